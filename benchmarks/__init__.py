@@ -1,0 +1,1 @@
+"""Measuring: errors, order, timing, studies, and the pytest plugin."""

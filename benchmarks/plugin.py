@@ -1,0 +1,1 @@
+"""Tell pytest about `--benchmark`."""

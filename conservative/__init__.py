@@ -1,0 +1,27 @@
+"""Conservative integration of rigid-body rotation, and the words that every method here shares.
+
+    import conservative as cv
+
+    trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
+"""
+
+from . import scenes as scenes
+from .body import RigidBody as RigidBody
+from .convected import Convected as Convected
+from .errors import BadInput as BadInput
+from .errors import Diverged as Diverged
+from .errors import IntegrationFailed as IntegrationFailed
+from .errors import MissingEngine as MissingEngine
+from .errors import NotConverged as NotConverged
+from .errors import Unsupported as Unsupported
+from .invariants import Invariant as Invariant
+from .method import Grid as Grid
+from .method import Method as Method
+from .method import integrate as integrate
+from .potential import Potential as Potential
+from .potential import UniformGravity as UniformGravity
+from .reduced import Reduced as Reduced
+from .scene import Scene as Scene
+from .trajectory import Counters as Counters
+from .trajectory import Trajectory as Trajectory
+from .version import VERSION as __version__  # noqa: N811  (the name every package uses)

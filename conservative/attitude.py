@@ -1,0 +1,102 @@
+"""Rotations: the hat map, the Cayley map, quaternions (scalar first), angles and the check that a matrix is a rotation.
+
+Every function is vectorised over leading axes. `R_WB` takes body components to world components.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+ROTATION_TOLERANCE = 1e-9
+"""Largest |R'R - 1| accepted of an attitude that a user hands in."""
+
+
+def hat(v: ArrayLike) -> Array:
+    """Return the skew matrices (..., 3, 3) with `hat(v) @ x == cross(v, x)` for v (..., 3)."""
+    v = np.asarray(v, dtype=float)
+    out = np.zeros((*v.shape[:-1], 3, 3))
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = v[..., 0], v[..., 1], v[..., 2]
+    out[..., 1, 2], out[..., 2, 0], out[..., 0, 1] = -v[..., 0], -v[..., 1], -v[..., 2]
+    return out
+
+
+def cayley(v: ArrayLike) -> Array:
+    """Return Cay(v) = (1 - hat(v)/2)^-1 (1 + hat(v)/2), (..., 3, 3), for rotation vectors v (..., 3)."""
+    half = np.asarray(v, dtype=float) / 2
+    skew = hat(half)
+    scale = 2 / (1 + np.sum(half * half, axis=-1))[..., None, None]
+    return np.eye(3) + scale * (skew + skew @ skew)
+
+
+def from_quaternion(q: ArrayLike) -> Array:
+    """Return matrices (..., 3, 3) of quaternions (..., 4), scalar first.
+
+    The formula is homogeneous: a quaternion of norm n gives n^2 times a rotation, so that a method which lets its
+    quaternion drift shows that drift as lost orthonormality instead of having it tidied away.
+    """
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def to_quaternion(R: ArrayLike) -> Array:
+    """Return unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3).
+
+    Of the four ways to read a quaternion off a matrix the one with the largest component is taken (Shepperd 1978).
+    The sign is chosen so that the scalar part is not negative.
+    """
+    R = np.asarray(R, dtype=float)
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    wx, wy, wz = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
+    candidates = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, wx, wy, wz], axis=-1),
+            np.stack([wx, 1 + xx - yy - zz, xy, xz], axis=-1),
+            np.stack([wy, xy, 1 - xx + yy - zz, yz], axis=-1),
+            np.stack([wz, xz, yz, 1 - xx - yy + zz], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def angle_between(R_ref: ArrayLike, R: ArrayLike) -> Array:
+    """Return the angle in rad, (...), of R_ref' R for attitudes (..., 3, 3).
+
+    Formed as 2 asin(|R - R_ref|_F / sqrt 8), which keeps full relative accuracy at small angles, where acos of the trace loses
+    half the digits. Not a number in, not a number out.
+    """
+    difference = np.asarray(R, dtype=float) - np.asarray(R_ref, dtype=float)
+    chord = np.sqrt(np.sum(difference * difference, axis=(-2, -1)) / 8)
+    return 2 * np.arcsin(np.where(chord > 1, 1.0, chord))
+
+
+def orthonormality(R: ArrayLike) -> Array:
+    """Return the largest component of |R'R - 1|, (...), for matrices (..., 3, 3)."""
+    R = np.asarray(R, dtype=float)
+    gram = np.swapaxes(R, -1, -2) @ R - np.eye(3)
+    return np.abs(gram).max(axis=(-2, -1))
+
+
+def rotation_about(axis: ArrayLike, angle: float) -> Array:
+    """Return the matrix (3, 3) that turns by `angle` rad about `axis` (3,), which need not be of unit length."""
+    axis = np.asarray(axis, dtype=float)
+    n = axis / np.linalg.norm(axis)
+    half = angle / 2
+    return from_quaternion(np.concatenate([[np.cos(half)], np.sin(half) * n]))
+
+
+def polished(R: Array) -> Array:
+    """Return the rotation next to a matrix (3, 3) that already is one to `ROTATION_TOLERANCE`, orthonormal to round-off."""
+    return from_quaternion(to_quaternion(R))

@@ -1,0 +1,95 @@
+"""The rigid body: its inertia about the fixed point and what follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .attitude import Array
+from .check import finite_array
+from .errors import BadInput
+
+_ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid body that turns about a fixed point.
+
+    Parameters
+    ----------
+    inertia
+        Principal moments (3,) or the whole tensor (3, 3) about the fixed point in body axes, kg m^2.
+
+    Raises
+    ------
+    BadInput
+        The inertia is not finite, not symmetric, not positive definite, or of another shape. Moments that no mass
+        distribution has (J1 + J2 < J3) are let through: the equations hold for them, though some engines refuse them.
+    """
+
+    inertia: Array
+
+    def __init__(self, inertia: ArrayLike) -> None:
+        value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
+        tensor = np.diag(value) if value.ndim == 1 else value
+        _check_tensor(tensor)
+        tensor = (tensor + tensor.T) / 2
+        tensor.flags.writeable = False
+        object.__setattr__(self, "inertia", tensor)
+
+    @cached_property
+    def _principal(self) -> tuple[Array, Array]:
+        """Moments and axes; a tensor that is diagonal already keeps its own axes in their order."""
+        if np.count_nonzero(self.inertia - np.diag(np.diag(self.inertia))) == 0:
+            return np.diag(self.inertia).copy(), np.eye(3)
+        moments, axes = np.linalg.eigh(self.inertia)
+        axes[:, 2] *= np.sign(np.linalg.det(axes))
+        return moments, axes
+
+    @property
+    def moments(self) -> Array:
+        """Principal moments (3,), kg m^2, in the order of the columns of `R_BP`."""
+        return self._principal[0]
+
+    @property
+    def R_BP(self) -> Array:
+        """Rotation (3, 3) that takes principal to body components."""
+        return self._principal[1]
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Inverse inertia (3, 3), 1/(kg m^2), body axes."""
+        return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
+
+    def momentum(self, w_WB_B: ArrayLike) -> Array:
+        """Return the angular momentum (..., 3) in body axes, kg m^2/s, of rates (..., 3) in rad/s."""
+        return np.asarray(w_WB_B, dtype=float) @ self.inertia
+
+    def symmetry_axis(self, tolerance: float = 1e-14) -> int | None:
+        """Return which principal axis (0, 1, 2) is one of symmetry; None for an asymmetric body, 2 for a spherical one.
+
+        Two moments are equal where they differ by no more than `tolerance` relative to the largest.
+        """
+        J = self.moments
+        for axis in (2, 1, 0):
+            other, another = (axis + 1) % 3, (axis + 2) % 3
+            if abs(J[other] - J[another]) <= tolerance * J.max():
+                return axis
+        return None
+
+    def __repr__(self) -> str:
+        diagonal = np.array_equal(self.inertia, np.diag(np.diag(self.inertia)))
+        return f"RigidBody(inertia={(np.diag(self.inertia) if diagonal else self.inertia).tolist()})"
+
+
+def _check_tensor(tensor: Array) -> None:
+    scale = np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > 1e-12 * scale:
+        raise BadInput("inertia", f"a matrix that is not symmetric (off by {np.abs(tensor - tensor.T).max():.3g})", _ALLOWED)
+    moments = np.linalg.eigvalsh(tensor)
+    if moments[0] <= 0:
+        raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _ALLOWED)

@@ -1,0 +1,66 @@
+"""Checks of arguments, made before any work."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .attitude import ROTATION_TOLERANCE, Array, orthonormality
+from .errors import BadInput
+
+
+def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...], ...], allowed: str) -> Array:
+    """Return `value` as a new float array of one of `shapes`, all finite; `BadInput` otherwise."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput(argument, repr(value), allowed) from None
+    if array.shape not in shapes:
+        raise BadInput(argument, f"shape {array.shape}", allowed)
+    if not np.isfinite(array).all():
+        raise BadInput(argument, f"{array.tolist()}, not finite", allowed)
+    return array
+
+
+def finite_number(argument: str, value: object, allowed: str) -> float:
+    """Return `value` as a finite float; `BadInput` otherwise."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise BadInput(argument, repr(value), allowed)
+    return float(value)
+
+
+def positive_number(argument: str, value: object, allowed: str = "a finite number above 0") -> float:
+    """Return `value` as a float that is finite and above 0; `BadInput` otherwise."""
+    number = finite_number(argument, value, allowed)
+    if number <= 0:
+        raise BadInput(argument, repr(value), allowed)
+    return number
+
+
+def positive_integer(argument: str, value: object, allowed: str = "an integer of 1 or more") -> int:
+    """Return `value` as an int of 1 or more; `BadInput` otherwise."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise BadInput(argument, repr(value), allowed)
+    return int(value)
+
+
+def rotation(argument: str, value: object) -> Array:
+    """Return `value`, a matrix (3, 3) or a SciPy `Rotation`, as a rotation matrix; `BadInput` says how far off it is."""
+    allowed = f"a rotation matrix (3, 3), orthonormal to {ROTATION_TOLERANCE:g} with determinant +1, or a SciPy Rotation"
+    as_matrix = getattr(value, "as_matrix", None)
+    R = finite_array(argument, as_matrix() if as_matrix else value, ((3, 3),), allowed)  # type: ignore[arg-type]
+    off = float(orthonormality(R))
+    if off > ROTATION_TOLERANCE:
+        raise BadInput(argument, f"a matrix with |R'R - 1| = {off:.3g}", allowed)
+    if np.linalg.det(R) < 0:
+        raise BadInput(argument, "a reflection (determinant -1)", allowed)
+    return R
+
+
+def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
+    """Raise `BadInput` unless `value` is one of `options`."""
+    if value not in options:
+        raise BadInput(argument, repr(value), "one of " + ", ".join(repr(o) for o in options))

@@ -1,0 +1,65 @@
+"""Errors a user can act on: which argument, what was got, what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BadInput(ValueError):
+    """An argument that cannot be used; the message says which one, what was got and what is allowed."""
+
+    def __init__(self, argument: str, got: object, allowed: str) -> None:
+        self.argument, self.got, self.allowed = argument, got, allowed
+        super().__init__(f"{argument}: got {got}; allowed: {allowed}")
+
+
+class Unsupported(BadInput):
+    """A method was asked for a scene that it cannot do."""
+
+
+class MissingEngine(ImportError):
+    """An engine is not installed; the message has the line that installs it."""
+
+    def __init__(self, engine: str, package: str) -> None:
+        self.engine, self.package = engine, package
+        super().__init__(f"engine: got {engine!r}, which is not installed; allowed after: pip install {package}")
+
+
+class IntegrationFailed(ArithmeticError):
+    """A run did not reach its end. `status` is the short text that trajectories and tables carry."""
+
+    status: str
+
+
+class NotConverged(IntegrationFailed):
+    """The equations of a step could not be solved.
+
+    Attributes: `step` (number of the step that failed, from 1), `time` (s, at its start) and `residual` (last size of the
+    residual, or of the correction relative to the unknown).
+    """
+
+    def __init__(self, step: int, time: float, residual: float) -> None:
+        self.step, self.time, self.residual = step, time, residual
+        self.status = f"not converged in step {step} at t = {time:g} s (residual {residual:.3g})"
+        super().__init__(
+            f"dt: got a step whose equations have no solution within reach: {self.status}; "
+            "allowed: a shorter step, or on_failure='return' to keep what was reached"
+        )
+
+
+class Diverged(IntegrationFailed):
+    """The state stopped being finite, or an engine gave up. Attributes: `time` (s, of the last good sample), `reason`."""
+
+    def __init__(self, time: float, reason: str = "the state is not finite") -> None:
+        self.time, self.reason = time, reason
+        self.status = f"diverged after t = {time:g} s ({reason})"
+        super().__init__(f"dt: got a run that {self.status}; allowed: a shorter step or a tighter tolerance, or on_failure='return'")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return what to say is allowed instead of an unknown `name`: the nearest known one first."""
+    known = sorted(known)
+    close = get_close_matches(name, known, n=1, cutoff=0.4)
+    listing = ", ".join(known)
+    return f"{close[0]!r} (nearest), or one of {listing}" if close else f"one of {listing}"

@@ -1,0 +1,80 @@
+"""What the exact motion conserves, as functions of attitude and rates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .attitude import Array
+from .potential import UniformGravity
+
+if TYPE_CHECKING:
+    from .body import RigidBody
+    from .potential import Potential
+    from .scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Invariant:
+    """A conserved quantity.
+
+    `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`, which has
+    the unit `unit` and is above 0.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    evaluate: Callable[[Array, Array], Array]
+
+
+def energy(body: RigidBody, potential: Potential | None, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return kinetic plus potential energy (...), J."""
+    kinetic = np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2
+    return kinetic if potential is None else kinetic + potential.energy(R_WB)
+
+
+def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return the angular momentum (..., 3) about the fixed point, kg m^2/s, world axes."""
+    return (R_WB @ body.momentum(w_WB_B)[..., None])[..., 0]
+
+
+def invariants_of(scene: Scene) -> tuple[Invariant, ...]:
+    """Return what follows from the body and the potential alone.
+
+    Energy always. World momentum (a vector) for a free body, its vertical component in uniform gravity. The axial momentum where
+    body and field are symmetric about one axis.
+    """
+    body, potential = scene.body, scene.potential
+    found = [Invariant("energy", "J", scene.energy_scale, lambda R, w: energy(body, potential, R, w))]
+    # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
+    size = float(np.linalg.norm(body.momentum(scene.w_WB_B0)))
+    scale = size or float(np.sqrt(body.moments.max() * scene.energy_scale))
+    if potential is None:
+        found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
+    elif isinstance(potential, UniformGravity):
+        found.append(Invariant("vertical momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)[..., 2]))
+    axis = axial_direction(body, potential)
+    if axis is not None:
+        found.append(Invariant("axial momentum", "kg m^2/s", scale, lambda R, w: body.momentum(w) @ axis))
+    return tuple(found)
+
+
+def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:
+    """Return the unit vector (3,), body axes, about which body and field are symmetric; None where they are not.
+
+    In uniform gravity it points to the side of the centre of mass. Fields of other kinds are not looked into: None.
+    """
+    if potential is not None and not isinstance(potential, UniformGravity):
+        return None
+    moment_P = np.zeros(3) if potential is None else potential.moment_B @ body.R_BP
+    size = float(np.linalg.norm(moment_P))
+    if size > 0 and np.ptp(body.moments) <= tolerance * body.moments.max():
+        return np.asarray(body.R_BP @ (moment_P / size))
+    axis = body.symmetry_axis(tolerance)
+    if axis is None or np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size:
+        return None
+    return np.asarray(body.R_BP[:, axis] * (-1.0 if moment_P[axis] < 0 else 1.0))

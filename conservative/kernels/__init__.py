@@ -1,0 +1,25 @@
+"""Compiled kernels. Importing this package imports numba; `import conservative` alone does not.
+
+Numba keys its on-disk cache on the file of the outermost function only, so an edit to an inner kernel would leave stale
+machine code behind. All kernels therefore live in this folder, and caches older than any of its files are dropped on import.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from numba import njit
+
+
+def _drop_stale_caches(folder: Path) -> None:
+    newest = max(file.stat().st_mtime for file in folder.glob("*.py"))
+    for index in (folder / "__pycache__").glob("*.nbi"):
+        if index.stat().st_mtime < newest:
+            index.unlink(missing_ok=True)
+
+
+_drop_stale_caches(Path(__file__).parent)
+
+kernel = partial(njit, cache=True, error_model="numpy")
+"""The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""

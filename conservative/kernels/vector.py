@@ -1,0 +1,80 @@
+"""Three-vectors, quaternions and 3 x 3 systems as tuples of floats, which compile to registers."""
+
+from __future__ import annotations
+
+from . import kernel
+
+
+@kernel
+def dot(a, b):
+    """a . b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """a x b"""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def add(a, b):
+    """a + b"""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def subtract(a, b):
+    """a - b"""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@kernel
+def scaled(s, a):
+    """s a"""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@kernel
+def times(a, b):
+    """Component by component: a diagonal matrix times a vector."""
+    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+@kernel
+def product(q, p):
+    """Quaternion product, scalar first."""
+    return (
+        q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3],
+        q[0] * p[1] + q[1] * p[0] + q[2] * p[3] - q[3] * p[2],
+        q[0] * p[2] - q[1] * p[3] + q[2] * p[0] + q[3] * p[1],
+        q[0] * p[3] + q[1] * p[2] - q[2] * p[1] + q[3] * p[0],
+    )
+
+
+@kernel
+def vertical(q):
+    """World e_z in the axes that the quaternion q turns into world axes: the last row of its matrix, over |q|^2."""
+    n = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (
+        2.0 * n * (q[1] * q[3] - q[0] * q[2]),
+        2.0 * n * (q[2] * q[3] + q[0] * q[1]),
+        n * (q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]),
+    )
+
+
+@kernel
+def solve(columns, b):
+    """x with c0 x0 + c1 x1 + c2 x2 = b, by Cramer's rule: no branch, so it stays in registers."""
+    c0, c1, c2 = columns
+    c12 = cross(c1, c2)
+    inverse = 1.0 / dot(c0, c12)
+    return (inverse * dot(b, c12), inverse * dot(b, cross(c2, c0)), inverse * dot(b, cross(c0, c1)))
+
+
+@kernel
+def accumulate(total, carry, increment):
+    """Compensated (Kahan) sum: the new total and what it lost, to be handed back with the next increment."""
+    wanted = increment - carry
+    new = total + wanted
+    return new, (new - total) - wanted

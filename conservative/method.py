@@ -1,0 +1,188 @@
+"""Methods, ours and the engines' alike: the protocol, the grid of steps and samples, and `integrate`."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from .attitude import Array
+from .check import choice, positive_integer, positive_number
+from .errors import BadInput, Unsupported
+from .scene import Scene
+from .trajectory import Trajectory
+from .version import VERSION
+
+Run = Callable[[], Trajectory]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
+
+    The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
+    """
+
+    dt: float
+    n_steps: int
+    every: int = 1
+
+    @cached_property
+    def steps(self) -> Array:
+        """Numbers (n,) of the steps after which a sample is kept, from 0."""
+        steps = np.arange(0, self.n_steps + 1, self.every)
+        return steps if steps[-1] == self.n_steps else np.append(steps, self.n_steps)
+
+    @cached_property
+    def t(self) -> Array:
+        """Times (n,) of the samples, s."""
+        return self.steps * self.dt
+
+    def kept(self, done: int) -> int:
+        """Return how many samples a run of `done` steps has filled."""
+        return self.n_samples if done == self.n_steps else 1 + done // self.every
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return 1 + -(-self.n_steps // self.every)
+
+
+def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: object = 1) -> Grid:
+    """Return the checked grid of a run.
+
+    Raises
+    ------
+    BadInput
+        dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
+    """
+    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
+    if step > end:
+        raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
+    # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
+    return Grid(step, max(1, math.ceil(end / step * (1 - 1e-9))), positive_integer("sample_every", sample_every))
+
+
+class Method(ABC):
+    """A way to integrate any scene it supports: a frozen value, one file, one line of registration.
+
+    Class attributes: `family` (its registered name) and `room` ("ours", "engine" or "truth").
+    """
+
+    family: ClassVar[str]
+    room: ClassVar[Literal["ours", "engine", "truth"]]
+
+    @property
+    def name(self) -> str:
+        """Return the registered name with the settings that are not defaults; `conservative.registry.method` reads it back."""
+        settings = settings_text(self)
+        return f"{self.family}:{settings}" if settings else self.family
+
+    @property
+    def label(self) -> str:
+        """Return name and version of what computes, and the setting, such as `mujoco==4.0.0/RK4`."""
+        return f"conservative=={VERSION}/{self.name}"
+
+    @property
+    @abstractmethod
+    def order(self) -> int | None:
+        """Order of convergence in dt that the method claims; None where accuracy does not depend on dt."""
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
+        return frozenset()
+
+    def unsupported(self, scene: Scene) -> str | None:
+        """Return why the scene cannot be done, None if it can."""
+        return None
+
+    @abstractmethod
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
+
+        Timing calls the run, so all that happens once per model belongs before it. A run may be called many times and
+        starts afresh each time.
+        """
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        """Return the settings that tables and generic tests take up by themselves."""
+        return (cls(),)
+
+    def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
+        """Return the trajectory, whatever its status; `integrate` is this with checks and exceptions."""
+        return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
+
+
+def settings_text(value: Any) -> str:
+    """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
+    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
+    return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)
+
+
+def require_support(method: Method, scene: Scene) -> None:
+    """Raise `Unsupported` if the method cannot do the scene."""
+    reason = method.unsupported(scene)
+    if reason:
+        raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene it can do ({reason})")
+
+
+def integrate(
+    scene: Scene,
+    dt: float = 0.01,
+    method: Method | None = None,
+    t_end: float | None = None,
+    sample_every: int = 1,
+    *,
+    on_failure: Literal["raise", "return"] = "raise",
+) -> Trajectory:
+    """Integrate a scene.
+
+    Parameters
+    ----------
+    scene
+        What moves.
+    dt
+        Step, s. For adaptive methods the distance of samples.
+    method
+        Default `Reduced()`, the paper's map in three unknowns.
+    t_end
+        Duration, s; default the scene's. The run ends with the first step at or past it.
+    sample_every
+        Keep every so many steps (and the first and last state).
+    on_failure
+        "raise" or, to get what was reached with a status that says what failed, "return".
+
+    Raises
+    ------
+    BadInput
+        An argument cannot be used.
+    Unsupported
+        The method cannot do the scene.
+    NotConverged
+        The equations of a step could not be solved.
+    Diverged
+        The state stopped being finite, or an engine gave up.
+    """
+    if method is None:
+        from .reduced import Reduced
+
+        method = Reduced()
+    if not isinstance(scene, Scene):
+        raise BadInput("scene", repr(scene), "a Scene, such as conservative.scenes.brick_flip()")
+    if not isinstance(method, Method):
+        raise BadInput("method", repr(method), "a Method, such as conservative.Reduced()")
+    choice("on_failure", on_failure, ("raise", "return"))
+    grid = grid_for(scene, dt, t_end, sample_every)
+    require_support(method, scene)
+    trajectory = method.prepare(scene, grid)()
+    if trajectory.failure is not None and on_failure == "raise":
+        raise trajectory.failure
+    return trajectory

@@ -1,0 +1,94 @@
+"""Scenes and methods by name. Everybody registers the same way, we too: an entry point in the package's pyproject.
+
+    [project.entry-points."conservative.methods"]
+    my_method = "my_package.my_file:MyMethod"           # a class derived from conservative.Method
+
+    [project.entry-points."conservative.scenes"]
+    my_scene = "my_package.my_scenes:my_scene"          # a function whose parameters all have defaults, returning a Scene
+
+A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from .errors import BadInput, nearest
+from .method import Method
+from .scene import Scene
+
+METHODS, SCENES = "conservative.methods", "conservative.scenes"
+
+
+@cache
+def registered(group: str) -> dict[str, EntryPoint]:
+    """Return the entry points of `METHODS` or `SCENES` by name, in order of their names; nothing is imported."""
+    return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+
+
+def _load(group: str, argument: str, name: str) -> Any:
+    known = registered(group)
+    if name not in known:
+        raise BadInput(argument, repr(name), nearest(name, known))
+    return known[name].load()
+
+
+def scene(text: str) -> Scene:
+    """Return a scene from its name with parameters, such as `brick_flip` or `brick_flip:disturbance=1e-6`.
+
+    Raises
+    ------
+    BadInput
+        The name or a parameter is unknown, or a value cannot be used.
+    """
+    name, settings = _split(text)
+    builder: Callable[..., Scene] = _load(SCENES, "scene", name)
+    return builder(**_arguments(f"scene {name}", builder, settings))
+
+
+def method(text: str) -> Method:
+    """Return a method from its name with settings, such as `reduced`, `mujoco:RK4` or `heyoka:tol=1e-9,frame=non_spinning`.
+
+    Raises
+    ------
+    BadInput
+        The name or a setting is unknown, or a value cannot be used.
+    MissingEngine
+        The engine is not installed.
+    """
+    name, settings = _split(text)
+    family: type[Method] = _load(METHODS, "method", name)
+    return family(**_arguments(f"method {name}", family, settings))
+
+
+def _split(text: str) -> tuple[str, list[str]]:
+    name, _, rest = text.partition(":")
+    return name, [item.strip() for item in rest.split(",") if item.strip()]
+
+
+def _arguments(argument: str, target: Callable[..., object], settings: list[str]) -> dict[str, Any]:
+    """Return keyword arguments from `key=value` items; items without a key go to the parameters in their order."""
+    parameters = list(inspect.signature(target).parameters)
+    found: dict[str, Any] = {}
+    for position, item in enumerate(settings):
+        key, equals, value = item.partition("=")
+        if not equals:
+            key, value = parameters[position] if position < len(parameters) else item, item
+        if key not in parameters:
+            raise BadInput(argument, repr(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
+        found[key] = _value(value)
+    return found
+
+
+def _value(text: str) -> object:
+    for convert in (int, float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False, "none": None}.get(text.lower(), text)
+

@@ -1,0 +1,111 @@
+"""A scene: a body, what acts on it, how it starts and for how long. Only what the motion needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .attitude import Array
+from .body import RigidBody
+from .check import finite_array, positive_number, rotation
+from .errors import BadInput
+from .invariants import Invariant, invariants_of
+from .potential import Potential
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A rigid body turning about a fixed point, from a start, for a time.
+
+    Parameters
+    ----------
+    name
+        What tables and pictures call it.
+    body
+        The body.
+    R_WB0
+        Attitude at t = 0: a rotation matrix (3, 3), body to world, or a SciPy `Rotation`.
+    w_WB_B0
+        Angular velocity at t = 0 (3,), rad/s, body axes.
+    t_end
+        Duration, s.
+    potential
+        What acts on the body; None for a free body, which then carries no torque code anywhere.
+    dt
+        Step of the source, s: what commands and studies take when nobody says otherwise. Default: a 20th of a radian's time.
+    extra_invariants
+        Conserved quantities beyond those that follow from the body and the potential.
+    group, source
+        Heading under which `conservative list` shows the scene, and where it comes from.
+
+    Raises
+    ------
+    BadInput
+        An argument is not finite, has another shape, or is not a rotation.
+    """
+
+    name: str
+    body: RigidBody
+    R_WB0: Array
+    w_WB_B0: Array
+    t_end: float
+    potential: Potential | None = None
+    dt: float | None = field(default=None, kw_only=True)
+    extra_invariants: tuple[Invariant, ...] = field(default=(), kw_only=True)
+    group: str = field(default="your own", kw_only=True)
+    source: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise BadInput("name", repr(self.name), "a text of one character or more")
+        if not isinstance(self.body, RigidBody):
+            raise BadInput("body", repr(self.body), "a RigidBody")
+        if self.potential is not None and not isinstance(self.potential, Potential):
+            raise BadInput("potential", repr(self.potential), "None or a Potential such as UniformGravity")
+        self._set("R_WB0", rotation("R_WB0", self.R_WB0))
+        self._set("w_WB_B0", finite_array("w_WB_B0", self.w_WB_B0, ((3,),), "three finite rates (3,), rad/s"))
+        self._set("t_end", positive_number("t_end", self.t_end, "a finite duration above 0, s"))
+        self._set("dt", self._default_dt() if self.dt is None else positive_number("dt", self.dt, "a step above 0, s"))
+
+    def _set(self, name: str, value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+        object.__setattr__(self, name, value)
+
+    def _default_dt(self) -> float:
+        speed = float(np.linalg.norm(self.w_WB_B0))
+        return min(self.t_end, 0.05 / speed if speed > 0 else self.t_end / 100)
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing acts on the body."""
+        return self.potential is None
+
+    @cached_property
+    def kinetic_energy0(self) -> float:
+        """Kinetic energy at the start, J."""
+        return float(self.w_WB_B0 @ self.body.inertia @ self.w_WB_B0) / 2
+
+    @cached_property
+    def energy_scale(self) -> float:
+        """What energy errors are relative to, J: kinetic energy at the start plus the size of the potential; never 0.
+
+        Unlike the energy itself it does not vanish where kinetic and potential energy cancel.
+        """
+        size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
+        return size or 1.0
+
+    @cached_property
+    def invariants(self) -> tuple[Invariant, ...]:
+        """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
+        return (*invariants_of(self), *self.extra_invariants)
+
+    def renamed(self, name: str, **changes: Any) -> Scene:
+        """Return the scene under another name and with other fields where `changes` says so."""
+        return replace(self, name=name, **changes)
+
+    def __repr__(self) -> str:
+        return f"Scene({self.name!r}, {self.body!r}, potential={self.potential!r}, t_end={self.t_end:g})"

@@ -1,0 +1,92 @@
+"""What a method hands back: sampled attitudes and rates, what it cost in work, and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from . import invariants
+from .attitude import Array
+from .errors import IntegrationFailed
+from .scene import Scene
+
+OK = "ok"
+
+
+@dataclass(frozen=True)
+class Counters:
+    """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
+
+    None means that the method does not have the thing or its engine does not tell.
+    """
+
+    steps: int
+    stages: int | None = None
+    iterations: int | None = None
+    evaluations: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Samples of a motion.
+
+    Attributes
+    ----------
+    scene
+        What was integrated.
+    t
+        Times (n,), s.
+    R_WB
+        Attitudes (n, 3, 3), body to world, as the method has them: not tidied up.
+    w_WB_B
+        Angular velocities (n, 3), rad/s, body axes.
+    label
+        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`.
+    counters
+        Work done.
+    failure
+        What ended the run early, as the exception that `integrate` raises; the samples then end before it. None if all went well.
+    """
+
+    scene: Scene
+    t: Array
+    R_WB: Array
+    w_WB_B: Array
+    label: str
+    counters: Counters = field(default=Counters(0))
+    failure: IntegrationFailed | None = None
+
+    @property
+    def status(self) -> str:
+        """Return "ok", or what failed and when."""
+        return OK if self.failure is None else self.failure.status
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end."""
+        return self.failure is None
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic plus potential energy (n,), J."""
+        return invariants.energy(self.scene.body, self.scene.potential, self.R_WB, self.w_WB_B)
+
+    @cached_property
+    def momentum_W(self) -> Array:
+        """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
+        return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        end = f"{self.t[-1]:g} s" if len(self.t) else "nothing"
+        return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {end}, status={self.status!r})"
+
+
+def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
+    """Return how many leading samples are finite."""
+    good = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
+    return len(good) if good.all() else int(np.argmin(good))

@@ -1,0 +1,1 @@
+"""Showing: tables, pictures, the report and the command line."""
