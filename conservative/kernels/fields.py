@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numba.extending import overload
 
 from . import kernel
@@ -33,8 +32,8 @@ def finite_torque(field, q, a):
     raise TypeError("compiled only")  # pragma: no cover
 
 
-def body_torque(field, gamma):
-    """Return the torque in N m, principal axes, where the world's e_z has the principal components `gamma`."""
+def body_torque(field, q):
+    """Return the torque in N m, principal axes, at the attitude of the quaternion q, whose length does not matter."""
     raise TypeError("compiled only")  # pragma: no cover
 
 
@@ -45,7 +44,7 @@ def finite_derivative(field, q0, q1):
 
 def is_field(type_, field) -> bool:
     """Whether a numba type is the named tuple `field`."""
-    return isinstance(type_, types.BaseNamedTuple) and type_.instance_class is field
+    return getattr(type_, "instance_class", None) is field
 
 
 @overload(finite_torque)
@@ -90,12 +89,12 @@ def _derivative(k, a, c, ac, ax, m, s, g):
 
 
 @overload(body_torque)
-def _body_torque_uniform(field, gamma):
+def _body_torque_uniform(field, q):
     if not is_field(field, Uniform):
         return None
 
-    def torque(field, gamma):
-        return cross(gamma, (field.x, field.y, field.z))
+    def torque(field, q):
+        return cross(vertical(q), (field.x, field.y, field.z))
 
     return torque
 

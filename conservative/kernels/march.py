@@ -15,7 +15,7 @@ import numpy as np
 
 from . import kernel
 from .fields import body_torque, finite_torque
-from .vector import accumulate, add, cross, dot, product, scaled, solve, subtract, times, vertical
+from .vector import accumulate, add, cross, dot, product, scaled, solve, subtract, times
 
 MAX_ITERATIONS = 30
 
@@ -25,7 +25,7 @@ def initial_guess(h, J_inverse, field, q, L):
     """a of an explicit half step of Euler's equations: third order in h, so that Newton mostly needs two corrections."""
     rate = cross(L, times(J_inverse, L))
     if field is not None:
-        rate = add(rate, body_torque(field, vertical(q)))
+        rate = add(rate, body_torque(field, q))
     return scaled(0.5 * h, times(J_inverse, add(L, scaled(0.5 * h, rate))))
 
 
@@ -53,8 +53,8 @@ def residual_and_tangent(h, J, field, q, L, a):
 def solved(h, J, J_inverse, field, q, L, tolerance):
     """Return (a, T, corrections made, size of the last relative to a, or -1 times it where Newton gave up).
 
-    Newton converges quadratically, so a correction of relative size s leaves an error of s^2: the loop ends AFTER the correction
-    with s^2 <= tolerance. Testing before it would bias the energy (method, section 9).
+    Newton converges quadratically, so a correction of relative size s leaves an error of s^2: the loop ends AFTER the
+    correction with s^2 <= tolerance. Testing before it would bias the energy (method, section 9).
     """
     a = initial_guess(h, J_inverse, field, q, L)
     size = math.inf
