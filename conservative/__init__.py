@@ -1,8 +1,8 @@
 """Conservative integration of rigid-body rotation, and the words that every method here shares.
 
-    import conservative as cv
+import conservative as cv
 
-    trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
+trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 """
 
 from . import scenes as scenes
@@ -24,4 +24,6 @@ from .reduced import Reduced as Reduced
 from .scene import Scene as Scene
 from .trajectory import Counters as Counters
 from .trajectory import Trajectory as Trajectory
-from .version import VERSION as __version__  # noqa: N811  (the name every package uses)
+from .version import VERSION as VERSION
+
+__version__ = VERSION

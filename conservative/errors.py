@@ -54,7 +54,9 @@ class Diverged(IntegrationFailed):
     def __init__(self, time: float, reason: str = "the state is not finite") -> None:
         self.time, self.reason = time, reason
         self.status = f"diverged after t = {time:g} s ({reason})"
-        super().__init__(f"dt: got a run that {self.status}; allowed: a shorter step or a tighter tolerance, or on_failure='return'")
+        super().__init__(
+            f"dt: got a run that {self.status}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
+        )
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class Invariant:
     """A conserved quantity.
 
-    `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`, which has
-    the unit `unit` and is above 0.
+    `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
+    which has the unit `unit` and is above 0.
     """
 
     name: str
@@ -45,8 +45,8 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
 def invariants_of(scene: Scene) -> tuple[Invariant, ...]:
     """Return what follows from the body and the potential alone.
 
-    Energy always. World momentum (a vector) for a free body, its vertical component in uniform gravity. The axial momentum where
-    body and field are symmetric about one axis.
+    Energy always. World momentum (a vector) for a free body, its vertical component in uniform gravity. The axial momentum
+    where body and field are symmetric about one axis.
     """
     body, potential = scene.body, scene.potential
     found = [Invariant("energy", "J", scene.energy_scale, lambda R, w: energy(body, potential, R, w))]

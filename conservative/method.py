@@ -35,8 +35,8 @@ class Grid:
     @cached_property
     def steps(self) -> Array:
         """Numbers (n,) of the steps after which a sample is kept, from 0."""
-        steps = np.arange(0, self.n_steps + 1, self.every)
-        return steps if steps[-1] == self.n_steps else np.append(steps, self.n_steps)
+        steps = np.arange(0, self.n_steps + 1, self.every, dtype=float)
+        return steps if steps[-1] == self.n_steps else np.append(steps, float(self.n_steps))
 
     @cached_property
     def t(self) -> Array:

@@ -91,4 +91,3 @@ def _value(text: str) -> object:
         except ValueError:
             continue
     return {"true": True, "false": False, "none": None}.get(text.lower(), text)
-

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
@@ -14,6 +15,9 @@ from .check import finite_array, positive_number, rotation
 from .errors import BadInput
 from .invariants import Invariant, invariants_of
 from .potential import Potential
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +39,7 @@ class Scene:
     potential
         What acts on the body; None for a free body, which then carries no torque code anywhere.
     dt
-        Step of the source, s: what commands and studies take when nobody says otherwise. Default: a 20th of a radian's time.
+        Step of the source, s: what commands and studies take when nobody says otherwise.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
@@ -52,32 +56,49 @@ class Scene:
     R_WB0: Array
     w_WB_B0: Array
     t_end: float
-    potential: Potential | None = None
-    dt: float | None = field(default=None, kw_only=True)
-    extra_invariants: tuple[Invariant, ...] = field(default=(), kw_only=True)
-    group: str = field(default="your own", kw_only=True)
-    source: str = field(default="", kw_only=True)
+    potential: Potential | None
+    dt: float
+    extra_invariants: tuple[Invariant, ...]
+    group: str
+    source: str
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise BadInput("name", repr(self.name), "a text of one character or more")
-        if not isinstance(self.body, RigidBody):
-            raise BadInput("body", repr(self.body), "a RigidBody")
-        if self.potential is not None and not isinstance(self.potential, Potential):
-            raise BadInput("potential", repr(self.potential), "None or a Potential such as UniformGravity")
-        self._set("R_WB0", rotation("R_WB0", self.R_WB0))
-        self._set("w_WB_B0", finite_array("w_WB_B0", self.w_WB_B0, ((3,),), "three finite rates (3,), rad/s"))
-        self._set("t_end", positive_number("t_end", self.t_end, "a finite duration above 0, s"))
-        self._set("dt", self._default_dt() if self.dt is None else positive_number("dt", self.dt, "a step above 0, s"))
+    def __init__(
+        self,
+        name: str,
+        body: RigidBody,
+        R_WB0: ArrayLike | Rotation,
+        w_WB_B0: ArrayLike,
+        t_end: float,
+        potential: Potential | None = None,
+        *,
+        dt: float | None = None,
+        extra_invariants: tuple[Invariant, ...] = (),
+        group: str = "your own",
+        source: str = "",
+    ) -> None:
+        if not isinstance(name, str) or not name:
+            raise BadInput("name", repr(name), "a text of one character or more")
+        if not isinstance(body, RigidBody):
+            raise BadInput("body", repr(body), "a RigidBody")
+        if potential is not None and not isinstance(potential, Potential):
+            raise BadInput("potential", repr(potential), "None or a Potential such as UniformGravity")
+        rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
+        end = positive_number("t_end", t_end, "a finite duration above 0, s")
+        self._set("name", name)
+        self._set("body", body)
+        self._set("R_WB0", rotation("R_WB0", R_WB0))
+        self._set("w_WB_B0", rates)
+        self._set("t_end", end)
+        self._set("potential", potential)
+        self._set("dt", _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s"))
+        self._set("extra_invariants", tuple(extra_invariants))
+        self._set("group", group)
+        self._set("source", source)
 
     def _set(self, name: str, value: Any) -> None:
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
         object.__setattr__(self, name, value)
-
-    def _default_dt(self) -> float:
-        speed = float(np.linalg.norm(self.w_WB_B0))
-        return min(self.t_end, 0.05 / speed if speed > 0 else self.t_end / 100)
 
     @property
     def free(self) -> bool:
@@ -109,3 +130,9 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({self.name!r}, {self.body!r}, potential={self.potential!r}, t_end={self.t_end:g})"
+
+
+def _usual_step(w_WB_B0: Array, t_end: float) -> float:
+    """Return the time, s, in which the body turns by a 20th of a radian, or a hundredth of the duration if that is shorter."""
+    speed = float(np.linalg.norm(w_WB_B0))
+    return min(t_end / 100, 0.05 / speed) if speed > 0 else t_end / 100

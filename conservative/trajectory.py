@@ -47,7 +47,7 @@ class Trajectory:
     counters
         Work done.
     failure
-        What ended the run early, as the exception that `integrate` raises; the samples then end before it. None if all went well.
+        What ended the run early, as the exception that `integrate` raises; the samples then end before it. Else None.
     """
 
     scene: Scene
@@ -88,5 +88,5 @@ class Trajectory:
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
     """Return how many leading samples are finite."""
-    good = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
-    return len(good) if good.all() else int(np.argmin(good))
+    finite = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
+    return len(R_WB) if np.all(finite) else int(np.argmin(finite))

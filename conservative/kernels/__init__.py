@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from numba import njit
 
@@ -21,5 +22,5 @@ def _drop_stale_caches(folder: Path) -> None:
 
 _drop_stale_caches(Path(__file__).parent)
 
-kernel = partial(njit, cache=True, error_model="numpy")
+kernel: Any = partial(njit, cache=True, error_model="numpy")
 """The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""

@@ -1,6 +1,7 @@
 """The flying brick: spin about the unstable intermediate axis, which turns over at regular intervals.
 
-Krenk & Nielsen, section 5.1: a box 1 x 3 x 2 of mass 12, so J = (13, 5, 10), free, started about its 3-axis, the intermediate one.
+Krenk & Nielsen, section 5.1: a box 1 x 3 x 2 of mass 12, so J = (13, 5, 10), free, started about its 3-axis, which is the
+intermediate one.
 """
 
 from __future__ import annotations
