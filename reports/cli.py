@@ -1,0 +1,123 @@
+"""The command line `conservative`. What needs more than click is imported when a command runs, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+EXIT_CODES = """Exit codes:
+    0  done
+    1  a run failed: it did not converge, or diverged; or the command was interrupted
+    2  the command or an input cannot be used, or an engine is missing
+"""
+
+
+def _epilog(*examples: str) -> str:
+    """Return what every --help ends with; a backspace on a line of its own keeps click from joining the lines after it."""
+    return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])
+
+
+class _UserError(click.ClickException):
+    exit_code = 2
+
+
+class Commands(click.Group):
+    """Commands whose user errors end as one line on stderr and an exit code, never as a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (ValueError, ImportError, ArithmeticError) as error:
+            raise _as_click(error) from None
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        kwargs.setdefault("prog_name", "conservative")
+        return super().main(*args, **kwargs)
+
+
+def _as_click(error: Exception) -> Exception:
+    """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
+    from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+
+    if isinstance(error, BadInput | MissingEngine):
+        return _UserError(str(error))
+    return click.ClickException(str(error)) if isinstance(error, IntegrationFailed) else error
+
+
+def _names(group: str) -> Any:
+    """Return the completion of registered names of `group`; several are separated by commas."""
+
+    def complete(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+        from conservative.registry import registered
+
+        before, comma, last = incomplete.rpartition(",")
+        return [before + comma + name for name in registered(f"conservative.{group}") if name.startswith(last)]
+
+    return complete
+
+
+@click.group(
+    cls=Commands,
+    epilog=_epilog(
+        "conservative report                      everything, into report/",
+        "conservative run brick_flip --dt 0.01    one run",
+        "conservative list                        scenes and methods",
+    ),
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(package_name="conservative-rotation", message="%(prog)s %(version)s")
+def main() -> None:
+    """Integrate the rotation of rigid bodies so that energy and momentum stay, and measure that beside other engines.
+
+    Completion of names: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)", or zsh_source, or fish_source.
+    """
+
+
+@main.command(
+    "list",
+    short_help="Show scenes and methods.",
+    epilog=_epilog(
+        "conservative list",
+        "conservative list --json | jq '.methods[] | select(.available) | .name'",
+    ),
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def list_command(as_json: bool) -> None:
+    """Show the scenes, grouped, and the methods, with what they conserve and whether their engine is installed."""
+    from . import catalogue
+
+    if as_json:
+        click.echo(catalogue.as_json())
+    else:
+        catalogue.show()
+
+
+@main.command(
+    short_help="Integrate one scene once.",
+    epilog=_epilog(
+        "conservative run brick_flip --method reduced --dt 0.01",
+        "conservative run lagrange_top -m mujoco:RK4 --dt 0.001 --t-end 2 --json",
+        "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
+    ),
+)
+@click.argument("scene", shell_complete=_names("scenes"))
+@click.option(
+    "--method", "-m", default="reduced", show_default=True, shell_complete=_names("methods"), help="Name, with settings."
+)
+@click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
+@click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+@click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
+@click.option("--csv", type=click.Path(path_type=Path), help="Write every sample: t, R_WB, w_WB_B, energy, momentum.")
+def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
+    """Integrate SCENE once and show how it ended, its drifts and its last state.
+
+    A run that fails leaves what it reached in the file, and exits with 1.
+    """
+    from . import single
+
+    summary = single.run(scene, method, dt, t_end, csv)
+    click.echo(single.as_json(summary) if as_json else single.as_text(summary))
+    if summary["status"] != "ok":
+        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['status']}")

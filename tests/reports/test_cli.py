@@ -1,0 +1,156 @@
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from reports.cli import main
+
+
+def conservative(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def one_line(text):
+    return text.startswith("Error: ") and text.count("\n") == 1
+
+
+def test_import_brings_in_nothing_heavy():
+    heavy = ["numpy", "pandas", "numba", "altair", "rich", "jinja2", "mujoco", "scipy"]
+    code = f"import sys, reports.cli; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in main.commands)])
+def test_help_has_examples_and_exit_codes(command):
+    done = conservative(*command, "--help")
+    assert done.exit_code == 0
+    assert "Examples:" in done.stdout
+    assert "Exit codes:" in done.stdout
+
+
+def test_run_equals_the_known_rates():
+    done = conservative("run", "brick_flip", "--method", "reduced", "--dt", "0.01", "--json")
+    assert done.exit_code == 0
+    summary = json.loads(done.stdout)
+    # method.md, section 3: rates of the scheme itself at t = 6
+    error = np.abs(np.subtract(summary["last"]["w_WB_B"], (-0.2856185, 0.36022433, 9.99151229))).max()
+    assert error < 1e-8  # measured 3.8e-9, the digits printed there
+    assert summary["counters"]["steps"] == 600
+    assert summary["drift"]["energy"] < 1e-14  # measured 4.5e-16
+    assert summary["status"] == "ok"
+
+
+def test_run_as_text_has_the_same_figures():
+    text = conservative("run", "lagrange_top", "--t-end", "0.1").stdout
+    for part in ("conservative==", "ok", "drift of energy", "drift of axial momentum", "R_WB row 3", "w_WB_B, rad/s"):
+        assert part in text
+
+
+def test_run_writes_samples(tmp_path):
+    path = tmp_path / "run.csv"
+    assert conservative("run", "lagrange_top", "--t-end", "0.1", "--csv", path).exit_code == 0
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert len(rows) == 11
+    assert float(rows[-1]["t"]) == pytest.approx(0.1, abs=1e-15)
+    R = np.array([[float(rows[-1][f"R_WB_{i}{j}"]) for j in "123"] for i in "123"])
+    assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14  # measured 4e-16
+    assert abs(float(rows[-1]["energy"]) / float(rows[0]["energy"]) - 1) < 1e-13  # measured 3e-15
+
+
+def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
+    path = tmp_path / "run.csv"
+    done = conservative("run", "lagrange_top", "-m", "convected:1e-300", "--t-end", "0.1", "--csv", path)
+    assert done.exit_code == 1
+    assert one_line(done.stderr)
+    assert "not converged in step" in done.stderr
+    assert "not converged in step" in done.stdout
+    assert len(path.read_text().splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["brik_flip"], ["scene: got 'brik_flip'", "'brick_flip' (nearest)"]),
+        (["brick_flip", "-m", "redused"], ["method: got 'redused'", "'reduced' (nearest)"]),
+        (["brick_flip", "-m", "reduced:tool=1"], ["method reduced: got 'tool=1'", "'tol' (nearest)"]),
+        (["brick_flip", "-m", "reduced:tol=-1"], ["tol: got -1", "above 0"]),
+        (["brick_flip", "--dt", "0"], ["dt: got 0.0", "above 0"]),
+        (["brick_flip", "--dt", "nan"], ["dt: got nan", "above 0"]),
+        (["brick_flip", "--dt", "7"], ["dt: got 7", "at most t_end = 6"]),
+        (["brick_flip", "--t-end", "-1"], ["t_end: got -1.0", "above 0"]),
+        (["brick_flip", "--csv", "missing/run.csv"], ["csv: got 'missing/run.csv'", "a folder that exists"]),
+    ],
+)
+def test_mistakes_end_in_one_clear_line(arguments, parts, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = conservative("run", *arguments)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert one_line(done.stderr)
+    assert all(part in done.stderr for part in parts)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [["run"], ["run", "brick_flip", "--dt", "fast"], ["nonsense"], ["list", "--xml"]])
+def test_usage_errors_exit_with_2(arguments):
+    done = conservative(*arguments)
+    assert done.exit_code == 2
+    assert "Traceback" not in done.output
+
+
+def test_a_bug_keeps_its_traceback(monkeypatch):
+    def broken():
+        raise ValueError("not the user's mistake")
+
+    monkeypatch.setattr("reports.catalogue.show", broken)
+    assert isinstance(conservative("list").exception, ValueError)
+
+
+def test_list_names_what_is_registered():
+    listed = json.loads(conservative("list", "--json").stdout)
+    brick = next(scene for scene in listed["scenes"] if scene["name"] == "brick_flip")
+    assert brick["group"] == "free body"
+    assert brick["invariants"] == ["energy", "momentum"]
+    assert "5.1" in brick["source"]
+    reduced = next(method for method in listed["methods"] if method["name"] == "reduced")
+    assert reduced["order"] == 2
+    assert reduced["available"]
+    assert "energy" in reduced["conserves"]
+
+
+def test_list_as_text():
+    done = conservative("list")
+    assert done.exit_code == 0
+    for part in ("Scenes: free body", "lagrange_top", "Methods: ours", "convected"):
+        assert part in done.stdout
+
+
+def test_missing_engine_is_listed_with_its_install_line(monkeypatch):
+    from conservative import MissingEngine, Reduced
+
+    def missing(self):
+        raise MissingEngine("reduced", "some-package")
+
+    monkeypatch.setattr(Reduced, "label", property(missing))
+    listed = json.loads(conservative("list", "--json").stdout)
+    entry = next(method for method in listed["methods"] if method["name"] == "reduced")
+    assert not entry["available"]
+    assert "pip install some-package" in entry["reason"]
+    done = conservative("run", "brick_flip")
+    assert done.exit_code == 2
+    assert "pip install some-package" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"), [("run bri", "brick_flip"), ("run brick_flip --method re", "reduced"), ("l", "list")]
+)
+def test_completion_offers_names(words, offered):
+    environment = {"_CONSERVATIVE_COMPLETE": "bash_complete", "COMP_WORDS": f"conservative {words}"}
+    environment["COMP_CWORD"] = str(len(words.split()))
+    done = CliRunner().invoke(main, [], env=environment, prog_name="conservative")
+    assert f"plain,{offered}" in done.stdout.splitlines()
