@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.method import Grid, grid_for
+
+BRICK = cv.scenes.brick_flip()
+
+
+@pytest.mark.parametrize(
+    ("dt", "t_end", "every", "n_steps", "times"),
+    [
+        (0.01, 6, 100, 600, [0, 1, 2, 3, 4, 5, 6]),
+        (0.1, 0.35, 1, 4, [0, 0.1, 0.2, 0.3, 0.4]),  # the last step is the first at or past the end
+        (0.1, 0.5, 2, 5, [0, 0.2, 0.4, 0.5]),  # the last state is kept whatever `every` says
+        (0.1, 0.1, 7, 1, [0, 0.1]),
+        (1 / 3, 1.0, 1, 3, [0, 1 / 3, 2 / 3, 1]),
+    ],
+)
+def test_grid_of_steps_and_samples(dt, t_end, every, n_steps, times):
+    grid = grid_for(BRICK, dt, t_end, every)
+    assert grid.n_steps == n_steps
+    np.testing.assert_allclose(grid.t, times, rtol=1e-15)
+    assert grid.n_samples == len(grid.t)
+
+
+@pytest.mark.parametrize("done", range(8))
+def test_grid_counts_the_samples_of_a_run_that_stopped(done):
+    grid = Grid(0.1, 7, 3)
+    assert grid.kept(done) == np.searchsorted(grid.steps, done, side="right")
+
+
+@pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10"])
+def test_names_are_read_back(text):
+    assert registry.method(text).name == text.replace("1e-10", "1e-10")
+    assert registry.method(registry.method(text).name) == registry.method(text)
+
+
+def test_a_setting_may_come_without_its_name():
+    assert registry.method("convected:1e-10") == cv.Convected(tol=1e-10)
+    assert registry.scene("brick_flip:1e-6").w_WB_B0[1] == 1e-6
+
+
+def test_default_method_is_the_papers_map():
+    assert cv.integrate(BRICK, t_end=0.1).label == f"conservative=={cv.__version__}/reduced"
+
+
+def test_a_step_without_solution_is_an_error_that_says_where():
+    with pytest.raises(cv.NotConverged) as caught:
+        cv.integrate(BRICK, dt=0.5, method=cv.Convected(tol=1e-30))
+    assert caught.value.step == 1
+    assert caught.value.time == 0
+    assert caught.value.residual > 0
+
+
+def test_what_was_reached_before_a_failure_can_be_had():
+    trajectory = cv.integrate(BRICK, dt=0.5, method=cv.Convected(tol=1e-30), on_failure="return")
+    assert trajectory.status.startswith("not converged in step 1 at t = 0")
+    assert len(trajectory) == 1
+    assert not trajectory.ok
+    np.testing.assert_allclose(trajectory.w_WB_B[0], BRICK.w_WB_B0, rtol=1e-15)
+
+
+def test_a_run_starts_afresh_each_time():
+    run = cv.Reduced().prepare(BRICK, Grid(0.01, 50))
+    np.testing.assert_array_equal(run().R_WB, run().R_WB)
+
+
+def test_samples_do_not_depend_on_how_many_are_kept():
+    all_of_them = cv.integrate(BRICK, 0.01, sample_every=1)
+    few = cv.integrate(BRICK, 0.01, sample_every=50)
+    np.testing.assert_array_equal(few.R_WB, all_of_them.R_WB[::50])
+    np.testing.assert_array_equal(few.w_WB_B, all_of_them.w_WB_B[::50])
+
+
+def test_what_does_not_turn_stays():
+    scene = cv.Scene("rest", cv.RigidBody((1, 2, 2.5)), np.eye(3), (0, 0, 0), 1.0)
+    trajectory = cv.integrate(scene, 0.1)
+    np.testing.assert_array_equal(trajectory.R_WB, np.broadcast_to(np.eye(3), (11, 3, 3)))
+    np.testing.assert_array_equal(trajectory.w_WB_B, np.zeros((11, 3)))
