@@ -1,0 +1,178 @@
+"""What every engine's file needs: its version, its module, and the scene in axes an engine can use.
+
+Engines see the body in axes F in which its inertia is diagonal. Going there and back happens here, once in each direction:
+
+    R_WF = R_WB R_BF      w_F = R_BF' w_B      and back      R_WB = R_WF R_BF'      w_B = R_BF w_F
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module, metadata
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.body import RigidBody
+from conservative.errors import Diverged, MissingEngine
+from conservative.invariants import axial_direction
+from conservative.method import Grid
+from conservative.potential import UniformGravity
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory, finite_prefix
+
+
+@cache
+def version(package: str, engine: str) -> str:
+    """Return the version of an installed package; the engine itself is not imported.
+
+    Raises
+    ------
+    MissingEngine
+        The package is not installed; the message has the line that installs it.
+    """
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        raise MissingEngine(engine, package) from None
+
+
+@cache
+def load(module: str, package: str, engine: str) -> Any:
+    """Return an engine's module, imported at the first call.
+
+    Raises
+    ------
+    MissingEngine
+        The module cannot be imported.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingEngine(engine, package) from error
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """A scene's start in axes F that diagonalise the inertia.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    R_BF
+        Rotation (3, 3), F to body components.
+    J
+        Moments (3,) about the axes F, kg m^2.
+    """
+
+    scene: Scene
+    R_BF: Array
+    J: Array
+
+    @property
+    def q0(self) -> Array:
+        """Attitude at the start: unit quaternion (4,) of `R_WF`, scalar first."""
+        return to_quaternion(self.scene.R_WB0 @ self.R_BF)
+
+    @property
+    def w0(self) -> Array:
+        """Rates at the start (3,), rad/s, axes F."""
+        return self.scene.w_WB_B0 @ self.R_BF
+
+    @property
+    def moment(self) -> Array:
+        """Weight times centre of mass (3,), N m, axes F; zero for a free body."""
+        potential = self.scene.potential
+        return potential.moment_B @ self.R_BF if isinstance(potential, UniformGravity) else np.zeros(3)
+
+    def trajectory(
+        self, grid: Grid, label: str, q: Array, w: Array, work: Counters, reason: str = "the state is not finite"
+    ) -> Trajectory:
+        """Return the samples in body axes from quaternions (n, 4), scalar first, and rates (n, 3) in F.
+
+        Samples end before the first that is not finite, or where the engine stopped handing them over: then `reason` says why. A
+        quaternion's norm is left as the engine has it, so that its drift shows in `R_WB`.
+        """
+        R_WB, w_WB_B = from_quaternion(q) @ self.R_BF.T, w @ self.R_BF.T
+        good = finite_prefix(R_WB, w_WB_B)
+        failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
+        return Trajectory(self.scene, grid.t[:good], R_WB[:good], w_WB_B[:good], label, work, failure)
+
+
+def principal_axes(scene: Scene) -> Axes:
+    """Return the start in principal axes; those of a diagonal inertia are the body's own, in their order."""
+    return Axes(scene, scene.body.R_BP, scene.body.moments)
+
+
+def symmetric_axes(scene: Scene) -> Axes | None:
+    """Return the start in axes whose third is that of a body symmetric about it, in a field symmetric about it; None otherwise."""
+    axis = axial_direction(scene.body, scene.potential)
+    if axis is None:
+        return None
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    R_BF = np.column_stack([first, np.cross(axis, first), axis])
+    return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
+
+
+def gravity_or_free(scene: Scene) -> str | None:
+    """Return why an engine that knows uniform gravity only cannot do the scene, None if it can."""
+    if scene.potential is None or isinstance(scene.potential, UniformGravity):
+        return None
+    return f"the engine has uniform gravity only, not {type(scene.potential).__name__}"
+
+
+@dataclass(frozen=True, eq=False)
+class MassModel:
+    """A mass, its centre and the inertia about it that together are the scene's body, axes F.
+
+    A scene has the product of weight and centre of mass only, and the motion depends on no more. Engines want a mass m and the
+    inertia about the centre of mass c, J_c = J - m (c'c - c c'). Any m gives the same joint-space inertia J and, with gravity
+    weight/m, the same torque; it only has to leave a J_c that a mass distribution can have.
+
+    Attributes
+    ----------
+    mass, com, gravity
+        kg; m, (3,), axes F; downward acceleration, m/s^2.
+    body
+        Inertia about the centre of mass, its principal moments and axes.
+    """
+
+    mass: float
+    com: Array
+    gravity: float
+    body: RigidBody
+
+
+def mass_model(axes: Axes) -> MassModel | None:
+    """Return a physical mass model, None if there is none.
+
+    With the second moments S = tr(J)/2 - J of the mass distribution about the fixed point, those about the centre of mass are
+    S - m c c', which must not be negative: S itself must not be (the triangle inequality), and m c' S^-1 c <= 1. Half of that
+    largest mass is taken.
+    """
+    second = axes.J.sum() / 2 - axes.J
+    if second.min() < -1e-15 * axes.J.max():
+        return None
+    potential = axes.scene.potential
+    if not isinstance(potential, UniformGravity) or not np.any(axes.moment):
+        return MassModel(1.0, np.zeros(3), 0.0, RigidBody(axes.J))
+    com = potential.com_B @ axes.R_BF
+    com[np.abs(com) < 1e-15 * np.linalg.norm(com)] = 0.0
+    lever = com != 0
+    if second[lever].min() <= 1e-15 * axes.J.max():
+        return None
+    mass = 0.5 / float(np.sum(com[lever] ** 2 / second[lever]))
+    inertia_com = np.diag(axes.J) - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return MassModel(mass, com, potential.weight / mass, RigidBody(inertia_com))
+
+
+def mass_model_reason(scene: Scene) -> str | None:
+    """Return why the scene's body cannot be given as a mass with a centre and an inertia about it, None if it can."""
+    if mass_model(principal_axes(scene)) is None:
+        return "no mass distribution has this inertia and centre of mass: a moment exceeds the sum of the other two"
+    return None
