@@ -1,4 +1,33 @@
 """Scenes: one file a family, with its defaults, its source and its builders."""
 
+from .asymmetric_top import asymmetric_top as asymmetric_top
+from .boxes import gazebo_box as gazebo_box
+from .boxes import near_intermediate_box as near_intermediate_box
+from .boxes import tumbling_box as tumbling_box
 from .brick_flip import brick_flip as brick_flip
+from .hairer_vilmart import hairer_vilmart as hairer_vilmart
+from .kovalevskaya_top import kovalevskaya_top as kovalevskaya_top
 from .lagrange_top import lagrange_top as lagrange_top
+from .lie_group_top import lie_group_top as lie_group_top
+from .needle import needle as needle
+from .nutating_tops import cusped_top as cusped_top
+from .nutating_tops import looping_top as looping_top
+from .nutating_tops import nutating_top as nutating_top
+from .nutating_tops import unduloid_top as unduloid_top
+from .pendulums import hanging_rest as hanging_rest
+from .pendulums import inverted_rest as inverted_rest
+from .pendulums import pendulum_over_top as pendulum_over_top
+from .separatrix import degenerate_separatrix as degenerate_separatrix
+from .separatrix import near_separatrix as near_separatrix
+from .separatrix import separatrix as separatrix
+from .separatrix import unstable_spin as unstable_spin
+from .sleeping_tops import falling_top as falling_top
+from .sleeping_tops import simo_wong_top as simo_wong_top
+from .sleeping_tops import sleeping_top as sleeping_top
+from .stable_spin import stable_spin as stable_spin
+from .steady_free import axis_spin as axis_spin
+from .steady_free import planar_body as planar_body
+from .steady_free import spherical_body as spherical_body
+from .steady_free import symmetric_body as symmetric_body
+from .turned_frame import turned_brick as turned_brick
+from .turned_frame import turned_top as turned_top

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..body import RigidBody
+from ..check import finite_number
 from ..scene import Scene
 
 DEFAULT_INERTIA = (13.0, 5.0, 10.0)
@@ -28,12 +29,17 @@ def brick_flip(disturbance: float = DEFAULT_DISTURBANCE, spin: float = DEFAULT_S
     BadInput
         An argument is not finite, or t_end is not above 0.
     """
+    rates = (
+        0.0,
+        finite_number("disturbance", disturbance, "a finite rate, rad/s"),
+        finite_number("spin", spin, "a finite rate, rad/s"),
+    )
     name = "brick_flip" if disturbance == DEFAULT_DISTURBANCE else f"brick_flip_{disturbance:g}"
     return Scene(
         name,
         RigidBody(DEFAULT_INERTIA),
         np.eye(3),
-        (0.0, disturbance, spin),
+        rates,
         t_end,
         dt=DEFAULT_DT,
         group="free body",

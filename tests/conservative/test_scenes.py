@@ -1,0 +1,187 @@
+"""Scenes: each registered one builds, evaluates, moves and refuses; the published ones have the published numbers."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import angle_between, from_quaternion, rotation_about
+from conservative.scenes.turned_frame import in_body_frame
+
+NAMES = tuple(registry.registered(registry.SCENES))
+REFERENCE = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
+BUILDERS = {
+    "brick_flip": cv.scenes.brick_flip,
+    "brick_flip_1e-6": cv.scenes.near_separatrix,
+    "brick_flip_1e-12": lambda: cv.scenes.near_separatrix(1e-12),
+    "lagrange_top_steady": cv.scenes.lagrange_top,
+    "heavy_top_lie_group": cv.scenes.lie_group_top,
+    "sleeping_type_top": cv.scenes.simo_wong_top,
+    "hairer_vilmart": cv.scenes.hairer_vilmart,
+    "asymmetric_heavy_top": cv.scenes.asymmetric_top,
+    "gazebo_box": cv.scenes.gazebo_box,
+    "kovalevskaya_top": cv.scenes.kovalevskaya_top,
+}
+
+
+def builder_of(name):
+    return registry.registered(registry.SCENES)[name].load()
+
+
+def numbers(case, key):
+    return np.array([float(text) for text in case[key]])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_registered_scene_is_named_grouped_and_sourced(name):
+    scene = registry.scene(name)
+    assert (scene.name, scene.group != "your own", bool(scene.source)) == (name, True, True)
+    assert 5 <= scene.t_end / scene.dt <= 3e4  # a run of the defaults is short
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_registered_scene_has_invariants_with_a_scale(name):
+    scene = registry.scene(name)
+    R, w = np.repeat(scene.R_WB0[None], 2, 0), np.repeat(scene.w_WB_B0[None], 2, 0)
+    for invariant in scene.invariants:
+        value = invariant.evaluate(R, w)
+        assert len(value) == 2
+        assert np.isfinite(value).all()
+        assert 0 < invariant.scale < math.inf
+        assert np.abs(value).max() < 1e3 * invariant.scale
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_registered_scene_moves_with_energy_conserved(name):
+    scene = registry.scene(name)
+    trajectory = cv.integrate(scene, scene.dt, t_end=20 * scene.dt)
+    assert np.abs(trajectory.energy - trajectory.energy[0]).max() < 1e-14 * scene.energy_scale  # measured 7e-16
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_registered_builder_refuses_what_is_not_a_number(name):
+    for parameter in inspect.signature(builder_of(name)).parameters:
+        for bad in (math.nan, math.inf, "much"):
+            with pytest.raises(cv.BadInput) as caught:
+                builder_of(name)(**{parameter: bad})
+            assert caught.value.argument == parameter
+
+
+@pytest.mark.parametrize(
+    ("text", "argument"),
+    [
+        ("sleeping_top:stability=0.9", "stability"),
+        ("falling_top:stability=1.1", "stability"),
+        ("looping_top:precession=1", "precession"),
+        ("unduloid_top:precession=11", "precession"),
+        ("stable_spin:spin=0", "spin"),
+        ("stable_spin:revolutions=-1", "revolutions"),
+        ("axis_spin:axis=4", "axis"),
+        ("symmetric_body:axial=0", "axial"),
+        ("planar_body:second=-1", "second"),
+        ("pendulum_over_top:excess=0", "excess"),
+        ("kovalevskaya_top:moment=0", "moment"),
+        ("gazebo_box:t_end=0", "t_end"),
+    ],
+)
+def test_builder_names_the_argument_it_refuses(text, argument):
+    with pytest.raises(cv.BadInput) as caught:
+        registry.scene(text)
+    assert caught.value.argument == argument
+
+
+@pytest.mark.parametrize("case", REFERENCE)
+def test_published_scene_has_the_reference_parameters(case):
+    scene, reference = BUILDERS[case](), REFERENCE[case]
+    moment = np.zeros(3) if scene.potential is None else scene.potential.moment_B
+    np.testing.assert_allclose(np.diag(scene.body.inertia), numbers(reference, "J"), rtol=1e-15)  # measured 7.7e-16
+    np.testing.assert_allclose(moment, numbers(reference, "weight_com_B"), rtol=1e-15)  # measured 6.4e-16
+    np.testing.assert_allclose(scene.w_WB_B0, numbers(reference, "w0"), rtol=4e-16)  # measured 2.2e-16
+    assert angle_between(scene.R_WB0, from_quaternion(numbers(reference, "q0"))) < 6e-16  # measured 3.4e-16
+    assert np.count_nonzero(scene.body.inertia - np.diag(np.diag(scene.body.inertia))) == 0
+
+
+@pytest.mark.parametrize("case", REFERENCE)
+def test_invariants_of_published_scene_are_those_of_the_reference_motion(case):
+    scene, states = BUILDERS[case](), REFERENCE[case]["states"]
+    R = from_quaternion(np.array([numbers(state, "q") for state in states]))
+    w = np.array([numbers(state, "w") for state in states])
+    for invariant in scene.invariants:
+        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
+        assert np.abs(invariant.evaluate(R, w) - start).max() < 2e-15 * invariant.scale  # measured 3.3e-16
+
+
+def test_turned_frames_tell_the_same_motion():
+    F = rotation_about((1, 2, 3), 0.7)
+    for name, plain in (("turned_brick", cv.scenes.brick_flip()), ("turned_top", cv.scenes.asymmetric_top())):
+        turned = cv.integrate(registry.scene(name), 0.01, t_end=2)
+        straight = cv.integrate(plain, 0.01, t_end=2)
+        assert angle_between(turned.R_WB @ F, straight.R_WB).max() < 1e-12  # measured 3.0e-14
+        assert np.abs(turned.w_WB_B @ F - straight.w_WB_B).max() < 1e-11  # measured 2.9e-13
+        assert np.abs(turned.scene.body.inertia[0, 1]) > 0.01  # off-diagonal indeed
+
+
+def test_turning_the_frame_by_a_reflection_is_refused():
+    with pytest.raises(cv.BadInput, match="F: got a reflection"):
+        in_body_frame(cv.scenes.asymmetric_top(), -np.eye(3), "turned")
+
+
+def test_separatrix_goes_to_the_unstable_axis_as_its_closed_form_says():
+    scene = cv.scenes.separatrix(t_end=1)
+    w = cv.integrate(scene, 1e-4).w_WB_B[-1]
+    Ja, Jc, Jb = 13, 5, 10
+    k = 10 * math.sqrt((Ja - Jb) * (Jb - Jc) / (Ja * Jc))
+    exact = np.array([scene.w_WB_B0[0] / math.cosh(k), scene.w_WB_B0[1] / math.cosh(k), 0])
+    exact[2] = math.copysign(10 * math.tanh(k), w[2])
+    assert np.abs(w - exact).max() < 1e-5  # measured 1e-8, of order dt^2
+
+
+@pytest.mark.parametrize(
+    ("name", "figure"),
+    [("cusped_top", "cusps"), ("looping_top", "loops"), ("unduloid_top", "waves"), ("nutating_top", "waves")],
+)
+def test_nutating_tops_draw_what_they_are_named_after(name, figure):
+    scene = registry.scene(name)
+    trajectory = cv.integrate(scene, 0.0005)
+    x, y, _ = np.moveaxis(trajectory.R_WB[:, :, 2], 1, 0)
+    rate = np.gradient(np.unwrap(np.arctan2(y, x)), trajectory.t)[2:-2]
+    lowest, highest = rate.min(), rate.max()
+    assert highest > 5
+    if figure == "cusps":
+        assert abs(lowest) < 0.02 * highest  # measured 6e-5
+    else:
+        assert (lowest < -1) == (figure == "loops")
+
+
+def test_sleeping_top_sleeps_and_falling_top_falls_at_its_rate():
+    asleep = cv.integrate(cv.scenes.sleeping_top(), 0.001)
+    tilt = np.arccos(np.clip(asleep.R_WB[:, 2, 2], -1, 1))
+    assert tilt.max() < 0.01  # measured 0.0050: 1/sqrt(1 - 1/1.05) = 4.6 times the tilt at the start
+    scene = cv.scenes.falling_top(stability=0.5, tilt=1e-6, t_end=1)
+    falling = cv.integrate(scene, 0.0002)
+    tilt = np.linalg.norm(falling.R_WB[:, :2, 2], axis=1)
+    J1 = scene.body.moments[0]
+    rate = math.sqrt(scene.potential.moment_B[2] / J1 * (1 - 0.5))
+    late = falling.t > 0.6
+    grown = np.polyfit(falling.t[late], np.log(tilt[late]), 1)[0]
+    assert abs(grown / rate - 1) < 1e-3  # measured 9e-6
+
+
+def test_rests_stay_at_rest_and_the_pendulum_passes_the_top():
+    for scene in (cv.scenes.hanging_rest(), cv.scenes.inverted_rest()):
+        assert np.array_equal(cv.integrate(scene).R_WB[-1], np.eye(3))
+    heights = -cv.integrate(cv.scenes.pendulum_over_top()).R_WB[:, 2, 2]
+    assert heights.max() > 0.999  # measured 0.99999999
+
+
+def test_stable_spin_stays_within_its_polhode():
+    w = cv.integrate(cv.scenes.stable_spin(1000), sample_every=50).w_WB_B
+    assert np.abs(w[:, 1:]).max() < 0.2  # measured 0.153, the polhode's half-axes
+    assert w[:, 0].min() > 9.999  # measured 9.99968
