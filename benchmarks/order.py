@@ -1,0 +1,146 @@
+"""Observed order of convergence: a fit to all points that show it, never to two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from conservative.attitude import Array
+from conservative.check import finite_array
+from conservative.errors import BadInput
+
+MIN_POINTS = 3
+SHRINKING = 0.5
+"""Local slope above which an error counts as still shrinking with the step: half of the lowest order there is."""
+ABOVE_FLOOR = 10.0
+"""How far above the floor a point must be, so that the floor changes it by less than a tenth."""
+BEND = 0.1
+"""Relative difference between the slopes of the coarsest pair and of the rest above which the coarsest point is left out."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A fitted order.
+
+    Attributes
+    ----------
+    slope, stderr
+        d log(error) / d log(step) and its standard error; nan where there is no fit.
+    used
+        Indices of the points in the fit, into what was handed in, coarsest step first.
+    floor
+        The largest error at steps where the error no longer shrinks; nan where the data do not reach a floor.
+    reason
+        Why there is no fit; empty where there is one.
+    """
+
+    slope: float
+    stderr: float
+    used: tuple[int, ...]
+    floor: float
+    reason: str = ""
+
+    def __str__(self) -> str:
+        if self.reason:
+            return self.reason
+        floor = "" if math.isnan(self.floor) else f" above a floor of {self.floor:.1e}"
+        return f"{self.slope:.2f} +- {self.stderr:.2f} from {len(self.used)} points{floor}"
+
+
+def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
+    """Fit log(error) = slope log(step) + constant where the data show convergence.
+
+    From coarse to fine the data are cut into three by rules that see nothing but the data:
+
+    1. The descent is the stretch of neighbouring points, each with a smaller error than the one before by a local slope above
+       `SHRINKING`, over which the error falls furthest. What is coarser has not begun to converge.
+    2. What is finer than its end has reached the floor: the largest error from that end on. Points within `ABOVE_FLOOR` of it
+       are left out. Should the data end in the bend, so that the last pair's slope is less than half that of the rest, its
+       finer point goes too, once.
+    3. The coarsest point is left out as long as the slope of its pair differs from the fit to the others by more than `BEND`,
+       and by more than three standard errors of that fit, and four points or more are there.
+
+    Points whose error is not finite, runs that failed, are passed over; errors of zero are at the floor.
+
+    Parameters
+    ----------
+    steps, errors
+        (n,) each, in any order; steps above 0 and all different.
+
+    Raises
+    ------
+    BadInput
+        The shapes differ, or a step is not finite, not above 0, or there twice.
+    """
+    h, e = _checked(steps, errors)
+    order = [int(i) for i in np.argsort(-h) if math.isfinite(e[i])]
+    if len(order) < MIN_POINTS:
+        return _none(float("nan"), f"{len(order)} runs with an error; a fit takes {MIN_POINTS}")
+    x = np.log(h[order])
+    y = np.log(np.maximum(e[order], np.finfo(float).tiny))
+    first, last = _descent(x, y)
+    floor = float(e[order[last:]].max()) if last < len(order) - 1 else float("nan")
+    used = [i for i in range(first, last + 1) if not e[order[i]] <= ABOVE_FLOOR * floor and e[order[i]] > 0]
+    used = _without_preasymptotic(x, y, _without_bend(x, y, used) if math.isnan(floor) else used)
+    if len(used) < MIN_POINTS:
+        return _none(floor, f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}")
+    slope, stderr = _fit(x[used], y[used])
+    return Order(slope, stderr, tuple(order[i] for i in used), floor)
+
+
+def _none(floor: float, reason: str) -> Order:
+    return Order(float("nan"), float("nan"), (), floor, reason)
+
+
+def _checked(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
+    e = np.array(errors, dtype=float)
+    h = finite_array("steps", steps, (e.shape,), f"as many finite steps as there are errors, {e.shape}")
+    if h.ndim != 1 or (h <= 0).any() or len(np.unique(h)) < len(h):
+        raise BadInput("steps", h.tolist(), "a list of different steps above 0")
+    if (e < 0).any():
+        raise BadInput("errors", e.tolist(), "errors of 0 or more, or nan")
+    return h, e
+
+
+def _descent(x: Array, y: Array) -> tuple[int, int]:
+    """Return first and last index of the stretch of shrinking errors over which the error falls furthest."""
+    best, first = (0, 0), 0
+    for last in range(1, len(x)):
+        if not y[last - 1] - y[last] > SHRINKING * (x[last - 1] - x[last]):
+            first = last
+        if y[first] - y[last] > y[best[0]] - y[best[1]]:
+            best = first, last
+    return best
+
+
+def _without_bend(x: Array, y: Array, used: list[int]) -> list[int]:
+    if len(used) <= MIN_POINTS:
+        return used
+    rest, _ = _fit(x[used[:-1]], y[used[:-1]])
+    return used[:-1] if _pair(x, y, used[-2:]) < rest / 2 else used
+
+
+def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
+    while len(used) > MIN_POINTS:
+        rest, stderr = _fit(x[used[1:]], y[used[1:]])
+        if abs(_pair(x, y, used[:2]) - rest) <= max(BEND * abs(rest), 3 * stderr):
+            break
+        used = used[1:]
+    return used
+
+
+def _pair(x: Array, y: Array, pair: Sequence[int]) -> float:
+    i, j = pair
+    return float((y[i] - y[j]) / (x[i] - x[j]))
+
+
+def _fit(x: Array, y: Array) -> tuple[float, float]:
+    """Return the least-squares slope and its standard error, nan with two points."""
+    dx, dy = x - x.mean(), y - y.mean()
+    slope = float(dx @ dy / (dx @ dx))
+    spread = float(np.sum((dy - slope * dx) ** 2) / (dx @ dx))
+    return slope, math.sqrt(spread / (len(x) - 2)) if len(x) > 2 else float("nan")

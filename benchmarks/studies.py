@@ -1,0 +1,112 @@
+"""Which rows to make: scenes x methods x steps, four kinds of study.
+
+for study in studies.studies(selection.scenes(), selection.methods()):
+    for row in studies.rows(study): ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from conservative.check import choice
+from conservative.errors import BadInput
+from conservative.method import Grid, Method
+from conservative.scene import Scene
+
+from .measurement import Measurement
+
+if TYPE_CHECKING:
+    from references.truth import Truth
+
+Progress = Callable[[int, int, str], None]
+"""Called before each piece of work: pieces done, pieces in all, and what comes next."""
+FindTruth = Callable[[Scene, Grid], "Truth"]
+
+NAMES = ("paper", "convergence", "speed", "work_precision")
+
+
+def reference(scene: Scene, grid: Grid) -> Truth:
+    """Return the exact motion from two independent truths that agree (`references.truth`)."""
+    from references import truth
+
+    return truth.reference(scene, grid)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Attributes
+    ----------
+    name
+        paper: drifts and errors at the paper's steps. convergence: errors over a ladder of steps, and the observed order.
+        speed: wall time at the scene's step, all methods interleaved. work_precision: error and time of each step or tolerance.
+    scenes, methods
+        What is crossed; methods that cannot do a scene get rows that say so.
+    quick
+        Fewer points and rounds.
+    skip_missing
+        Rows with status "missing" instead of `MissingEngine`.
+    truth
+        Where the exact motion comes from.
+
+    Raises
+    ------
+    BadInput
+        The name is not that of a study, or there is nothing to cross.
+    """
+
+    name: str
+    scenes: tuple[Scene, ...]
+    methods: tuple[Method, ...]
+    quick: bool = False
+    skip_missing: bool = False
+    truth: FindTruth = reference
+
+    @property
+    def rounds(self) -> int:
+        """Rounds of interleaved timing."""
+        return 5 if self.quick else 9
+
+    @property
+    def longest_run(self) -> float:
+        """Time, s, of the longest single run that the study waits for on the way down a ladder of steps."""
+        return 0.1 if self.quick else 0.5
+
+    def __post_init__(self) -> None:
+        choice("name", self.name, NAMES)
+        for argument in ("scenes", "methods"):
+            if not getattr(self, argument):
+                raise BadInput(argument, "none", "one or more")
+
+
+def studies(
+    scenes: tuple[Scene, ...], methods: tuple[Method, ...], quick: bool = False, skip_missing: bool = False
+) -> tuple[Study, ...]:
+    """Return all four studies of the same scenes and methods, in the order of `NAMES`."""
+    return tuple(Study(name, scenes, methods, quick, skip_missing) for name in NAMES)
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Report to nobody."""
+
+
+def rows(study: Study, progress: Progress = _silent) -> Iterator[Measurement]:
+    """Yield the rows of a study as they are measured.
+
+    Raises
+    ------
+    MissingEngine
+        An engine is not installed, and the study does not skip what is missing.
+    """
+    from . import accuracy, cost
+
+    makers = {
+        "paper": accuracy.paper,
+        "convergence": accuracy.convergence,
+        "speed": cost.speed,
+        "work_precision": cost.work_precision,
+    }
+    return makers[study.name](study, progress)

@@ -1,0 +1,125 @@
+"""Wall time that can be compared: everything in one run, in interleaved rounds, the fastest of which counts."""
+
+from __future__ import annotations
+
+import gc
+import math
+import random
+import statistics
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import perf_counter_ns
+from typing import Any
+
+from conservative.check import positive_integer, positive_number
+
+MIN_ROUNDS = 3
+"""Rounds that even a run over its budget gets: fewer have no median."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Wall time of one call, s: the minimum and the median over `rounds` samples of `calls` calls each."""
+
+    minimum: float
+    median: float
+    rounds: int
+    calls: int
+
+    def __str__(self) -> str:
+        return f"{self.rounds} rounds x {self.calls} calls"
+
+
+@contextmanager
+def collector_off() -> Iterator[None]:
+    """Collect garbage now and not before the end of the block."""
+    enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def elapsed(run: Callable[[], Any], calls: int = 1) -> float:
+    """Return the wall time of `calls` calls, s."""
+    start = perf_counter_ns()
+    for _ in range(calls):
+        run()
+    return (perf_counter_ns() - start) * 1e-9
+
+
+def calls_per_sample(run: Callable[[], Any], min_time: float) -> int:
+    """Return how many calls last min_time s: doubled until they do, which also warms caches and clock."""
+    calls = 1
+    while (spent := elapsed(run, calls)) < min_time:
+        calls = max(2 * calls, math.ceil(calls * min_time / spent) if spent > min_time / 10 else 0)
+    return calls
+
+
+def interleaved(
+    runs: Mapping[str, Callable[[], Any]], rounds: int = 7, min_time: float = 0.01, budget: float = math.inf, seed: int = 0
+) -> dict[str, Timing]:
+    """Time several runs against each other.
+
+    Each is called once, unmeasured. Then every round takes one sample of each, in a new random order, so that a slow spell of
+    the machine, or a neighbour in the order, hits them all alike. Ratios of minimums are what lasts.
+
+    Parameters
+    ----------
+    runs
+        What to call, by name.
+    rounds
+        Samples of each.
+    min_time
+        Shortest sample, s; faster runs are called repeatedly within a sample.
+    budget
+        Time, s, for all samples of one run: slower ones get fewer rounds, but at least three.
+    seed
+        Of the orders.
+
+    Raises
+    ------
+    BadInput
+        rounds is not an integer of 1 or more, or a time is not above 0.
+    """
+    positive_integer("rounds", rounds)
+    positive_number("min_time", min_time, "a finite duration above 0, s")
+    for run in runs.values():
+        run()
+    calls = {name: calls_per_sample(run, min_time) for name, run in runs.items()}
+    samples: dict[str, list[float]] = {name: [] for name in runs}
+    shuffled = random.Random(seed)
+    with collector_off():
+        for _ in range(rounds):
+            for name in shuffled.sample(list(runs), len(runs)):
+                taken = samples[name]
+                if len(taken) < MIN_ROUNDS or sum(taken) * (1 + 1 / len(taken)) * calls[name] <= budget:
+                    taken.append(elapsed(runs[name], calls[name]) / calls[name])
+    return {name: Timing(min(taken), statistics.median(taken), len(taken), calls[name]) for name, taken in samples.items()}
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What a model costs once, s: `prepare` (conversion, compilation) and the first call of what it returned."""
+
+    prepare: float
+    first_call: float
+
+    @property
+    def total(self) -> float:
+        """Both together, s."""
+        return self.prepare + self.first_call
+
+
+def prepared(prepare: Callable[[], Callable[[], Any]]) -> tuple[Callable[[], Any], Any, Preparation]:
+    """Return the run that `prepare` gives, the result of its first call, and what both cost."""
+    start = perf_counter_ns()
+    run = prepare()
+    middle = perf_counter_ns()
+    result = run()
+    end = perf_counter_ns()
+    return run, result, Preparation((middle - start) * 1e-9, (end - middle) * 1e-9)
