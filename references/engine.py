@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.invariants import axial_direction
@@ -89,14 +89,14 @@ class Axes:
         return potential.moment_B @ self.R_BF if isinstance(potential, UniformGravity) else np.zeros(3)
 
     def trajectory(
-        self, grid: Grid, label: str, q: Array, w: Array, work: Counters, reason: str = "the state is not finite"
+        self, grid: Grid, label: str, R_WF: Array, w: Array, work: Counters, reason: str = "the state is not finite"
     ) -> Trajectory:
-        """Return the samples in body axes from quaternions (n, 4), scalar first, and rates (n, 3) in F.
+        """Return the samples in body axes from attitudes (n, 3, 3) and rates (n, 3) in F.
 
-        Samples end before the first that is not finite, or where the engine stopped handing them over: then `reason` says why. A
-        quaternion's norm is left as the engine has it, so that its drift shows in `R_WB`.
+        Samples end before the first that is not finite, or where the engine stopped handing them over: then `reason` says why.
+        Attitudes are not tidied: the norm of an engine's quaternion shows in `R_WB`.
         """
-        R_WB, w_WB_B = from_quaternion(q) @ self.R_BF.T, w @ self.R_BF.T
+        R_WB, w_WB_B = R_WF @ self.R_BF.T, w @ self.R_BF.T
         good = finite_prefix(R_WB, w_WB_B)
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
         return Trajectory(self.scene, grid.t[:good], R_WB[:good], w_WB_B[:good], label, work, failure)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice
 from conservative.method import Grid, Method, Run
 from conservative.scene import Scene
@@ -23,7 +23,18 @@ INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 # version does not have are skipped. Autoreset would silently start a diverged run afresh.
 _SWITCHED_OFF = (
     *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
-    *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND", "MULTICCD"),
+    *(
+        "FILTERPARENT",
+        "ACTUATION",
+        "REFSAFE",
+        "SENSOR",
+        "MIDPHASE",
+        "EULERDAMP",
+        "AUTORESET",
+        "NATIVECCD",
+        "ISLAND",
+        "MULTICCD",
+    ),
 )
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
 _ROLLOUT_UP_TO = 8
@@ -82,7 +93,9 @@ class MuJoCo(Method):
             with _quiet(mj):
                 q, w, reason = march(mj, model, data, start, grid)
             evaluations = grid.n_steps * (4 if self.integrator == "RK4" else 1)
-            return axes.trajectory(grid, self.label, q, w, Counters(grid.n_steps, evaluations=evaluations), reason)
+            return axes.trajectory(
+                grid, self.label, from_quaternion(q), w, Counters(grid.n_steps, evaluations=evaluations), reason
+            )
 
         return run
 

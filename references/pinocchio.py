@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from conservative.attitude import Array
+from conservative.attitude import Array, from_quaternion
 from conservative.check import choice
 from conservative.method import Grid, Method, Run
 from conservative.scene import Scene
@@ -73,7 +73,8 @@ class Pinocchio(Method):
         def run() -> Trajectory:
             q, v = _march(step, q_start, v_start, grid)
             evaluations = grid.n_steps * (4 if self.scheme == "RK4" else 1)
-            return axes.trajectory(grid, self.label, np.roll(q, 1, axis=1), v, Counters(grid.n_steps, evaluations=evaluations))
+            R_WF = from_quaternion(np.roll(q, 1, axis=1))
+            return axes.trajectory(grid, self.label, R_WF, v, Counters(grid.n_steps, evaluations=evaluations))
 
         return run
 

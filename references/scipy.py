@@ -81,7 +81,7 @@ class SciPy(Method):
                 found = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
             q, w = found.y[:4].T, found.y[4:].T
             work = Counters(solver.steps, evaluations=int(found.nfev))
-            return axes.trajectory(grid, self.label, q, w, work, found.message)
+            return axes.trajectory(grid, self.label, from_quaternion(q), w, work, found.message)
 
         return run
 

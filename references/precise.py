@@ -1,0 +1,223 @@
+"""Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar, Literal
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from conservative.attitude import from_quaternion, to_quaternion
+from conservative.check import positive_integer
+from conservative.errors import BadInput
+from conservative.method import Grid, Method, Run
+from conservative.potential import Potential, UniformGravity
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory
+
+from . import taylor
+from .engine import Axes, version
+
+Number = Any
+"""A float, an `mpmath.mpf` or a text with as many digits as one likes."""
+
+Reals = NDArray[Any]
+"""An array of `heyoka.real`."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A potential as expressions: how many parameters, their values, and the torque (body axes) from quaternion and parameters."""
+
+    values: Callable[[Any], Sequence[Number]]
+    torque: Callable[[Sequence[taylor.Expression], Sequence[taylor.Expression]], list[taylor.Expression]]
+
+
+FIELDS: dict[type[Potential], Field] = {
+    UniformGravity: Field(lambda potential: potential.moment_B.tolist(), lambda q, m: taylor.cross(taylor.vertical(q), m)),
+}
+"""Potentials that truth knows; one entry adds one."""
+
+
+@dataclass(frozen=True)
+class Precise(Method):
+    """Quaternion and body rates by heyoka in multi-precision; dt is only the distance of samples.
+
+    The start is the scene's, taken as exact numbers; samples are rounded to double at the very end. `states` gives them unrounded.
+
+    Parameters
+    ----------
+    bits
+        Precision, 53 to 4096 bits; the tolerance of a step is 2^-(bits - 1). A motion that amplifies errors e-fold N times costs
+        1.44 N bits of the result.
+
+    Raises
+    ------
+    BadInput
+        bits is not an integer in that range.
+    MissingEngine
+        heyoka is not installed.
+    """
+
+    bits: int = 256
+
+    family: ClassVar[str] = "precise"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "truth"
+
+    def __post_init__(self) -> None:
+        _check_bits(self.bits)
+        version("heyoka", "heyoka")
+
+    @property
+    def label(self) -> str:
+        return f"heyoka=={version('heyoka', 'heyoka')}/{self.bits} bits"
+
+    @property
+    def order(self) -> None:
+        return None
+
+    def unsupported(self, scene: Scene) -> str | None:
+        if scene.potential is None or type(scene.potential) in FIELDS:
+            return None
+        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to references.precise.FIELDS"
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        field = None if scene.potential is None else FIELDS[type(scene.potential)]
+        values = () if field is None else field.values(scene.potential)
+        solve = _solver(scene.body.inertia.tolist(), to_quaternion(scene.R_WB0), scene.w_WB_B0, field, values, self.bits)
+        axes = Axes(scene, np.eye(3), np.diag(scene.body.inertia))
+        t = _reals(grid.steps.tolist(), self.bits) * _real(grid.dt, self.bits)
+
+        def run() -> Trajectory:
+            outcome, steps, found = solve(t)
+            doubles = np.array([[float(x) for x in row] for row in found]).reshape(-1, 7)
+            R_WB, work = from_quaternion(doubles[:, :4]), Counters(steps)
+            return axes.trajectory(grid, self.label, R_WB, doubles[:, 4:], work, f"heyoka: {outcome.name}")
+
+        return run
+
+
+def states(
+    inertia: Sequence[Any],
+    q0: Sequence[Number],
+    w0: Sequence[Number],
+    t: Sequence[Number],
+    moment_B: Sequence[Number] | None = None,
+    bits: int = 256,
+) -> tuple[list[list[mpmath.mpf]], list[list[mpmath.mpf]]]:
+    """Return quaternions and body rates at given times, as multi-precision numbers.
+
+    Parameters
+    ----------
+    inertia
+        Moments (3,) or tensor (3, 3), kg m^2, body axes. As all numbers here: a float (taken as exact), an `mpmath.mpf`, or a text.
+    q0
+        Attitude at t = 0, body to world: quaternion (4,), scalar first; normalised here.
+    w0
+        Rates at t = 0 (3,), rad/s, body axes.
+    t
+        Increasing times (n,), s, of which the first is 0 or later.
+    moment_B
+        Weight times centre of mass (3,), N m, body axes; gravity points along the world's -z. None for a free body.
+    bits
+        Precision, 53 to 4096.
+
+    Returns
+    -------
+    Quaternions (n, 4), scalar first, and rates (n, 3).
+
+    Raises
+    ------
+    BadInput
+        bits is out of range.
+    """
+    _check_bits(bits)
+    field = None if moment_B is None else FIELDS[UniformGravity]
+    solve = _solver(inertia, q0, w0, field, () if moment_B is None else moment_B, bits)
+    _, _, found = solve(_reals([0, *t], bits))
+    with mpmath.workprec(bits):
+        rows = [[mpmath.mpf(str(x)) for x in row] for row in found[1:]]
+    return [row[:4] for row in rows], [row[4:] for row in rows]
+
+
+def _check_bits(bits: object) -> None:
+    allowed = "an integer from 53 (double precision) to 4096"
+    if not 53 <= positive_integer("bits", bits, allowed) <= 4096:
+        raise BadInput("bits", repr(bits), allowed)
+
+
+def _equations(field: Field | None) -> Callable[[Sequence[taylor.Expression]], taylor.Equations]:
+    return _free if field is None else _in_field(field)
+
+
+def _free(parameters: Sequence[taylor.Expression]) -> taylor.Equations:
+    return _system(parameters, None)
+
+
+@cache
+def _in_field(field: Field) -> Callable[[Sequence[taylor.Expression]], taylor.Equations]:
+    return lambda parameters: _system(parameters, field)
+
+
+def _system(parameters: Sequence[taylor.Expression], field: Field | None) -> taylor.Equations:
+    """Return q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w), parameters J (9), J^-1 (9) and the field's."""
+    hy = taylor.heyoka()
+    q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
+    J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
+    torque = taylor.cross(taylor.product(J, w), w)
+    if field is not None:
+        torque = [a + b for a, b in zip(torque, field.torque(q, rest), strict=True)]
+    return [*zip(q, taylor.turned_by_body(q, w), strict=True), *zip(w, taylor.product(K, torque), strict=True)]
+
+
+@cache
+def _compiled(form: taylor.Form, bits: int) -> Any:
+    hy = taylor.heyoka()
+    equations = form.build()
+    # Compact mode: the code of some 90 orders would take minutes to compile written out, and is no faster on these numbers.
+    return hy.taylor_adaptive(equations, _reals([0] * len(equations), bits), fp_type=hy.real, prec=bits, compact_mode=True)
+
+
+def _solver(
+    inertia: Sequence[Any], q0: Any, w0: Any, field: Field | None, values: Sequence[Number], bits: int
+) -> Callable[[Reals], tuple[Any, int, Reals]]:
+    """Return the function that takes times, the first 0, to outcome, number of steps and states (n, 7)."""
+    with mpmath.workprec(bits + 32):
+        J = mpmath.matrix(
+            [[_mpf(x) for x in row] for row in inertia] if np.ndim(inertia) == 2 else mpmath.diag(list(map(_mpf, inertia)))
+        )
+        quaternion = [_mpf(x) for x in q0]
+        norm = mpmath.sqrt(mpmath.fsum(x * x for x in quaternion))
+        start = _reals([*(x / norm for x in quaternion), *w0], bits)
+        form, parameters = taylor.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
+        parameters = _reals(parameters, bits)
+    integrator = _compiled(form, bits)
+
+    def solve(t: Reals) -> tuple[Any, int, Reals]:
+        integrator.time = _real(0, bits)
+        integrator.state[:], integrator.pars[:] = start, parameters
+        outcome, _, _, steps, _, found = integrator.propagate_grid(t)
+        return outcome, int(steps), found
+
+    return solve
+
+
+def _mpf(x: Number) -> mpmath.mpf:
+    return mpmath.mpf(float(x) if isinstance(x, np.floating) else x)
+
+
+def _real(x: Number, bits: int) -> Any:
+    """Return a number as `heyoka.real`: floats and integers exactly, others through their digits."""
+    hy = taylor.heyoka()
+    if isinstance(x, float | int):
+        return hy.real(x, bits)
+    return hy.real(mpmath.nstr(_mpf(x), math.ceil(bits * 0.30103) + 5), bits)
+
+
+def _reals(values: Sequence[Number], bits: int) -> Reals:
+    return np.array([_real(x, bits) for x in values])
