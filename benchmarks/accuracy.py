@@ -10,7 +10,7 @@ from conservative.scene import Scene
 from conservative.trajectory import OK, Counters, Trajectory
 
 from . import errors, ladder
-from .cases import SKIPPED, UNSUPPORTED, Case, Outcome, at_no_step, attempt
+from .cases import SKIPPED, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
 from .measurement import Measurement
 from .order import observed_order
 from .timing import elapsed
@@ -51,9 +51,9 @@ def truth_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
     )
 
 
-def measured(case: Case, outcome: Outcome, truth: Trajectory) -> list[Measurement]:
+def measured(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:
     """Return a row for every measure, and for the work done; without values where the run did not reach its end."""
-    if not outcome.ok or outcome.trajectory is None:
+    if isinstance(outcome, Failed):
         return case.blanks(errors.names(case.scene), outcome.status, outcome.detail)
     found = errors.measure(outcome.trajectory, truth) + work(outcome.trajectory.counters)
     return [case.row(*value) for value in found]
@@ -92,7 +92,7 @@ def converging(study: Study, scene: Scene, method: Method, truth: Trajectory) ->
     found: dict[str, dict[float, float]] = {name: {} for name in wanted}
     cases = [Case(study.name, scene, method, grid) for grid in ladder.steps(scene, method)]
     for case, outcome in climb(cases, study.longest_run, study.skip_missing):
-        if not outcome.ok or outcome.trajectory is None:
+        if isinstance(outcome, Failed):
             yield from case.blanks(units, outcome.status, outcome.detail)
             continue
         for name, value, unit in errors.measure(outcome.trajectory, truth):
@@ -103,16 +103,16 @@ def converging(study: Study, scene: Scene, method: Method, truth: Trajectory) ->
         yield from fitted(cases[0], order_name, found[name])
 
 
-def climb(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Outcome]]:
+def climb(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Done | Failed]]:
     """Yield the outcome of each case, coarse to fine; what would take more than `longest` s is skipped and says so."""
     per_step = 0.0
     for case in cases:
         expected = per_step * case.grid.n_steps
         if expected > longest:
-            yield case, Outcome(SKIPPED, f"would take about {expected:.2g} s, more than {longest:g} s")
+            yield case, Failed(SKIPPED, f"would take about {expected:.2g} s, more than {longest:g} s")
             continue
         outcome = attempt(case, skip_missing)
-        if outcome.run is not None:
+        if isinstance(outcome, Done):
             per_step = elapsed(outcome.run) / case.grid.n_steps
         yield case, outcome
 

@@ -48,19 +48,20 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a case: how it ended, and the run, its first trajectory and its cost where it came that far."""
+class Done:
+    """A case that reached its end: the run, which can be called again, its first trajectory and what both cost."""
+
+    run: Run
+    trajectory: Trajectory
+    cost: Preparation
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A case that did not: the status that its rows carry, and more words about it."""
 
     status: str
     detail: str = ""
-    run: Run | None = None
-    trajectory: Trajectory | None = None
-    cost: Preparation | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Whether there is a whole trajectory."""
-        return self.status == OK
 
 
 def at_no_step(row: Measurement) -> Measurement:
@@ -76,7 +77,7 @@ def label_of(method: Method) -> str:
         return method.name
 
 
-def attempt(case: Case, skip_missing: bool = False) -> Outcome:
+def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     """Prepare and run a case once.
 
     Failures of the integration, scenes that the method cannot do and exceptions out of an engine become a status. Exceptions
@@ -90,16 +91,16 @@ def attempt(case: Case, skip_missing: bool = False) -> Outcome:
     try:
         reason = case.method.unsupported(case.scene)
         if reason:
-            return Outcome(UNSUPPORTED, reason)
-        run, trajectory, cost = prepared(lambda: case.method.prepare(case.scene, case.grid))
+            return Failed(UNSUPPORTED, reason)
+        done = Done(*prepared(lambda: case.method.prepare(case.scene, case.grid)))
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return Outcome(MISSING, str(error))
+        return Failed(MISSING, str(error))
     except IntegrationFailed as failure:
-        return Outcome(failure.status)
+        return Failed(failure.status)
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
         if case.method.room != "engine":
             raise
-        return Outcome(ENGINE_ERROR, f"{type(error).__name__}: {error}")
-    return Outcome(trajectory.status, "", run, trajectory, cost)
+        return Failed(ENGINE_ERROR, f"{type(error).__name__}: {error}")
+    return done if done.trajectory.ok else Failed(done.trajectory.status)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from conservative.method import Grid, Method, grid_for
@@ -13,7 +13,7 @@ from conservative.trajectory import Trajectory
 
 from . import errors, ladder
 from .accuracy import climb
-from .cases import Case, Outcome, attempt
+from .cases import Case, Done, Failed, attempt
 from .measurement import Measurement
 from .selection import at_tolerance, series, tolerance_setting
 from .timing import Timing, elapsed, interleaved
@@ -42,75 +42,84 @@ def end_only(grid: Grid, times: int = 1) -> Grid:
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
-def stretched(case: Case, outcome: Outcome) -> tuple[Case, Outcome]:
+def stretched(case: Case, done: Done) -> tuple[Case, Done]:
     """Return the case over so long a time that a call lasts `CALL` s; as it was where the method fails on the way there."""
-    assert outcome.run is not None
-    times = min(STRETCH, math.ceil(CALL / elapsed(outcome.run)))
+    times = min(STRETCH, math.ceil(CALL / elapsed(done.run)))
     if times == 1:
-        return case, outcome
+        return case, done
     longer = replace(case, grid=end_only(case.grid, times))
     found = attempt(longer)
-    return (longer, found) if found.ok else (case, outcome)
+    return (longer, found) if isinstance(found, Done) else (case, done)
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A case to be timed: as it is timed, and as it was at the first call."""
+
+    case: Case
+    done: Done
+    first: Done
+
+    @property
+    def simulated(self) -> float:
+        """Simulated time of one timed call, s."""
+        return self.case.grid.dt * self.case.grid.n_steps
 
 
 def speed(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield wall times at the scene's own step: each method in its own loop, all interleaved, sampled at the end only."""
-    total = len(study.scenes) * (len(study.methods) + 1)
+    methods = [method for method in study.methods if method.room != "truth"]
+    pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
         grid = end_only(grid_for(scene, scene.dt))
-        timed: dict[str, tuple[Case, Outcome, Outcome]] = {}
-        for j, method in enumerate(study.methods):
-            progress(i * (len(study.methods) + 1) + j, total, f"{scene.name}: preparing {method.name}")
+        ready: dict[str, Timed] = {}
+        for j, method in enumerate(methods):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
             case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
-            if outcome.ok:
-                timed[method.name] = (*stretched(case, outcome), outcome)
+            if isinstance(outcome, Done):
+                ready[method.name] = Timed(*stretched(case, outcome), outcome)
             else:
                 yield from case.blanks(SPEED, outcome.status, outcome.detail)
-        progress((i + 1) * (len(study.methods) + 1) - 1, total, f"{scene.name}: timing {len(timed)} methods")
-        runs = {name: longer.run for name, (_, longer, _) in timed.items() if longer.run is not None}
-        timings = interleaved(runs, study.rounds, budget=study.longest_run * study.rounds)
-        for name, (case, longer, first) in timed.items():
-            yield from speed_rows(case, longer, first, timings[name])
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} methods")
+        timings = interleaved({name: timed.done.run for name, timed in ready.items()}, study.rounds, budget=study.timing_budget)
+        for name, timed in ready.items():
+            yield from speed_rows(timed, timings[name])
 
 
-def speed_rows(case: Case, longer: Outcome, first: Outcome, timing: Timing) -> Iterator[Measurement]:
-    """Yield the rows of one method; the case is the stretched one, `first` the outcome of the first call ever."""
-    assert longer.trajectory is not None
-    assert first.cost is not None
-    steps, simulated = longer.trajectory.counters.steps, case.grid.dt * case.grid.n_steps
-    nan = float("nan")
+def speed_rows(timed: Timed, timing: Timing) -> Iterator[Measurement]:
+    """Yield the rows of one method."""
+    steps = timed.done.trajectory.counters.steps or math.nan
     values = (
-        timing.minimum / steps if steps else nan,
-        timing.median / steps if steps else nan,
-        timing.minimum / simulated,
-        timing.median / simulated,
-        first.cost.prepare,
-        first.cost.first_call,
+        timing.minimum / steps,
+        timing.median / steps,
+        timing.minimum / timed.simulated,
+        timing.median / timed.simulated,
+        timed.first.cost.prepare,
+        timed.first.cost.first_call,
     )
-    detail = f"{timing} of {simulated:.4g} s, {steps} steps"
+    detail = f"{timing} of {timed.simulated:.4g} s, {steps} steps"
     for (measure, unit), value in zip(SPEED, values, strict=True):
         if math.isnan(value):
-            yield case.row(measure, value, unit, "unsupported", "its engine does not count steps")
+            yield timed.case.row(measure, value, unit, "unsupported", "its engine does not count steps")
         else:
-            yield case.row(measure, value, unit, detail=detail)
+            yield timed.case.row(measure, value, unit, detail=detail)
 
 
 def work_precision(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield error and time of every point; rows of one point share scene, method and dt, those of one line their `detail`."""
     methods = series_of(study)
-    total = len(study.scenes) * (len(methods) + 1)
+    pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
         truth = study.truth(scene, ladder.samples(scene)).trajectory
-        timed: list[tuple[Case, Outcome]] = []
+        good: list[Case] = []
         for j, method in enumerate(methods):
-            progress(i * (len(methods) + 1) + j, total, f"{scene.name}: errors of {method.name}")
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
             for case, outcome in climb(points(study, scene, method), study.longest_run, study.skip_missing):
                 yield from error_rows(case, outcome, truth)
-                if outcome.ok:
-                    timed.append((case, outcome))
-        progress((i + 1) * (len(methods) + 1) - 1, total, f"{scene.name}: timing {len(timed)} points")
-        yield from time_rows(study, timed)
+                good += [case] * isinstance(outcome, Done)
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} points")
+        yield from time_rows(study, good)
 
 
 def series_of(study: Study) -> list[Method]:
@@ -132,24 +141,27 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     return [Case(study.name, scene, at_tolerance(method, setting, tolerance), grid) for tolerance in tolerances]
 
 
-def error_rows(case: Case, outcome: Outcome, truth: Trajectory) -> list[Measurement]:
-    """Return the errors of one point."""
+def error_rows(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:
+    """Return the errors of one point; of one that failed the time as well, all without values."""
     line = series(case.method)
-    if not outcome.ok or outcome.trajectory is None:
-        rows = case.blanks([*WORK_PRECISION, (TIME, "s/s")], outcome.status)
-        return [replace(row, detail="; ".join(filter(None, (line, outcome.detail)))) for row in rows]
+    if isinstance(outcome, Failed):
+        detail = f"{line}; {outcome.detail}" if outcome.detail else line
+        return case.blanks([*WORK_PRECISION, (TIME, "s/s")], outcome.status, detail)
     found = {name: value for name, value, _ in errors.measure(outcome.trajectory, truth)}
     return [case.row(name, found[name], unit, detail=line) for name, unit in WORK_PRECISION]
 
 
-def time_rows(study: Study, timed: list[tuple[Case, Outcome]]) -> Iterator[Measurement]:
+def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, interleaved; the runs timed keep no sample but the last."""
-    ready = []
-    for case, _ in timed:
+    ready: dict[str, Timed] = {}
+    for case in cases:
         bare = replace(case, grid=end_only(case.grid))
-        ready.append(stretched(bare, attempt(bare)))
-    runs = {str(k): outcome.run for k, (_, outcome) in enumerate(ready) if outcome.run is not None}
-    timings = interleaved(runs, study.rounds, min_time=CALL / 2, budget=study.longest_run)
-    for k, (case, _) in enumerate(ready):
-        simulated = case.grid.dt * case.grid.n_steps
-        yield case.row(TIME, timings[str(k)].minimum / simulated, "s/s", detail=series(case.method))
+        outcome = attempt(bare)
+        if isinstance(outcome, Done):
+            ready[str(len(ready))] = Timed(*stretched(bare, outcome), outcome)
+        else:
+            yield from case.blanks([(TIME, "s/s")], outcome.status, series(case.method))
+    runs = {key: timed.done.run for key, timed in ready.items()}
+    timings = interleaved(runs, study.rounds, min_time=CALL / 2, budget=study.timing_budget)
+    for key, timed in ready.items():
+        yield timed.case.row(TIME, timings[key].minimum / timed.simulated, "s/s", detail=series(timed.case.method))

@@ -1,1 +1,80 @@
-"""Tell pytest about `--benchmark`."""
+"""The pytest plugin behind `pytest --benchmark`; without the option it only keeps the suite in this folder from running.
+
+It is an entry point, so every pytest run of the environment imports this file: nothing heavy at the top.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SUITE = Path(__file__).resolve().parent
+TIMER = "benchmark"
+"""Name under which pytest knows the plugin pytest-benchmark."""
+MEASURED = pytest.StashKey[list[dict[str, Any]]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Register the option. Options that begin with the same letters, all of pytest-benchmark's, keep their meaning."""
+    parser.getgroup("conservative", "benchmarks of rotation integrators").addoption(
+        "--benchmark",
+        action="store_true",
+        dest="conservative_benchmark",
+        help="Run benchmarks: those under the paths given, by default the suite that comes with conservative.",
+    )
+
+
+def wanted(config: pytest.Config) -> bool:
+    """Return whether benchmarks were asked for."""
+    return bool(config.getoption("conservative_benchmark"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """With the option and no path, make the suite what is run.
+
+    Raises
+    ------
+    pytest.UsageError
+        pytest-benchmark, which times, is not installed or switched off.
+    """
+    if not wanted(config):
+        return
+    if not config.pluginmanager.hasplugin(TIMER):
+        allowed = "allowed after: pip install pytest-benchmark, and without -p no:benchmark"
+        raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
+    if config.args_source is not pytest.Config.ArgsSource.ARGS:
+        config.args = [str(SUITE)]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip the suite unless benchmarks were asked for."""
+    if wanted(config):
+        return
+    for item in items:
+        if SUITE in item.path.resolve().parents:
+            item.add_marker(pytest.mark.skip(reason="a benchmark, which runs with --benchmark"))
+
+
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
+def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[str, Any]]) -> None:
+    """Keep what pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
+    config.stash[MEASURED] = list(benchmarks)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Show accuracy beside the times, after pytest-benchmark's own table; or say why nothing was timed."""
+    config = terminalreporter.config
+    if not wanted(config):
+        return
+    if getattr(config.option, "dist", "no") != "no":
+        terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")
+    measured = config.stash.get(MEASURED, [])
+    if measured:
+        from .columns import lines
+
+        terminalreporter.section("accuracy beside time")
+        for line in lines(measured):
+            terminalreporter.write_line(line)

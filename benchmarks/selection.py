@@ -3,17 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Literal, NoReturn
 
 from conservative import registry
-from conservative.method import Method
+from conservative.errors import MissingEngine
+from conservative.method import Grid, Method
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
 ROOMS = ("ours", "engine", "truth")
 TOLERANCES = ("tol", "rtol")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
+
+
+@dataclass(frozen=True)
+class Missing(Method):
+    """Stands in a table for a method whose engine is not installed: every run raises `MissingEngine`.
+
+    Attributes: `wanted` (what was asked for), and `engine` and `package` as the error has them.
+    """
+
+    wanted: str
+    engine: str
+    package: str
+
+    family: ClassVar[str] = "missing"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+
+    @property
+    def name(self) -> str:
+        return self.wanted
+
+    @property
+    def label(self) -> str:
+        return self.wanted
+
+    @property
+    def order(self) -> None:
+        return None
+
+    def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
+        raise MissingEngine(self.engine, self.package)
 
 
 def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
@@ -27,25 +58,42 @@ def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
     return tuple(registry.scene(name) for name in names)
 
 
-def methods(names: Iterable[str] | None = None) -> tuple[Method, ...]:
+def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> tuple[Method, ...]:
     """Return methods by name, ours first; a family's bare name, such as `mujoco`, stands for all its variants.
 
     Parameters
     ----------
     names
         Default: every registered family.
+    skip_missing
+        A `Missing` method for each name whose engine is not installed, instead of an error.
 
     Raises
     ------
     BadInput
         A name or a setting is unknown, or a value cannot be used.
+    MissingEngine
+        An engine is not installed, and `skip_missing` is False.
     """
     wanted = registry.registered(registry.METHODS) if names is None else names
     found: dict[Method, None] = {}
     for name in wanted:
-        method = registry.method(name)
-        found.update(dict.fromkeys((method,) if ":" in name else method.variants()))
+        found.update(dict.fromkeys(_named(name, skip_missing)))
     return tuple(sorted(found, key=lambda method: ROOMS.index(method.room)))
+
+
+def _named(name: str, skip_missing: bool) -> tuple[Method, ...]:
+    try:
+        method = registry.method(name)
+        return (method,) if ":" in name else method.variants()
+    except MissingEngine as error:
+        if not skip_missing:
+            raise
+        return (Missing(name, error.engine, error.package),)
+    except ModuleNotFoundError as error:  # another package's method, registered but not whole
+        if not skip_missing:
+            raise
+        return (Missing(name, name, str(error.name)),)
 
 
 def tolerance_setting(method: Method) -> str | None:
@@ -71,10 +119,18 @@ def series(method: Method) -> str:
 
 
 def identifier(scene: Scene, method: Method, dt: float) -> str:
-    """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only."""
+    """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
+
+    A setting is in the id if it is not the default, or if it comes first and is a text: that is what an engine's integrators
+    are told apart by.
+    """
     settings = [(field.name, getattr(method, field.name), field.default) for field in fields(_value(method))]
-    parts = [_short(name, setting) for name, setting, default in settings if setting != default]
-    return f"{scene.name}-{'_'.join([method.family, *parts])}-dt{dt:g}"
+    shown = [
+        _short(name, setting)
+        for position, (name, setting, default) in enumerate(settings)
+        if setting != default or (position == 0 and isinstance(setting, str))
+    ]
+    return f"{scene.name}-{'_'.join([method.family, *shown])}-dt{dt:g}"
 
 
 def _short(name: str, setting: object) -> str:
