@@ -10,9 +10,10 @@ from conservative.scene import Scene
 from conservative.trajectory import OK, Counters, Trajectory
 
 from . import errors, ladder
-from .cases import SKIPPED, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
+from .cases import MISSING, NO_ORDER, SKIPPED, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
 from .measurement import Measurement
 from .order import observed_order
+from .selection import Missing
 from .timing import elapsed
 
 if TYPE_CHECKING:
@@ -70,23 +71,25 @@ def convergence(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = [method for method in study.methods if method.room != "truth"]
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
-        truth = study.truth(scene, ladder.samples(scene)).trajectory
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             if method.order is None:
-                yield from without_order(Case(study.name, scene, method, ladder.samples(scene)))
+                yield from without_order(Case(study.name, scene, method, ladder.samples(scene, method)))
             else:
-                yield from converging(study, scene, method, truth)
+                yield from converging(study, scene, method)
 
 
 def without_order(case: Case) -> list[Measurement]:
-    """Return the rows of a method whose accuracy does not depend on dt."""
+    """Return the rows of a method whose accuracy does not depend on dt, or whose engine is missing."""
     measures = [(name, "1") for _, name in CONVERGENCE]
-    return [at_no_step(row) for row in case.blanks(measures, UNSUPPORTED, "its accuracy does not depend on dt")]
+    missing = isinstance(case.method, Missing)
+    status, detail = (MISSING, "") if missing else (UNSUPPORTED, "its accuracy does not depend on dt")
+    return [at_no_step(row) for row in case.blanks(measures, status, detail)]
 
 
-def converging(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Iterator[Measurement]:
+def converging(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
     """Yield the errors of one method at all its steps, then the orders they show."""
+    truth = study.truth(scene, ladder.samples(scene, method)).trajectory
     wanted = {name for name, _ in CONVERGENCE} | {"attitude error final"}
     units = [(name, unit) for name, unit in errors.names(scene) if name in wanted]
     found: dict[str, dict[float, float]] = {name: {} for name in wanted}
@@ -113,13 +116,14 @@ def climb(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tup
             continue
         outcome = attempt(case, skip_missing)
         if isinstance(outcome, Done):
-            per_step = elapsed(outcome.run) / case.grid.n_steps
+            first = outcome.cost.first_call  # may include compilation, so only a short one is taken for the cost of a run
+            per_step = (first if first < longest / 4 else elapsed(outcome.run)) / case.grid.n_steps
         yield case, outcome
 
 
 def fitted(case: Case, name: str, errors_of_steps: dict[float, float]) -> list[Measurement]:
     """Return the observed order and its standard error."""
     order = observed_order(list(errors_of_steps), list(errors_of_steps.values()))
-    status = f"no order ({order.reason})" if order.reason else OK
+    status = NO_ORDER if order.reason else OK
     values = ((name, order.slope), (f"{name} stderr", order.stderr))
     return [at_no_step(case.row(measure, value, "1", status, str(order))) for measure, value in values]

@@ -13,7 +13,8 @@ from conservative.trajectory import OK, Trajectory
 from .measurement import Measurement
 from .timing import Preparation, prepared
 
-MISSING, UNSUPPORTED, ENGINE_ERROR, SKIPPED = "missing", "unsupported", "engine error", "skipped"
+MISSING, UNSUPPORTED, ENGINE_ERROR = "missing", "unsupported", "engine error"
+SKIPPED, NO_ORDER = "skipped", "no order"
 
 
 @dataclass(frozen=True)

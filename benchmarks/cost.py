@@ -111,10 +111,10 @@ def work_precision(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = series_of(study)
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
-        truth = study.truth(scene, ladder.samples(scene)).trajectory
         good: list[Case] = []
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+            truth = study.truth(scene, ladder.samples(scene, method)).trajectory
             for case, outcome in climb(points(study, scene, method), study.longest_run, study.skip_missing):
                 yield from error_rows(case, outcome, truth)
                 good += [case] * isinstance(outcome, Done)
@@ -134,11 +134,11 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     if method.order is not None:
         grids = ladder.steps(scene, method)[:: 2 if study.quick else 1]
         return [Case(study.name, scene, method, grid) for grid in grids]
-    grid = ladder.samples(scene)
+    grid = ladder.samples(scene, method)
     if setting is None:
         return [Case(study.name, scene, method, grid)]
-    tolerances = ladder.TOLERANCES[:: 2 if study.quick else 1]
-    return [Case(study.name, scene, at_tolerance(method, setting, tolerance), grid) for tolerance in tolerances]
+    tolerances = {*ladder.TOLERANCES[:: 2 if study.quick else 1], getattr(method, setting)}
+    return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in sorted(tolerances, reverse=True)]
 
 
 def error_rows(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:

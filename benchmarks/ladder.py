@@ -10,23 +10,36 @@ from conservative.scene import Scene
 SAMPLES = 12
 """Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
 RADIANS = 1.0
-"""Turn of the body in the coarsest step, rad."""
+"""Turn of the body in the coarsest step of a ladder, rad."""
 LENGTH = 8
 """Steps of a ladder, each half of the one before."""
-TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
 HIGH_ORDER = 6
-"""From this order on the steps of a ladder are closer, since one halving can lead from no accuracy to the round-off floor."""
+"""From this order on one halving can lead from no accuracy to the round-off floor: steps are closer, and begin further out."""
+HIGH_SAMPLES, HIGH_LENGTH = 4, 17
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+"""Tolerances of adaptive methods, beside their own."""
+
+
+def intervals(method: Method) -> int:
+    """Return the number of intervals between a method's samples: with fewer, a step can be longer."""
+    return SAMPLES if (method.order or 0) < HIGH_ORDER else HIGH_SAMPLES
+
+
+def samples(scene: Scene, method: Method) -> Grid:
+    """Return the grid of the samples alone: that of the truth, and of a method without a step."""
+    n = intervals(method)
+    return Grid(scene.t_end / n, n)
 
 
 def steps(scene: Scene, method: Method) -> list[Grid]:
     """Return the grids of a method with a step, coarse to fine, over the scene's duration."""
+    n = intervals(method)
+    return [Grid(scene.t_end / (n * k), n * k, k) for k in _per_interval(scene, method)]
+
+
+def _per_interval(scene: Scene, method: Method) -> list[int]:
+    if intervals(method) == HIGH_SAMPLES:
+        return sorted({round(2 ** (k / 2)) for k in range(HIGH_LENGTH)})
     rate = float(np.linalg.norm(scene.w_WB_B0))
     coarsest = max(1, round(scene.t_end * rate / RADIANS / SAMPLES))
-    ratio = 2.0 if (method.order or 0) < HIGH_ORDER else 2.0**0.5
-    per_sample = sorted({round(coarsest * ratio**k) for k in range(LENGTH)})
-    return [Grid(scene.t_end / (SAMPLES * n), SAMPLES * n, n) for n in per_sample]
-
-
-def samples(scene: Scene) -> Grid:
-    """Return the grid of an adaptive method and of the truth: the samples alone."""
-    return Grid(scene.t_end / SAMPLES, SAMPLES)
+    return [coarsest * 2**k for k in range(LENGTH)]

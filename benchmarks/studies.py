@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from conservative.check import choice
@@ -27,6 +28,7 @@ FindTruth = Callable[[Scene, Grid], "Truth"]
 NAMES = ("paper", "convergence", "speed", "work_precision")
 
 
+@lru_cache(maxsize=32)
 def reference(scene: Scene, grid: Grid) -> Truth:
     """Return the exact motion from two independent truths that agree (`references.truth`)."""
     from references import truth

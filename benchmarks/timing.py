@@ -53,7 +53,9 @@ def elapsed(run: Callable[[], Any], calls: int = 1) -> float:
 
 
 def calls_per_sample(run: Callable[[], Any], min_time: float) -> int:
-    """Return how many calls last min_time s: doubled until they do, which also warms caches and clock."""
+    """Return how many calls last min_time s. The first call is not counted unless it alone lasts ten times as long."""
+    if elapsed(run) > 10 * min_time:
+        return 1
     calls = 1
     while (spent := elapsed(run, calls)) < min_time:
         calls = max(2 * calls, math.ceil(calls * min_time / spent) if spent > min_time / 10 else 0)
@@ -65,8 +67,9 @@ def interleaved(
 ) -> dict[str, Timing]:
     """Time several runs against each other.
 
-    Each is called once, unmeasured. Then every round takes one sample of each, in a new random order, so that a slow spell of
-    the machine, or a neighbour in the order, hits them all alike. Ratios of minimums are what lasts.
+    Each is called unmeasured first, to warm up and to see how many calls make a sample. Then every round takes one sample of
+    each, in a new random order, so that a slow spell of the machine, or a neighbour in the order, hits them all alike. Ratios of
+    minimums are what lasts.
 
     Parameters
     ----------
@@ -88,8 +91,6 @@ def interleaved(
     """
     positive_integer("rounds", rounds)
     positive_number("min_time", min_time, "a finite duration above 0, s")
-    for run in runs.values():
-        run()
     calls = {name: calls_per_sample(run, min_time) for name, run in runs.items()}
     samples: dict[str, list[float]] = {name: [] for name in runs}
     shuffled = random.Random(seed)
