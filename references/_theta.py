@@ -1,0 +1,237 @@
+"""Quotients of theta functions, prepared in many digits and evaluated in double precision.
+
+The exact motions are made of constants times `exp(i mu t) theta_j(v - i y) / theta_4(v)`, v linear in time. The series of a theta
+function (DLMF 20.2) converges fast where its nome is small; elsewhere Jacobi's imaginary transformation (DLMF 20.7(viii)) trades
+the nome for the complementary one, which turns circular functions into hyperbolic ones. One of the two nomes never exceeds
+exp(-pi) = 0.043, so that five terms give double precision, for every modulus from 0 to 1, both included.
+
+No difference of nearly equal numbers is formed on the way: what could cancel is prepared by `mp`, 500 bits wide, once a motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from conservative.attitude import Array
+
+mp = mpmath.MPContext()
+mp.prec = 500
+
+Number = Any
+"""A real or complex number of `mp`."""
+ComplexArray = NDArray[np.complex128]
+
+_TERMS = 14  # exp(-pi)^(14^2) is below 2^-800
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Quarter periods K (real) and K' (imaginary) of an elliptic function; either may be infinite.
+
+    With w = s v the series run in exp(2 w). `hyperbolic` says that K' < K, so that s = pi/(2 K') is real and the nome the
+    complementary one; otherwise s = i pi/(2 K).
+    """
+
+    K: Number
+    K_prime: Number
+
+    @classmethod
+    def of(cls, m: Number, m_complement: Number) -> Lattice:
+        """Return the lattice of the parameter m and 1 - m, both given so that neither need be formed by subtraction."""
+        return cls(_quarter_period(m_complement), _quarter_period(m))
+
+    @cached_property
+    def hyperbolic(self) -> bool:
+        """Whether the complementary nome is the smaller one."""
+        return bool(self.K_prime < self.K)
+
+    @cached_property
+    def short(self) -> Number:
+        """The smaller quarter period."""
+        return min(self.K, self.K_prime)
+
+    @cached_property
+    def nome(self) -> Number:
+        """The smaller nome, at most exp(-pi)."""
+        return mp.exp(-mp.pi * max(self.K, self.K_prime) / self.short)
+
+    @cached_property
+    def s(self) -> Number:
+        """d w / d v."""
+        rate = mp.pi / (2 * self.short)
+        return rate if self.hyperbolic else mp.mpc(0, rate)
+
+    def exponentials(self, v: Number) -> tuple[Number, Number, Number]:
+        """Return exp(2 w), exp(-2 w) and the lift (see `Theta`) at a number v; hyperbolic: 0 <= v, the first times the nome."""
+        grown = mp.exp(2 * self.s * (v - self.K if self.hyperbolic else v))
+        return grown, mp.exp(-2 * self.s * v), mp.exp(-self.s * v if self.hyperbolic else self.s * v)
+
+    def exponential_arrays(self, v: Array) -> tuple[Any, Any, Any]:
+        """Return the same at v (n,) in double precision."""
+        rate = float(abs(self.s))
+        if self.hyperbolic:
+            lift = np.exp(-rate * v)
+            return np.exp((2 * rate) * (v - float(self.K))), lift * lift, lift
+        lift = np.exp(1j * rate * v)
+        grown = lift * lift
+        return grown, np.conj(grown), lift
+
+
+def _quarter_period(m_complement: Number) -> Number:
+    return mp.inf if m_complement == 0 else mp.pi / (2 * mp.agm(1, mp.sqrt(m_complement)))
+
+
+@dataclass(frozen=True, eq=False)
+class Theta:
+    """A multiple of exp(i kappa v) theta_j(v - i y), as the series sum rising[n] exp(2 n w) + sum falling[n] exp(-2 n w).
+
+    `half` says that the series has odd exponents, (2 n + 1) w: then exp(w) is divided out. `odd` is the sign c in
+    f(-v - i y) = c conj(f(v - i y)) for real v, by which hyperbolic series are only ever summed for v >= 0.
+    """
+
+    lattice: Lattice
+    rising: tuple[Number, ...]
+    falling: tuple[Number, ...]
+    kappa: Number
+    half: bool
+    odd: int
+
+    def value_and_slope(self, v: Number) -> tuple[Number, Number]:
+        """Return the function and its derivative at a number v."""
+        if self.lattice.hyperbolic and v < 0:
+            value, slope = self.value_and_slope(-v)
+            return self.odd * mp.conj(value), -self.odd * mp.conj(slope)
+        grown, fallen, _ = self.lattice.exponentials(v)
+        value, slope = mp.mpc(0), mp.mpc(0)
+        for n, (up, down) in enumerate(zip(self.rising, self.falling, strict=True)):
+            a, b = up * grown**n, down * fallen**n
+            value, slope = value + a + b, slope + 2 * n * self.lattice.s * (a - b)
+        turn = mp.expj(self.kappa * v)
+        return turn * value, turn * (slope + mp.mpc(0, self.kappa) * value)
+
+    def arrays(self, grown: Any, fallen: Any) -> Any:
+        """Return the series at exp(2 w) and exp(-2 w), each (n,), in double precision and without exp(i kappa v)."""
+        return _polynomial(self.rising, grown) + fallen * _polynomial(self.falling[1:], fallen)
+
+
+def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
+    """Return a multiple of theta_j(v - i y), j = `number`, 0 <= y <= K', with y_rest = K' - y given beside it.
+
+    Formula: DLMF 20.2.1 to 20.2.4, transformed by 20.7.30 to 20.7.33 where the lattice is hyperbolic. There theta_1 and theta_3
+    stay, theta_2 and theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), leaves kappa.
+    """
+    hyperbolic = lattice.hyperbolic
+    series = {2: 4, 4: 2}.get(number, number) if hyperbolic else number
+    half, sign = series in (1, 2), (-1 if series in (1, 4) else 1)
+    if hyperbolic:
+        step = mp.expj(-mp.pi * y / lattice.K_prime)
+        back, lead = mp.conj(step), mp.expj(-mp.pi * y / (2 * lattice.K_prime)) if half else mp.mpf(1)
+        kappa = mp.pi * y / (2 * lattice.K * lattice.K_prime)
+    else:
+        step, back, lead = mp.exp(-mp.pi * y_rest / lattice.K), mp.exp(-mp.pi * y / lattice.K), mp.mpf(1)
+        kappa = mp.mpf(0)
+    nome, first, second = lattice.nome, (0 if half else -1), (-1 if half else 0)
+    rising = [lead * sign**n * nome ** (n * (n + first)) * step**n for n in range(_TERMS)]
+    falling = [mp.mpf(0), *(lead * sign**n * nome ** (n * (n + second)) * back**n for n in range(1, _TERMS))]
+    return Theta(lattice, tuple(rising), tuple(falling), kappa, half, -1 if series == 1 and hyperbolic else 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Quotient:
+    """scale exp(i kappa v) theta_j(v - i y) / theta_4(v); the conjugate before scaling where `mirrored`, for y < 0."""
+
+    above: Theta
+    below: Theta
+    mirrored: bool = False
+    scale: Number = 1
+
+    def scaled(self, factor: Number) -> Quotient:
+        """Return the quotient times a number."""
+        return replace(self, scale=self.scale * factor)
+
+    def value_and_slope(self, v: Number) -> tuple[Number, Number]:
+        """Return the function and its derivative at a number v."""
+        a, a_slope = self.above.value_and_slope(v)
+        b, b_slope = self.below.value_and_slope(v)
+        lift, lift_slope = self._lift(v)
+        value = a * lift / b
+        slope = (a_slope * lift + a * lift_slope - value * b_slope) / b
+        if self.mirrored:
+            value, slope = mp.conj(value), mp.conj(slope)
+        return self.scale * value, self.scale * slope
+
+    def _lift(self, v: Number) -> tuple[Number, Number]:
+        """Return the quotient of the factors exp(w) that the two series leave out, and its derivative."""
+        if self.above.half == self.below.half:
+            return mp.mpf(1), mp.mpf(0)
+        lattice = self.above.lattice
+        if not lattice.hyperbolic:
+            lift = lattice.exponentials(v)[2]
+            return lift, lattice.s * lift
+        lift = lattice.exponentials(abs(v))[2]
+        return lift, -lattice.s * lift * (1 if v >= 0 else -1)
+
+
+def quotient(lattice: Lattice, number: int, y: Number = 0, y_rest: Number | None = None, mirrored: bool = False) -> Quotient:
+    """Return a multiple of theta_j(v - i y) / theta_4(v), with + i y where `mirrored`."""
+    rest = lattice.K_prime if y_rest is None else y_rest
+    return Quotient(theta(lattice, number, mp.mpf(y), rest), theta(lattice, 4, mp.mpf(0), lattice.K_prime), mirrored)
+
+
+def jacobi(lattice: Lattice) -> tuple[Quotient, Quotient, Quotient]:
+    """Return sn, cn, dn (DLMF 22.2), normalised by sn'(0) = cn(0) = dn(0) = 1."""
+    sn, cn, dn = (quotient(lattice, number) for number in (1, 2, 3))
+    zero = mp.mpf(0)
+    return (
+        sn.scaled(1 / sn.value_and_slope(zero)[1]),
+        cn.scaled(1 / cn.value_and_slope(zero)[0]),
+        dn.scaled(1 / dn.value_and_slope(zero)[0]),
+    )
+
+
+class Points:
+    """Arguments v (n,), |v| <= K, at which several functions of one lattice are evaluated in double precision."""
+
+    def __init__(self, lattice: Lattice, v: Array) -> None:
+        self._lattice, self._v = lattice, v
+        self._size = np.abs(v) if lattice.hyperbolic else v
+        self._grown, self._fallen, self._lift = lattice.exponential_arrays(self._size)
+
+    @cached_property
+    def _theta_4(self) -> Array:
+        series = theta(self._lattice, 4, mp.mpf(0), self._lattice.K_prime)
+        return np.asarray(np.real(series.arrays(self._grown, self._fallen)))
+
+    def theta(self, function: Theta) -> Any:
+        """Return the function (n,), up to a positive factor."""
+        value = function.arrays(self._grown, self._fallen)
+        if function.kappa:
+            value = value * np.exp(1j * float(function.kappa) * self._size)
+        if self._lattice.hyperbolic:
+            value = np.where(self._v < 0, function.odd * np.conj(value), value)
+        return value
+
+    def quotient(self, function: Quotient) -> ComplexArray:
+        """Return the function (n,)."""
+        value = self.theta(function.above) / self._theta_4
+        if function.above.half != function.below.half:
+            value = value * self._lift
+        return np.asarray(complex(function.scale) * (np.conj(value) if function.mirrored else value))
+
+
+def _polynomial(coefficients: tuple[Number, ...], x: Any) -> Any:
+    """Return sum c[n] x^n for |x| <= 1, leaving out what is below a rounding unit."""
+    numbers = np.array([complex(c) for c in coefficients])
+    used = 1 + int(np.max(np.flatnonzero(np.abs(numbers) > 1e-18), initial=0))
+    if not np.any(numbers.imag):
+        numbers = numbers.real
+    total = numbers[used - 1]
+    for c in numbers[used - 2 :: -1] if used > 1 else ():
+        total = total * x + c
+    return total
