@@ -1,4 +1,4 @@
-"""The motion of a free rigid body in closed form (Jacobi 1849; Whittaker, Analytical Dynamics, 69-71; van Zon & Schofield 2007).
+"""The motion of a free rigid body in closed form (Jacobi 1849; Whittaker, Analytical Dynamics, 69; van Zon & Schofield 2007).
 
 In principal axes, ordered so that 2 is the middle one and the momentum never leaves the side of +3,
 

@@ -1,4 +1,4 @@
-"""The motion of the Lagrange top in closed form (Klein & Sommerfeld, Theorie des Kreisels, VI; Whittaker, Analytical Dynamics, 72).
+"""The Lagrange top in closed form (Klein & Sommerfeld, Theorie des Kreisels, VI; Whittaker, Analytical Dynamics, 72).
 
 Axis 3 is the body's, on the side of the centre of mass; R = Rz(phi) Rx(theta) Rz(psi), u = cos theta. With k = m g l/J1,
 b_z = L_z/J1, b3 = L3/J1, w = w1 + i w2, u_E = u + |w|^2/(2 k) (constant)
@@ -12,8 +12,8 @@ Euler's angles are singular at the poles u = -1 and 1. The Cayley-Klein paramete
     beta  = sin(theta/2) exp(i (phi - psi)/2)     beta'/beta   = (-u' + i (b_z - b3)) / (2 (1 - u)) - i (w3 - b3)/2
     w                                             w'/w         = (-u' - i (b_z - b3 u_E)) / (2 (u_E - u)) - i (w3 - b3/2)
 
-is a constant times exp(i mu t) theta_j(v - i y)/theta_4(v), with j = 1 for alpha and 2 for the others: it vanishes where u, as a
-function of complex time, is -1, 1 or u_E. A passage next to a pole, or through it, is a theta function next to its zero.
+is a constant times exp(i mu t) theta_j(v - i y)/theta_4(v), with j = 1 for alpha and 2 for the others: it vanishes where u, as
+a function of complex time, is -1, 1 or u_E. A passage next to a pole, or through it, is a theta function next to its zero.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Quotients of theta functions, prepared in many digits and evaluated in double precision.
 
-The exact motions are made of constants times `exp(i mu t) theta_j(v - i y) / theta_4(v)`, v linear in time. The series of a theta
-function (DLMF 20.2) converges fast where its nome is small; elsewhere Jacobi's imaginary transformation (DLMF 20.7(viii)) trades
-the nome for the complementary one, which turns circular functions into hyperbolic ones. One of the two nomes never exceeds
-exp(-pi) = 0.043, so that five terms give double precision, for every modulus from 0 to 1, both included.
+The exact motions are made of constants times `exp(i mu t) theta_j(v - i y) / theta_4(v)`, v linear in time. The series of a
+theta function (DLMF 20.2) converges fast where its nome is small; elsewhere Jacobi's imaginary transformation (DLMF
+20.7(viii)) trades the nome for the complementary one, which turns circular functions into hyperbolic ones. One of the two
+nomes never exceeds exp(-pi) = 0.043, so that five terms give double precision, for every modulus from 0 to 1, both included.
 
 No difference of nearly equal numbers is formed on the way: what could cancel is prepared by `mp`, 500 bits wide, once a motion.
 """
@@ -124,7 +124,8 @@ def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
     """Return a multiple of theta_j(v - i y), j = `number`, 0 <= y <= K', with y_rest = K' - y given beside it.
 
     Formula: DLMF 20.2.1 to 20.2.4, transformed by 20.7.30 to 20.7.33 where the lattice is hyperbolic. There theta_1 and theta_3
-    stay, theta_2 and theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), leaves kappa.
+    stay, theta_2 and theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), leaves
+    kappa.
     """
     hyperbolic = lattice.hyperbolic
     series = {2: 4, 4: 2}.get(number, number) if hyperbolic else number

@@ -1,8 +1,8 @@
 """Exact solutions: the free rigid body and the Lagrange top, at any times at once.
 
-Each time costs the same, however late. What belongs to the motion as a whole is prepared in 500 bits, and the samples are sums of a
-few exponentials in double precision; see `references._theta` for why neither a separatrix nor a pole harms them. The inputs are
-taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded.
+Each time costs the same, however late. What belongs to the motion as a whole is prepared in 500 bits, and the samples are sums
+of a few exponentials in double precision; see `references._theta` for why neither a separatrix nor a pole harms them. The
+inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ from ._motion import Motion, steady_turn
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
     """Return the exact motion of a free rigid body.
 
-    Any body: asymmetric, symmetric or spherical, in principal or other axes. Any start: the separatrix and its neighbourhood too.
+    Any body: asymmetric, symmetric or spherical, in principal or other axes. Any start: the separatrix and its neighbourhood
+    too.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def lagrange_top(
 ) -> tuple[Array, Array]:
     """Return the exact motion of a symmetric body in uniform gravity, its centre of mass on the axis of symmetry.
 
-    Any start: nutating, steady, sleeping, without spin, hanging, inverted, next to a pole or through it. A spherical body may have
-    its centre of mass anywhere; without weight or lever any body is a free one.
+    Any start: nutating, steady, sleeping, without spin, hanging, inverted, next to a pole or through it. A spherical body may
+    have its centre of mass anywhere; without weight or lever any body is a free one.
 
     Parameters
     ----------
