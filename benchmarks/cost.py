@@ -132,7 +132,8 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     """Return the cases of one line, cheap to dear: steps, or tolerances of an adaptive method."""
     setting = tolerance_setting(method)
     if method.order is not None:
-        grids = ladder.steps(scene, method)[:: 2 if study.quick else 1]
+        longest = ladder.LENGTH if method.order == 1 else None  # what comes after is dear and still far off
+        grids = ladder.steps(scene, method)[:longest][:: 2 if study.quick else 1]
         return [Case(study.name, scene, method, grid) for grid in grids]
     grid = ladder.samples(scene, method)
     if setting is None:

@@ -11,8 +11,8 @@ SAMPLES = 12
 """Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
 RADIANS = 1.0
 """Turn of the body in the coarsest step of a ladder, rad."""
-LENGTH = 8
-"""Steps of a ladder, each half of the one before."""
+LENGTH, FIRST_ORDER_LENGTH = 8, 12
+"""Steps of a ladder, each half of the one before. First-order methods begin to converge late."""
 HIGH_ORDER = 6
 """From this order on one halving can lead from no accuracy to the round-off floor: steps are closer, and begin further out."""
 HIGH_SAMPLES, HIGH_LENGTH = 4, 17
@@ -42,4 +42,4 @@ def _per_interval(scene: Scene, method: Method) -> list[int]:
         return sorted({round(2 ** (k / 2)) for k in range(HIGH_LENGTH)})
     rate = float(np.linalg.norm(scene.w_WB_B0))
     coarsest = max(1, round(scene.t_end * rate / RADIANS / SAMPLES))
-    return [coarsest * 2**k for k in range(LENGTH)]
+    return [coarsest * 2**k for k in range(FIRST_ORDER_LENGTH if method.order == 1 else LENGTH)]

@@ -14,12 +14,14 @@ from conservative.check import finite_array
 from conservative.errors import BadInput
 
 MIN_POINTS = 3
-SHRINKING = 0.5
-"""Local slope above which an error counts as still shrinking with the step: half of the lowest order there is."""
+SHRINKING = 1 / 3
+"""An error is still shrinking with the step where its local slope is above this part of the steepest slope seen."""
 ABOVE_FLOOR = 10.0
 """How far above the floor a point must be, so that the floor changes it by less than a tenth."""
-BEND = 0.1
+BEND = 0.05
 """Relative difference between the slopes of the coarsest pair and of the rest above which the coarsest point is left out."""
+SCATTER = 1.5
+"""Standard deviations by which those slopes may differ because the points scatter."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +59,14 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     From coarse to fine the data are cut into three by rules that see nothing but the data:
 
     1. The descent is the stretch of neighbouring points, each with a smaller error than the one before by a local slope above
-       `SHRINKING`, over which the error falls furthest. What is coarser has not begun to converge.
+       `SHRINKING` of the steepest, over which the error falls furthest. The steepest is the second largest slope over three
+       neighbours, so that one lucky zero does not set it. What is coarser has not begun to converge; should any of it be as
+       small as the end of the descent, there was none but chance.
     2. What is finer than its end has reached the floor: the largest error from that end on. Points within `ABOVE_FLOOR` of it
        are left out. Should the data end in the bend, so that the last pair's slope is less than half that of the rest, its
        finer point goes too, once.
     3. The coarsest point is left out as long as the slope of its pair differs from the fit to the others by more than `BEND`,
-       and by more than three standard errors of that fit, and four points or more are there.
+       and by more than the scatter of the others about their fit explains (`SCATTER`), and four points or more are there.
 
     Points whose error is not finite, runs that failed, are passed over; errors of zero are at the floor.
 
@@ -88,7 +92,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     used = _without_preasymptotic(x, y, _without_bend(x, y, used) if math.isnan(floor) else used)
     if len(used) < MIN_POINTS:
         return _none(floor, f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}")
-    slope, stderr = _fit(x[used], y[used])
+    slope, stderr, _ = _fit(x[used], y[used])
     return Order(slope, stderr, tuple(order[i] for i in used), floor)
 
 
@@ -108,26 +112,29 @@ def _checked(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
 
 def _descent(x: Array, y: Array) -> tuple[int, int]:
     """Return first and last index of the stretch of shrinking errors over which the error falls furthest."""
+    steepest = np.sort((y[:-2] - y[2:]) / (x[:-2] - x[2:]))[-2:][0]
     best, first = (0, 0), 0
     for last in range(1, len(x)):
-        if not y[last - 1] - y[last] > SHRINKING * (x[last - 1] - x[last]):
+        if not y[last - 1] - y[last] > max(SHRINKING * steepest, 0.0) * (x[last - 1] - x[last]):
             first = last
         if y[first] - y[last] > y[best[0]] - y[best[1]]:
             best = first, last
-    return best
+    first, last = best
+    return best if y[last] < y[: first + 1].min() else (0, 0)
 
 
 def _without_bend(x: Array, y: Array, used: list[int]) -> list[int]:
     if len(used) <= MIN_POINTS:
         return used
-    rest, _ = _fit(x[used[:-1]], y[used[:-1]])
+    rest, _, _ = _fit(x[used[:-1]], y[used[:-1]])
     return used[:-1] if _pair(x, y, used[-2:]) < rest / 2 else used
 
 
 def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
     while len(used) > MIN_POINTS:
-        rest, stderr = _fit(x[used[1:]], y[used[1:]])
-        if abs(_pair(x, y, used[:2]) - rest) <= max(BEND * abs(rest), 3 * stderr):
+        rest, _, scatter = _fit(x[used[1:]], y[used[1:]])
+        by_chance = SCATTER * math.sqrt(2) * scatter / float(x[used[0]] - x[used[1]])
+        if abs(_pair(x, y, used[:2]) - rest) <= max(BEND * abs(rest), by_chance):
             break
         used = used[1:]
     return used
@@ -138,9 +145,9 @@ def _pair(x: Array, y: Array, pair: Sequence[int]) -> float:
     return float((y[i] - y[j]) / (x[i] - x[j]))
 
 
-def _fit(x: Array, y: Array) -> tuple[float, float]:
-    """Return the least-squares slope and its standard error, nan with two points."""
+def _fit(x: Array, y: Array) -> tuple[float, float, float]:
+    """Return the least-squares slope of three points or more, its standard error, and the points' scatter about the line."""
     dx, dy = x - x.mean(), y - y.mean()
     slope = float(dx @ dy / (dx @ dx))
-    spread = float(np.sum((dy - slope * dx) ** 2) / (dx @ dx))
-    return slope, math.sqrt(spread / (len(x) - 2)) if len(x) > 2 else float("nan")
+    scatter = math.sqrt(float(np.sum((dy - slope * dx) ** 2)) / (len(x) - 2))
+    return slope, scatter / math.sqrt(float(dx @ dx)), scatter

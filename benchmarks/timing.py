@@ -68,8 +68,8 @@ def interleaved(
     """Time several runs against each other.
 
     Each is called unmeasured first, to warm up and to see how many calls make a sample. Then every round takes one sample of
-    each, in a new random order, so that a slow spell of the machine, or a neighbour in the order, hits them all alike. Ratios of
-    minimums are what lasts.
+    each, in a new random order, so that a slow spell of the machine, or a neighbour in the order, hits them all alike. Ratios
+    of minimums are what lasts.
 
     Parameters
     ----------

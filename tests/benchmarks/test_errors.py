@@ -1,0 +1,141 @@
+import math
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from benchmarks.errors import drifts, measure, names, secular_slope
+from conservative.attitude import rotation_about
+from conservative.errors import BadInput
+from conservative.trajectory import Trajectory
+
+TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
+INERTIA = TURN @ np.diag([1.7, 0.9, 2.3]) @ TURN.T
+START = rotation_about((-0.2, 0.4, 0.9), 2.2)
+RATES = np.array([0.7, -1.3, 2.1])
+FREE = cv.Scene("free", cv.RigidBody(INERTIA), START, RATES, 2.0)
+HEAVY = cv.Scene("heavy", cv.RigidBody(INERTIA), START, RATES, 2.0, cv.UniformGravity(3.3, (0.2, -0.1, 0.4)))
+
+
+@pytest.fixture(params=[FREE, HEAVY], ids=lambda scene: scene.name)
+def exact(request):
+    """Fine enough to stand for the truth: only differences to it are looked at."""
+    return cv.integrate(request.param, dt=0.01, sample_every=4)
+
+
+def values(trajectory, truth):
+    return {name: value for name, value, _ in measure(trajectory, truth)}
+
+
+def changed(trajectory, R_WB=None, w_WB_B=None):
+    R = trajectory.R_WB if R_WB is None else R_WB
+    w = trajectory.w_WB_B if w_WB_B is None else w_WB_B
+    return Trajectory(trajectory.scene, trajectory.t, R, w, "changed")
+
+
+def test_a_trajectory_has_no_error_against_itself(exact):
+    found = values(exact, exact)
+    assert all(found[name] == 0 for name in found if "error" in name)
+    assert found["energy drift max"] < 1e-14  # measured 6e-16 and 8e-16
+
+
+def test_a_planted_turn_is_the_attitude_error(exact):
+    angles = 1e-9 * (1 + np.arange(len(exact)))
+    planted = changed(exact, np.array([R @ rotation_about((1, 2, 3), a) for R, a in zip(exact.R_WB, angles, strict=True)]))
+    found = values(planted, exact)
+    assert found["attitude error max"] == pytest.approx(angles[-1], rel=1e-6)  # measured 8e-10: round-off of R over the angle
+    assert found["attitude error final"] == found["attitude error max"]
+    assert found["attitude error rms"] == pytest.approx(np.sqrt(np.mean(angles**2)), rel=1e-6)
+    assert found["orthonormality max"] < 1e-14  # measured 1.3e-15
+
+
+def test_position_error_is_how_far_the_centre_of_mass_is_off():
+    exact = cv.integrate(HEAVY, dt=0.01)
+    turn = rotation_about((0, 0, 1), math.pi)
+    found = values(changed(exact, turn @ exact.R_WB), exact)
+    horizontal = np.linalg.norm((exact.R_WB @ HEAVY.potential.com_B)[:, :2], axis=1)
+    assert found["position error max"] == pytest.approx(2 * horizontal.max(), rel=1e-12)
+    assert found["position error final"] == pytest.approx(2 * horizontal[-1], rel=1e-12)
+
+
+def test_rate_error_is_relative_to_the_largest_exact_rate(exact):
+    off = np.array([0.0, 3e-4, 4e-4])
+    found = values(changed(exact, w_WB_B=exact.w_WB_B + off), exact)
+    largest = np.linalg.norm(exact.w_WB_B, axis=1).max()
+    assert found["rate error max"] == pytest.approx(5e-4 / largest, rel=1e-9)
+    assert found["rate error final"] == pytest.approx(5e-4 / largest, rel=1e-9)
+
+
+def test_a_planted_gain_of_energy_is_its_drift_and_slope():
+    exact = cv.integrate(FREE, dt=0.01)
+    gain = 3e-5
+    found = values(changed(exact, w_WB_B=exact.w_WB_B * np.sqrt(1 + gain * exact.t)[:, None]), exact)
+    assert found["energy drift final"] == pytest.approx(gain * 2.0, rel=1e-9)  # the free body's scale is its energy
+    assert found["energy drift max"] == found["energy drift final"]
+    assert found["energy drift slope"] == pytest.approx(gain, rel=1e-9)
+    assert found["energy drift slope stderr"] < 1e-9 * gain  # measured 1e-12 of it
+    assert found["momentum drift final"] == pytest.approx(np.sqrt(1 + gain * 2.0) - 1, rel=1e-9)
+    assert found["momentum drift slope"] == pytest.approx(gain / 2, rel=1e-3)  # measured 1.5e-5 off: the root bends it
+
+
+def test_a_start_that_a_method_spoilt_is_a_drift():
+    exact = cv.integrate(FREE, dt=0.01)
+    found = values(changed(exact, w_WB_B=exact.w_WB_B * (1 + 1e-6)), exact)
+    assert found["energy drift max"] == pytest.approx(2e-6, rel=1e-5)
+
+
+def test_energy_at_zero_has_a_scale():
+    """A body hung level at rest has no kinetic and no potential energy."""
+    scene = cv.Scene("level", cv.RigidBody(INERTIA), np.eye(3), (0, 0, 0), 1.0, cv.UniformGravity(2.0, (0.3, 0.0, 0.0)))
+    found = cv.integrate(scene, dt=0.01)
+    assert abs(found.energy[0]) < 1e-15  # J; measured 6e-17, from the turn to principal axes and back
+    assert {name: value for name, value, _ in drifts(found)}["energy drift max"] < 1e-14  # measured 5e-16
+
+
+def test_lost_orthonormality_is_found(exact):
+    R = exact.R_WB.copy()
+    R[3] *= 1 + 1e-7
+    assert values(changed(exact, R), exact)["orthonormality max"] == pytest.approx(2e-7, rel=1e-6)
+
+
+def test_names_are_those_of_the_measures(exact):
+    assert [(name, unit) for name, _, unit in measure(exact, exact)] == names(exact.scene)
+
+
+def test_slope_of_a_line_with_noise_is_within_its_standard_error():
+    t = np.linspace(0, 5, 400)
+    noise = np.random.default_rng(3).standard_normal((200, 400))
+    found = [secular_slope(t, 0.2 * t + 0.01 * row) for row in noise]
+    off = np.array([(slope.value - 0.2) / slope.stderr for slope in found])
+    assert 0.8 < off.std() < 1.2  # measured 1.06 over 200 draws
+    assert abs(off.mean()) < 0.25  # measured -0.03
+
+
+def test_slope_of_a_vector_is_the_length_of_its_slopes():
+    t = np.linspace(1, 3, 50)
+    assert secular_slope(t, np.outer(t, [2.0, -3.0, 6.0])).value == pytest.approx(7.0, rel=1e-12)
+
+
+def test_two_samples_have_no_slope():
+    assert all(math.isnan(value) for value in secular_slope(np.array([0.0, 1.0]), np.array([0.0, 1.0])))
+
+
+def test_what_a_run_that_ended_early_has_is_measured(exact):
+    half = len(exact) // 2
+    short = Trajectory(exact.scene, exact.t[:half], exact.R_WB[:half], exact.w_WB_B[:half], "short")
+    assert values(short, exact)["attitude error max"] == 0
+
+
+@pytest.mark.parametrize("spoil", [lambda t: t[:-1], lambda t: t + 1e-6, lambda t: t * 1.01], ids=["short", "late", "longer"])
+def test_other_times_are_refused(exact, spoil):
+    t = spoil(exact.t)
+    truth = Trajectory(exact.scene, t, exact.R_WB[: len(t)], exact.w_WB_B[: len(t)], "truth")
+    with pytest.raises(BadInput) as caught:
+        measure(exact, truth)
+    assert caught.value.argument == "truth"
+
+
+def test_nothing_cannot_be_measured(exact):
+    empty = Trajectory(exact.scene, exact.t[:0], exact.R_WB[:0], exact.w_WB_B[:0], "empty")
+    with pytest.raises(BadInput, match="no sample"):
+        measure(empty, exact)

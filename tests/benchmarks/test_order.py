@@ -1,0 +1,140 @@
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.order import observed_order
+from conservative.errors import BadInput
+
+STEPS = 0.1 / 2.0 ** np.arange(9)
+
+
+def noisy(errors, size, seed):
+    return errors * np.exp(size * np.random.default_rng(seed).standard_normal(len(errors)))
+
+
+@pytest.mark.parametrize("p", [1, 2, 4, 6])
+def test_exact_powers_give_their_order_from_all_points(p):
+    order = observed_order(STEPS, 3.7 * STEPS**p)
+    assert abs(order.slope - p) < 1e-12  # measured 9e-16 to 4e-15
+    assert len(order.used) == 9
+    assert math.isnan(order.floor)
+
+
+@pytest.mark.parametrize("p", [1, 2, 4])
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_is_averaged_over_the_points_and_shows_in_the_standard_error(p, seed):
+    order = observed_order(STEPS, noisy(STEPS**p, 0.1, seed))
+    assert abs(order.slope - p) < 0.08  # measured up to 0.056 over 200 draws with 10 % noise
+    assert 0.003 < order.stderr < 0.05  # measured 0.004 to 0.033
+    assert len(order.used) >= 6  # measured 6 to 9
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_false_order_is_seen(seed):
+    order = observed_order(STEPS, noisy(STEPS**3.8, 0.02, seed))
+    assert abs(order.slope - 3.8) < 0.03  # measured up to 0.011 over 200 draws: 4 is out of reach
+
+
+@pytest.mark.parametrize("p", [2, 4, 8])
+@pytest.mark.parametrize("seed", range(20))
+def test_points_on_and_near_the_floor_are_left_out(p, seed):
+    steps = 1 / 2.0 ** (np.arange(14) / (2 if p == 8 else 1))
+    level = 1e-6 if p == 2 else 1e-11
+    errors = 1e-2 * steps**p + level * np.abs(np.random.default_rng(seed).standard_normal(14))
+    order = observed_order(steps, errors)
+    assert abs(order.slope - p) < 0.08  # measured up to 0.052, 0.007, 0.013 over 200 draws
+    assert level / 5 < order.floor < 8 * level  # measured 0.29 to 5.4 levels
+    assert (errors[list(order.used)] > 3 * level).all()  # measured 3.9 levels and more
+    assert len(order.used) >= 4
+
+
+def test_a_floor_alone_seldom_looks_like_an_order():
+    draws = [1e-15 * np.abs(np.random.default_rng(seed).standard_normal(9)) for seed in range(500)]
+    found = [observed_order(STEPS, errors) for errors in draws]
+    assert sum(not order.reason for order in found) < 30  # measured 16: three random numbers can fall like an order
+
+
+def test_round_off_that_grows_as_steps_shrink_is_a_floor():
+    steps = 0.1 / 2.0 ** np.arange(12)
+    order = observed_order(steps, steps**4 + 1e-14 / steps)
+    assert abs(order.slope - 4) < 0.01  # measured 7e-4
+    assert order.floor == pytest.approx(1e-14 / steps[-1], rel=1e-3)
+
+
+def test_data_that_end_in_the_bend_to_the_floor_lose_their_last_point():
+    order = observed_order(STEPS[:6], STEPS[:6] ** 4 + 5e-10)
+    assert order.used == (0, 1, 2, 3, 4)
+    assert abs(order.slope - 4) < 0.1  # measured 0.08
+
+
+@pytest.mark.parametrize("p", [2, 4])
+def test_coarse_points_that_do_not_converge_yet_are_left_out(p):
+    errors = np.minimum(50 * (STEPS / 0.1) ** p / (1 + 3 * STEPS / 0.1), 3.1)
+    errors[1] = 2.5  # a wandering error of the order of half a turn
+    order = observed_order(STEPS, errors)
+    assert min(order.used) >= 3
+    assert abs(order.slope - p) < 0.1  # measured 0.06 and 0.08: what is left of the bend
+
+
+def test_a_lucky_zero_is_not_a_floor():
+    """One error a hundred times too small cuts the data in two; the larger part still has the order."""
+    errors = STEPS**4
+    errors[4] *= 1e-2
+    assert observed_order(STEPS, errors).slope == pytest.approx(4, rel=1e-9)
+
+
+def test_end_points_alone_do_not_decide():
+    errors = STEPS**2
+    errors[-1] *= 1.5
+    first_and_last = math.log(errors[0] / errors[-1]) / math.log(STEPS[0] / STEPS[-1])
+    order = observed_order(STEPS, errors)
+    assert abs(first_and_last - 2) > 0.07
+    assert abs(order.slope - 2) < 0.06  # measured 0.039
+
+
+def test_order_of_the_input_and_failed_runs_do_not_matter():
+    errors = noisy(STEPS**2, 0.05, 1)
+    errors[3] = math.nan
+    shuffled = np.random.default_rng(2).permutation(9)
+    straight, mixed = observed_order(STEPS, errors), observed_order(STEPS[shuffled], errors[shuffled])
+    assert straight.slope == pytest.approx(mixed.slope, rel=1e-13)
+    assert 3 not in straight.used
+    assert [shuffled[i] for i in mixed.used] == list(straight.used)
+
+
+@pytest.mark.parametrize(
+    "errors",
+    [
+        [1e-3, 2.5e-4],
+        [1e-3, math.nan, math.nan, 1e-5],
+        [3e-15, 1e-15, 4e-15, 2e-15, 5e-15],
+        [1e-3, 1e-3, 1e-3, 1e-3],
+        [0.0, 0.0, 0.0, 0.0],
+        [1e-3, 1e-14, 2e-14, 1e-14],
+    ],
+    ids=["two points", "two that ran", "all floor", "constant", "zero", "one above the floor"],
+)
+def test_too_little_gives_no_order_but_a_reason(errors):
+    order = observed_order(STEPS[: len(errors)], errors)
+    assert math.isnan(order.slope)
+    assert math.isnan(order.stderr)
+    assert order.used == ()
+    assert "a fit takes 3" in order.reason
+    assert str(order) == order.reason
+
+
+@pytest.mark.parametrize(
+    ("steps", "errors", "argument"),
+    [
+        ([0.1, 0.2], [1.0], "steps"),
+        ([0.1, 0.1, 0.2], [1.0, 1.0, 2.0], "steps"),
+        ([0.1, -0.1, 0.2], [1.0, 1.0, 2.0], "steps"),
+        ([0.1, math.nan, 0.2], [1.0, 1.0, 2.0], "steps"),
+        ([0.4, 0.1, 0.2], [1.0, -1.0, 2.0], "errors"),
+    ],
+)
+def test_bad_input(steps, errors, argument):
+    with pytest.raises(BadInput) as caught:
+        observed_order(steps, errors)
+    assert caught.value.argument == argument
