@@ -7,17 +7,23 @@ trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 
 from . import scenes as scenes
 from .body import RigidBody as RigidBody
+from .collocation import Gauss as Gauss
 from .convected import Convected as Convected
 from .errors import BadInput as BadInput
 from .errors import Diverged as Diverged
 from .errors import IntegrationFailed as IntegrationFailed
 from .errors import MissingEngine as MissingEngine
 from .errors import NotConverged as NotConverged
+from .errors import PotentialFailed as PotentialFailed
 from .errors import Unsupported as Unsupported
+from .function_potential import FunctionPotential as FunctionPotential
+from .gravity_gradient import GravityGradient as GravityGradient
 from .invariants import Invariant as Invariant
 from .method import Grid as Grid
 from .method import Method as Method
 from .method import integrate as integrate
+from .point_potentials import LinearSpring as LinearSpring
+from .point_potentials import PointAttraction as PointAttraction
 from .potential import Potential as Potential
 from .potential import UniformGravity as UniformGravity
 from .reduced import Reduced as Reduced
