@@ -22,6 +22,7 @@ from .invariants import Invariant as Invariant
 from .method import Grid as Grid
 from .method import Method as Method
 from .method import integrate as integrate
+from .moser_veselov import MoserVeselov as MoserVeselov
 from .point_potentials import LinearSpring as LinearSpring
 from .point_potentials import PointAttraction as PointAttraction
 from .potential import Potential as Potential

@@ -1,0 +1,126 @@
+"""Discrete Moser-Veselov steps of a free body: explicit, conserving, and without truncation error if so wished."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from .attitude import Array, to_quaternion
+from .errors import BadInput
+from .method import Grid, Method, Run
+from .principal import principal_start
+from .scene import Scene
+from .trajectory import Counters, Trajectory
+
+ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
+LONGEST = 1.5
+"""|w| dt at the start has to be below this, rad."""
+FARTHEST = 0.2
+"""So has cn of half a step to be above this, which only moments that no mass distribution has (J1 + J2 < J3) can violate."""
+
+
+@dataclass(frozen=True)
+class MoserVeselov(Method):
+    """The discrete Moser-Veselov (DMV) map with a calibrated inertia, for free bodies of any inertia.
+
+    With the Cayley vector c of a step h and the inertia B, where 1/B_i = css/J_i + cdd in principal axes,
+
+        L0 = (2/h) (B c + c x B c) / (1 + |c|^2)
+        L1 = L0 - (4/h) c x B c / (1 + |c|^2)
+        R1 = R0 Cay(2 c)
+
+    conserves energy and world momentum whatever the constants css and cdd are. These are series in h^2 that depend on energy
+    and |L| alone (Hairer & Vilmart 2006, J. Phys. A 39, 13225): order/2 terms of them give an even order, css = 1 and cdd = 0
+    the original map of order 2 (Moser & Veselov 1991), and their sum, order "exact", leaves no truncation error at all.
+    The step is taken in closed form: see `kernels/moser_veselov.py`. Nothing drifts, neither energy nor momentum nor
+    orthonormality: round-off shows in the phase only.
+
+    Parameters
+    ----------
+    order
+        2, 4, 6, 8, 10 or "exact", which the attribute `order` shows as None: accuracy does not depend on the step.
+
+    Raises
+    ------
+    BadInput
+        order is none of these; and on running: the step is too long, see `LONGEST` and `FARTHEST`.
+    """
+
+    order: int | None = None
+
+    family: ClassVar[str] = "moser_veselov"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+
+    def __init__(self, order: int | Literal["exact"] = "exact") -> None:
+        if isinstance(order, bool) or order not in ORDERS:
+            raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
+        object.__setattr__(self, "order", None if order == "exact" else order)
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        return frozenset({"energy", "momentum", "axial momentum"})
+
+    def unsupported(self, scene: Scene) -> str | None:
+        return None if scene.free else "it is for free bodies"
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return tuple(cls(order) for order in ORDERS)
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        from .kernels.moser_veselov import march, polhode
+
+        require_short(scene, grid.dt)
+        start = principal_start(scene)
+        R_PS = polhode_axes(np.array(start.J), np.array(start.L))
+        p = polhode(*(floats(np.array(start.J) @ np.abs(R_PS))), *floats(np.array(start.L) @ R_PS))
+        step = self._step(p, grid.dt)
+        q_axes = floats(to_quaternion(R_PS))
+
+        def run() -> Trajectory:
+            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
+            march(p, step, grid.n_steps, grid.every, start.q, q_axes, q, L)
+            work = Counters(steps=grid.n_steps, stages=grid.n_steps, iterations=0)
+            return start.trajectory(self.label, grid, grid.n_steps, q, L @ R_PS.T, work, None)
+
+        return run
+
+    def _step(self, p: Any, dt: float) -> Any:
+        """Return the constants of one step."""
+        from .kernels.moser_veselov import exact_step, normalised, preprocessed_step
+
+        step = exact_step(p, dt) if self.order is None else preprocessed_step(p, dt, self.order)
+        if not (math.isfinite(step.r0) and step.C > FARTHEST):
+            raise BadInput("dt", f"{dt:g}, for which {self.name} has no step", "a shorter step")
+        return normalised(step)
+
+
+def require_short(scene: Scene, dt: float) -> None:
+    """Raise `BadInput` unless |w| dt is below `LONGEST` at the start."""
+    speed = float(np.linalg.norm(scene.w_WB_B0))
+    if speed * dt >= LONGEST:
+        raise BadInput(
+            "dt", f"{dt:g}, |w| dt = {speed * dt:.3g} rad", f"a step with |w| dt < {LONGEST:g}: below {LONGEST / speed:.6g} s"
+        )
+
+
+def polhode_axes(J: Array, L: Array) -> Array:
+    """Return R_PS (3, 3), axes e1, e2, e3 in principal components: e2 intermediate, e3 the one that L keeps to one side of.
+
+    That is the axis of the largest moment where L^2 > 2 E J2 and of the smallest where it is less; on the separatrix either.
+    """
+    low, middle, high = np.argsort(J, kind="stable")
+    above = L[high] ** 2 * (J[high] - J[middle]) / J[high] - L[low] ** 2 * (J[middle] - J[low]) / J[low]
+    to_high = above > 0 or (above == 0 and J[high] - J[middle] >= J[middle] - J[low])
+    e2, e3 = np.eye(3)[middle], np.eye(3)[high if to_high else low]
+    if L @ e3 < 0:
+        e3 = -e3
+    return np.column_stack([np.cross(e2, e3), e2, e3])
+
+
+def floats(values: Array) -> Any:
+    """Return numbers as the tuple of floats that kernels take."""
+    return tuple(float(value) for value in values)
