@@ -73,9 +73,14 @@ class Axes:
     J: Array
 
     @property
+    def R_WF0(self) -> Array:
+        """Attitude at the start (3, 3), F to world."""
+        return self.scene.R_WB0 @ self.R_BF
+
+    @property
     def q0(self) -> Array:
         """Attitude at the start: unit quaternion (4,) of `R_WF`, scalar first."""
-        return to_quaternion(self.scene.R_WB0 @ self.R_BF)
+        return to_quaternion(self.R_WF0)
 
     @property
     def w0(self) -> Array:
@@ -108,7 +113,7 @@ def principal_axes(scene: Scene) -> Axes:
 
 
 def symmetric_axes(scene: Scene) -> Axes | None:
-    """Return the start in axes whose third is that of a body symmetric about it, in a field symmetric about it; None otherwise."""
+    """Return the start in axes whose third is one of symmetry of body and field; None where there is none."""
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None

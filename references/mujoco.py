@@ -44,9 +44,9 @@ _ROLLOUT_UP_TO = 8
 class MuJoCo(Method):
     """MuJoCo with one of its integrators, in its own loop.
 
-    The loop is `mujoco.rollout` where samples are close and `mj_step(m, d, nstep)` from sample to sample where they are not. The
-    body's principal axes are MuJoCo's body axes; everything the motion does not need is switched off. A free body has a free joint at
-    its centre of mass, as MuJoCo's users have it; a body in a field a ball joint at its fixed point.
+    The loop is `mujoco.rollout` where samples are close and `mj_step(m, d, nstep)` from sample to sample where they are not.
+    The body's principal axes are MuJoCo's body axes; everything the motion does not need is switched off. A free body has a
+    free joint at its centre of mass, as MuJoCo's users have it; a body in a field has a ball joint at its fixed point.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ def _switched_off(mj: Any, *more: str) -> int:
 def _start(mj: Any, model: Any, data: Any, axes: Axes) -> Array:
     """Return MuJoCo's state vector (time, qpos, qvel) at the start.
 
-    qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free joint
-    as for the ball joint (the free joint's translation, ahead of them, is zero).
+    qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
+    joint as for the ball joint (the free joint's translation, ahead of them, is zero).
     """
     mj.mj_resetData(model, data)
     data.qpos[-4:], data.qvel[-3:] = axes.q0, axes.w0

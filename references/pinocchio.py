@@ -25,14 +25,14 @@ Step = Callable[[Array, Array], tuple[Array, Array]]
 class Pinocchio(Method):
     """Pinocchio's `aba` and `integrate`, stepped from Python.
 
-    Pinocchio is a library of algorithms without a time loop, so this loop is Python's, and calling into the library is most of what
-    a step costs. The body hangs on a spherical joint at its fixed point (at the centre of mass for a free body).
+    Pinocchio is a library of algorithms without a time loop, so this loop is Python's, and calling into the library is most of
+    what a step costs. The body hangs on a spherical joint at its fixed point (at the centre of mass for a free body).
 
     Parameters
     ----------
     scheme
-        "Euler": semi-implicit, v += dt aba(q, v), then q = integrate(q, dt v). "RK4": Munthe-Kaas's Runge-Kutta method of order 4
-        on the rotation group (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
+        "Euler": semi-implicit, v += dt aba(q, v), then q = integrate(q, dt v). "RK4": Munthe-Kaas's Runge-Kutta method of
+        order 4 on the rotation group (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
 
     Raises
     ------

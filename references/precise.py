@@ -32,7 +32,7 @@ Reals = NDArray[Any]
 
 @dataclass(frozen=True)
 class Field:
-    """A potential as expressions: how many parameters, their values, and the torque (body axes) from quaternion and parameters."""
+    """A potential as expressions: the values of its parameters, and the torque in body axes from quaternion and parameters."""
 
     values: Callable[[Any], Sequence[Number]]
     torque: Callable[[Sequence[taylor.Expression], Sequence[taylor.Expression]], list[taylor.Expression]]
@@ -48,13 +48,13 @@ FIELDS: dict[type[Potential], Field] = {
 class Precise(Method):
     """Quaternion and body rates by heyoka in multi-precision; dt is only the distance of samples.
 
-    The start is the scene's, taken as exact numbers; samples are rounded to double at the very end. `states` gives them unrounded.
+    The start is the scene's, taken as exact numbers; samples are rounded to double at the end. `states` gives them unrounded.
 
     Parameters
     ----------
     bits
-        Precision, 53 to 4096 bits; the tolerance of a step is 2^-(bits - 1). A motion that amplifies errors e-fold N times costs
-        1.44 N bits of the result.
+        Precision, 53 to 4096 bits; the tolerance of a step is 2^-(bits - 1). A motion that amplifies errors e-fold N times
+        costs 1.44 N bits of the result.
 
     Raises
     ------
@@ -115,7 +115,8 @@ def states(
     Parameters
     ----------
     inertia
-        Moments (3,) or tensor (3, 3), kg m^2, body axes. As all numbers here: a float (taken as exact), an `mpmath.mpf`, or a text.
+        Moments (3,) or tensor (3, 3), kg m^2, body axes. As all numbers here: a float (taken as exact), an `mpmath.mpf`, or
+        a text.
     q0
         Attitude at t = 0, body to world: quaternion (4,), scalar first; normalised here.
     w0
@@ -194,8 +195,8 @@ def _solver(
         quaternion = [_mpf(x) for x in q0]
         norm = mpmath.sqrt(mpmath.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
-        form, parameters = taylor.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
-        parameters = _reals(parameters, bits)
+        form, used = taylor.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
+        parameters = _reals(used, bits)
     integrator = _compiled(form, bits)
 
     def solve(t: Reals) -> tuple[Any, int, Reals]:
@@ -205,6 +206,12 @@ def _solver(
         return outcome, int(steps), found
 
     return solve
+
+
+def _tensor(inertia: Sequence[Any]) -> mpmath.matrix:
+    if np.ndim(inertia) == 1:
+        return mpmath.diag([_mpf(x) for x in inertia])
+    return mpmath.matrix([[_mpf(x) for x in row] for row in inertia])
 
 
 def _mpf(x: Number) -> mpmath.mpf:

@@ -97,7 +97,7 @@ def _counting(solver: Any) -> Any:
         counting.steps += 1
         return solver.step(self)
 
-    counting = type(solver.__name__, (solver,), {"steps": 0, "step": step})
+    counting: Any = type(solver.__name__, (solver,), {"steps": 0, "step": step})
     return counting
 
 
