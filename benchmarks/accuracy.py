@@ -10,7 +10,7 @@ from conservative.scene import Scene
 from conservative.trajectory import OK, Counters, Trajectory
 
 from . import errors, ladder
-from .cases import MISSING, NO_ORDER, SKIPPED, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
+from .cases import NO_ORDER, SKIPPED, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
 from .measurement import Measurement
 from .order import observed_order
 from .selection import Missing
@@ -74,17 +74,17 @@ def convergence(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             if method.order is None:
-                yield from without_order(Case(study.name, scene, method, ladder.samples(scene, method)))
+                yield from without_order(Case(study.name, scene, method, ladder.samples(scene, method)), study.skip_missing)
             else:
                 yield from converging(study, scene, method)
 
 
-def without_order(case: Case) -> list[Measurement]:
+def without_order(case: Case, skip_missing: bool) -> list[Measurement]:
     """Return the rows of a method whose accuracy does not depend on dt, or whose engine is missing."""
+    missing = attempt(case, skip_missing) if isinstance(case.method, Missing) else None
+    failed = missing if isinstance(missing, Failed) else Failed(UNSUPPORTED, "its accuracy does not depend on dt")
     measures = [(name, "1") for _, name in CONVERGENCE]
-    missing = isinstance(case.method, Missing)
-    status, detail = (MISSING, "") if missing else (UNSUPPORTED, "its accuracy does not depend on dt")
-    return [at_no_step(row) for row in case.blanks(measures, status, detail)]
+    return [at_no_step(row) for row in case.blanks(measures, failed.status, failed.detail)]
 
 
 def converging(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:

@@ -1,0 +1,103 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import benchmarks
+
+SUITE = Path(benchmarks.__file__).parent
+OTHER = """
+def test_plain():
+    pass
+
+def test_timed(benchmark):
+    benchmark.extra_info.update(label="mine", error=1.25e-9)
+    benchmark(sum, range(100))
+"""
+
+
+@pytest.fixture
+def other(tmp_path):
+    """Another project, with a benchmark of its own and no settings."""
+    (tmp_path / "checks").mkdir()
+    (tmp_path / "checks" / "test_other.py").write_text(OTHER)
+    (tmp_path / "pytest.ini").write_text("[pytest]\ntestpaths = checks\naddopts = -p no:cacheprovider\n")
+    return tmp_path
+
+
+def run(folder, *options):
+    command = [sys.executable, "-m", "pytest", "--benchmark-max-time=0.001", *map(str, options)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_plugin_is_light():
+    code = "import sys, benchmarks.plugin; sys.exit(any(name in sys.modules for name in ('numpy', 'pandas', 'conservative')))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_the_option_other_projects_see_nothing(other):
+    code, text = run(other)
+    assert code == 0
+    assert "2 passed" in text
+    assert "accuracy beside time" not in text
+
+
+def test_without_the_option_the_suite_is_skipped_and_says_why(other):
+    code, text = run(other, SUITE, "-rs", "-k", "ratios")
+    assert code == 0
+    assert "1 skipped" in text
+    assert "runs with --benchmark" in text
+
+
+def test_alone_it_runs_the_suite(other):
+    code, text = run(other, "--benchmark", "--collect-only", "-q")
+    assert code == 0
+    assert "test_speed.py::test_speed[brick_flip-reduced-dt0.01]" in text
+    assert "test_other" not in text
+
+
+@pytest.mark.parametrize("options", [("--benchmark", "checks"), ("checks", "--benchmark")], ids=["before", "after"])
+def test_with_a_path_it_runs_what_is_there(other, options):
+    code, text = run(other, *options)
+    assert code == 0
+    assert "2 passed" in text
+    assert "test_speed" not in text
+
+
+def test_accuracy_stands_beside_the_times(other):
+    _, text = run(other, "--benchmark", "checks")
+    after = text.split("accuracy beside time")[1].splitlines()
+    assert after[1].split() == ["benchmark", "min,", "s", "median,", "s", "error"]
+    name, *numbers = after[2].split()
+    assert name == "test_timed"
+    assert float(numbers[2]) == 1.25e-9
+
+
+def test_options_of_pytest_benchmark_keep_their_meaning(other):
+    assert "1 passed, 1 skipped" in run(other, "--benchmark-only")[1]
+    assert "1 passed, 1 skipped" in run(other, "--benchmark-skip")[1]
+    code, text = run(other, "--benchmark", "--benchmark-only", "--benchmark-json=found.json", "checks")
+    assert code == 0
+    assert "1 passed, 1 skipped" in text
+    (found,) = json.loads((other / "found.json").read_text())["benchmarks"]
+    assert found["extra_info"] == {"label": "mine", "error": 1.25e-9}
+
+
+def test_without_pytest_benchmark_the_option_says_what_is_missing(other):
+    arguments = [sys.executable, "-m", "pytest", "-p", "no:benchmark", "-k", "plain", "checks"]
+    without = subprocess.run(arguments, cwd=other, capture_output=True, text=True, timeout=120, check=False)
+    assert without.returncode == 0
+    asked = subprocess.run([*arguments, "--benchmark"], cwd=other, capture_output=True, text=True, timeout=120, check=False)
+    assert asked.returncode == pytest.ExitCode.USAGE_ERROR
+    assert "pip install pytest-benchmark" in asked.stderr
+
+
+def test_under_workers_timing_is_off_and_says_so(other):
+    code, text = run(other, "--benchmark", "-n1", "checks")
+    assert code == 0
+    assert "timing is off under -n" in text
+    assert "accuracy beside time" not in text
+    assert "timing is off" not in run(other, "--benchmark", "-n0", "checks")[1]

@@ -1,0 +1,185 @@
+import math
+from dataclasses import dataclass
+from functools import cache
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from benchmarks import errors, ladder, studies
+from benchmarks.cost import SPEED
+from benchmarks.selection import Missing
+from conservative.attitude import rotation_about
+from conservative.method import Grid, grid_for
+from conservative.registry import method
+from references.exact import Exact
+
+TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
+START = rotation_about((-0.2, 0.4, 0.9), 2.2)
+BODY = cv.RigidBody(TURN @ np.diag([1.7, 0.9, 2.3]) @ TURN.T)
+SCENE = cv.Scene("generic", BODY, START, (0.7, -1.3, 2.1), 2.0, dt=0.02)
+ABSENT = Missing("mujoco", "MuJoCo", "mujoco")
+
+
+@dataclass(frozen=True)
+class Broken(cv.Method):
+    """An engine whose runs end as `how` says."""
+
+    how: str
+    family: ClassVar[str] = "broken"
+    room: ClassVar[str] = "engine"
+
+    @property
+    def order(self):
+        return 2
+
+    def unsupported(self, scene):
+        return "it cannot do anything" if self.how == "unsupported" else None
+
+    def prepare(self, scene, grid):
+        if self.how == "raises":
+            raise RuntimeError("planted")
+        start = np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None]
+        return lambda: cv.Trajectory(scene, *start, self.label, failure=cv.Diverged(0.0, "planted"))
+
+
+BROKEN = tuple(Broken(how) for how in ("unsupported", "raises", "diverges"))
+STATUS = {"unsupported": "unsupported", "raises": "engine error", "diverges": "diverged after t = 0 s (planted)"}
+
+
+@cache
+def truth(scene, grid):
+    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+
+
+def rows(name, *methods, quick=True, **settings):
+    study = studies.Study(name, (SCENE,), methods, quick=quick, truth=truth, **settings)
+    return list(studies.rows(study))
+
+
+@cache
+def table(name):
+    """Rows of a study of three orders, by (method, dt, measure)."""
+    found = rows(name, cv.Reduced(), cv.Convected(tol=1e-12), method("scipy:rtol=1e-9"))
+    assert all(row.study == name and row.scene == "generic" for row in found)
+    return {(row.method, row.dt, row.measure): row for row in found}
+
+
+def test_paper_measures_every_method_at_three_steps():
+    found = table("paper")
+    assert {dt for name, dt, _ in found if name == "reduced"} == {0.02, 0.01, 0.005}
+    assert {dt for name, dt, _ in found if name.startswith("scipy")} == {0.02}  # its accuracy does not depend on dt
+    for dt in (0.02, 0.01, 0.005):
+        assert {measure for name, at, measure in found if (name, at) == ("reduced", dt)} > {n for n, _ in errors.names(SCENE)}
+        assert found["reduced", dt, "energy drift max"].value < 1e-14  # measured 8e-16
+        assert found["reduced", dt, "steps"].value == round(2.0 / dt)
+    assert all(row.status == "ok" for row in found.values())
+
+
+def test_paper_says_how_well_the_truths_agree():
+    row = table("paper")["truth", 0.02, "truth agreement"]
+    assert (row.value, row.unit, row.room, row.detail) == (2e-15, "rad", "truth", "exact and other")
+
+
+def test_paper_errors_are_those_of_the_run():
+    grid = grid_for(SCENE, 0.01)
+    run = cv.integrate(SCENE, dt=0.01)
+    direct = {name: value for name, value, _ in errors.measure(run, truth(SCENE, grid).trajectory)}
+    assert table("paper")["reduced", 0.01, "attitude error final"].value == direct["attitude error final"]
+
+
+def test_convergence_finds_the_order_of_each_method():
+    found = {(name, measure): row for (name, dt, measure), row in table("convergence").items() if math.isnan(dt)}
+    for name in ("reduced", "convected:tol=1e-12"):
+        for measure in ("observed order", "observed order rates"):
+            assert abs(found[name, measure].value - 2) < 0.02  # measured 0.001 and 0.004
+            assert found[name, f"{measure} stderr"].value < 0.02  # measured 4e-4 and 2e-3
+            assert "points" in found[name, measure].detail
+    without = found["scipy:rtol=1e-09", "observed order"]
+    assert without.status == "unsupported"
+    assert math.isnan(without.value)
+
+
+def test_speed_has_times_per_step_and_per_second():
+    found = table("speed")
+    for name in {name for name, _, _ in found}:
+        times = {measure: row for (who, _, measure), row in found.items() if who == name}
+        assert set(times) == {measure for measure, _ in SPEED}
+        assert times["time per simulated second"].value > 0
+        assert times["time per step"].value <= times["time per step median"].value
+    row = found["reduced", 0.02, "time per simulated second"]
+    assert row.value == pytest.approx(found["reduced", 0.02, "time per step"].value / 0.02, rel=1e-9)
+    assert "rounds" in row.detail
+
+
+def test_work_precision_pairs_error_and_time():
+    found = table("work_precision")
+    points = {(name, dt) for name, dt, _ in found}
+    assert len({point for point in points if point[0] == "reduced"}) == 4  # every second of eight steps
+    assert len({point for point in points if point[0].startswith("scipy")}) >= 4
+    for point in points:
+        pair = [found[*point, measure] for measure in ("attitude error final", "time per simulated second")]
+        assert all(row.status == "ok" and row.value > 0 for row in pair)
+        assert len({row.detail for row in pair}) == 1
+    assert {row.detail for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
+
+
+@pytest.mark.parametrize("name", studies.NAMES)
+def test_nothing_is_dropped_silently(name):
+    found = rows(name, *BROKEN, ABSENT, skip_missing=True)
+    for broken in BROKEN:
+        mine = [row for row in found if row.method == broken.name]
+        assert mine
+        assert {row.status for row in mine if row.measure in {n for n, _ in errors.names(SCENE)}} <= {STATUS[broken.how]}
+        assert all(math.isnan(row.value) and row.status != "ok" for row in mine)
+    missing = [row for row in found if row.method == "mujoco"]
+    assert missing
+    assert all(row.status == "missing" and math.isnan(row.value) for row in missing)
+
+
+@pytest.mark.parametrize("name", studies.NAMES)
+def test_a_missing_engine_is_an_error_unless_skipped(name):
+    with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
+        rows(name, ABSENT)
+
+
+def test_a_bug_of_our_own_is_not_a_status():
+    class Ours(Broken):
+        room = "ours"
+
+    with pytest.raises(RuntimeError, match="planted"):
+        rows("paper", Ours("raises"))
+
+
+@pytest.mark.parametrize("name", studies.NAMES)
+def test_progress_counts_up_to_the_whole(name):
+    seen = []
+    study = studies.Study(name, (SCENE, SCENE.renamed("again")), (cv.Reduced(),), quick=True, truth=truth)
+    list(studies.rows(study, lambda *call: seen.append(call)))
+    done, total, texts = zip(*seen, strict=True)
+    assert list(done) == sorted(done)
+    assert len(set(total)) == 1
+    assert max(done) < total[0]
+    assert all("generic" in text or "again" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("change", "argument"), [({"name": "sped"}, "name"), ({"scenes": ()}, "scenes"), ({"methods": ()}, "methods")]
+)
+def test_bad_studies(change, argument):
+    good = {"name": "speed", "scenes": (SCENE,), "methods": (cv.Reduced(),)}
+    with pytest.raises(cv.BadInput) as caught:
+        studies.Study(**{**good, **change})
+    assert caught.value.argument == argument
+
+
+@pytest.mark.parametrize("name", ["reduced", "mujoco:Euler", "gauss:stages=4"])
+def test_all_steps_of_a_ladder_have_the_same_samples(name):
+    chosen = method(name)
+    grids = ladder.steps(SCENE, chosen)
+    expected = ladder.samples(SCENE, chosen).t
+    assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
+    assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
+    assert isinstance(grids[0], Grid)
