@@ -104,7 +104,10 @@ def lagrange_top(
 
 @dataclass(frozen=True)
 class Exact(Method):
-    """The closed form of a free body or a Lagrange top at the times of the grid; dt is only the distance of samples."""
+    """The closed form of a free body, a Lagrange top or a compound pendulum; dt is only the distance of samples.
+
+    A pendulum is any body that swings about a principal axis, exactly horizontal, with its centre of mass exactly in the plane.
+    """
 
     family: ClassVar[str] = "exact"
     room: ClassVar[Literal["ours", "engine", "truth"]] = "truth"
@@ -122,16 +125,28 @@ class Exact(Method):
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
     def unsupported(self, scene: Scene) -> str | None:
-        return _reason(scene.body, scene.potential)
+        return _reason(_swinging(scene) or scene.body, scene.potential)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        motion = _motion(Start(scene.body, scene.R_WB0, scene.w_WB_B0), scene.potential)
+        motion = _motion(Start(_swinging(scene) or scene.body, scene.R_WB0, scene.w_WB_B0), scene.potential)
 
         def run() -> Trajectory:
             R_WB, w_WB_B = motion.at(grid.t)
             return Trajectory(scene, grid.t, R_WB, w_WB_B, self.label, Counters(steps=0, evaluations=grid.n_samples))
 
         return run
+
+
+def _swinging(scene: Scene) -> RigidBody | None:
+    """Return the spherical body that moves as a pendulum does: with the moment about its axis all round; None for others."""
+    field, body = scene.potential, scene.body
+    if not isinstance(field, UniformGravity):
+        return None
+    w_P, moment_P, heights = scene.w_WB_B0 @ body.R_BP, field.moment_B @ body.R_BP, scene.R_WB0[2] @ body.R_BP
+    for axis in range(3):
+        if moment_P[axis] == heights[axis] == 0 and not np.any(np.delete(w_P, axis)):
+            return RigidBody(np.full(3, body.moments[axis]))
+    return None
 
 
 def _reason(body: RigidBody, potential: Potential | None) -> str | None:
