@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from conservative.errors import IntegrationFailed, MissingEngine
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.method import Grid, Method, Run
 from conservative.scene import Scene
 from conservative.trajectory import OK, Trajectory
@@ -81,7 +81,7 @@ def label_of(method: Method) -> str:
 def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     """Prepare and run a case once.
 
-    Failures of the integration, scenes that the method cannot do and exceptions out of an engine become a status. Exceptions
+    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become a status. Exceptions
     out of our own methods are bugs and are not caught.
 
     Raises
@@ -98,6 +98,8 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
         if not skip_missing:
             raise
         return Failed(MISSING, str(error))
+    except BadInput as error:  # a step that the method does not have
+        return Failed(UNSUPPORTED, str(error))
     except IntegrationFailed as failure:
         return Failed(failure.status)
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty

@@ -39,14 +39,21 @@ class Broken(cv.Method):
         return "it cannot do anything" if self.how == "unsupported" else None
 
     def prepare(self, scene, grid):
+        if self.how == "refuses":
+            raise cv.BadInput("dt", grid.dt, "a shorter step")
         if self.how == "raises":
             raise RuntimeError("planted")
         start = np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None]
         return lambda: cv.Trajectory(scene, *start, self.label, failure=cv.Diverged(0.0, "planted"))
 
 
-BROKEN = tuple(Broken(how) for how in ("unsupported", "raises", "diverges"))
-STATUS = {"unsupported": "unsupported", "raises": "engine error", "diverges": "diverged after t = 0 s (planted)"}
+BROKEN = tuple(Broken(how) for how in ("unsupported", "refuses", "raises", "diverges"))
+STATUS = {
+    "unsupported": "unsupported",
+    "refuses": "unsupported",
+    "raises": "engine error",
+    "diverges": "diverged after t = 0 s (planted)",
+}
 
 
 @cache
