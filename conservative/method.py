@@ -20,6 +20,9 @@ from .version import VERSION
 
 Run = Callable[[], Trajectory]
 
+DEFAULT_DT = 0.01
+"""Step, s, where nobody names one: the paper's."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -136,11 +139,12 @@ def require_support(method: Method, scene: Scene) -> None:
 
 def integrate(
     scene: Scene,
-    dt: float = 0.01,
+    dt: float | None = None,
     method: Method | None = None,
     t_end: float | None = None,
     sample_every: int = 1,
     *,
+    error: float | None = None,
     on_failure: Literal["raise", "return"] = "raise",
 ) -> Trajectory:
     """Integrate a scene.
@@ -150,13 +154,16 @@ def integrate(
     scene
         What moves.
     dt
-        Step, s. For adaptive methods the distance of samples.
+        Step, s, by default 0.01. For adaptive methods, and with `error`, the distance of samples.
     method
         Default `Reduced()`, the paper's map in three unknowns.
     t_end
         Duration, s; default the scene's. The run ends with the first step at or past it.
     sample_every
         Keep every so many steps (and the first and last state).
+    error
+        Attitude error over the run, rad, instead of a method and a step: both are chosen, `trajectory.choice` says which and what
+        error is estimated (`conservative.chooser`), and `AccuracyNotReached` is warned of where round-off is in the way.
     on_failure
         "raise" or, to get what was reached with a status that says what failed, "return".
 
@@ -171,18 +178,39 @@ def integrate(
     Diverged
         The state stopped being finite, or an engine gave up.
     """
-    if method is None:
-        from .reduced import Reduced
-
-        method = Reduced()
     if not isinstance(scene, Scene):
         raise BadInput("scene", repr(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    if not isinstance(method, Method):
-        raise BadInput("method", repr(method), "a Method, such as conservative.Reduced()")
     choice("on_failure", on_failure, ("raise", "return"))
-    grid = grid_for(scene, dt, t_end, sample_every)
-    require_support(method, scene)
-    trajectory = method.prepare(scene, grid)()
+    if error is not None:
+        trajectory = _integrated_to(scene, error, dt, method, t_end, sample_every)
+    else:
+        method = _default() if method is None else method
+        if not isinstance(method, Method):
+            raise BadInput("method", repr(method), "a Method, such as conservative.Reduced()")
+        grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
+        require_support(method, scene)
+        trajectory = method.prepare(scene, grid)()
     if trajectory.failure is not None and on_failure == "raise":
         raise trajectory.failure
     return trajectory
+
+
+def _default() -> Method:
+    from .reduced import Reduced
+
+    return Reduced()
+
+
+def _integrated_to(
+    scene: Scene, error: float, dt: float | None, method: Method | None, t_end: float | None, sample_every: int
+) -> Trajectory:
+    from .chooser import chosen
+
+    positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput(
+            "method", repr(method), "None together with error, which chooses the method; or a method and dt without error"
+        )
+    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    spacing = None if dt is None else grid_for(scene, dt, end).dt
+    return chosen(scene, error, end, spacing, positive_integer("sample_every", sample_every))

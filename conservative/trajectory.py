@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from . import invariants
 from .attitude import Array
 from .errors import IntegrationFailed
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from .chooser import Choice
 
 OK = "ok"
 
@@ -48,6 +52,8 @@ class Trajectory:
         Work done.
     failure
         What ended the run early, as the exception that `integrate` raises; the samples then end before it. Else None.
+    choice
+        Method, step and estimated error, where `integrate` was asked for an error instead of a method. Else None.
     """
 
     scene: Scene
@@ -57,6 +63,7 @@ class Trajectory:
     label: str
     counters: Counters = field(default=Counters(0))
     failure: IntegrationFailed | None = None
+    choice: Choice | None = None
 
     @property
     def status(self) -> str:
