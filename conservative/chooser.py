@@ -1,9 +1,10 @@
 """From a wanted error to a method and a step: probe, pick, run, and say how good it is.
 
-1. A short probe of each candidate, halving steps until the difference of two step lengths says that the error is small enough.
+1. A short probe of each candidate, cutting steps until the difference of two step lengths says that the error is small enough.
 2. The candidate with the least work for its step is taken: a count, not a time, so that the same scene gets the same choice.
-3. The whole run, once more with twice the step. Their difference, not the probe, is the estimate that is reported: a probe cannot
-   see how much a scene amplifies errors later on. Where it is above what was asked for, the step is cut and the run repeated.
+3. The whole run, once more with twice the step. Their difference, not the probe, is the estimate that is reported: a probe
+   cannot see how much a scene amplifies errors later on. Where it is above what was asked for, the step is cut and the run
+   repeated.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from .trajectory import Trajectory
 SAFETY = 0.5
 """Share of the wanted error that steps are chosen for."""
 MOST_TRUSTED = 30.0
-"""Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink at all."""
+"""Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
 ATTEMPTS = 8
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
@@ -73,7 +74,8 @@ def candidates(scene: Scene) -> tuple[Method, ...]:
 def chosen(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
     """Return the trajectory with the cheapest method and step found for an attitude error, rad; its `choice` says which.
 
-    With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th step.
+    With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th
+    step.
     """
     method, dt = _cheapest(scene, error, t_end)
     attempts: list[tuple[float, float]] = []
@@ -81,7 +83,7 @@ def chosen(scene: Scene, error: float, t_end: float, spacing: float | None, samp
         grid = _grid(dt, t_end, spacing, sample_every)
         estimate, trajectory = _checked_run(method, scene, grid)
         attempts.append((grid.dt, estimate))
-        if trajectory.ok and estimate <= error or _hopeless(attempts):
+        if (trajectory.ok and estimate <= error) or _hopeless(attempts):
             break
         dt = grid.dt * _shrink(estimate, error, method)
     best = Choice(method, grid.dt, error, estimate, tuple(attempts))

@@ -162,8 +162,8 @@ def integrate(
     sample_every
         Keep every so many steps (and the first and last state).
     error
-        Attitude error over the run, rad, instead of a method and a step: both are chosen, `trajectory.choice` says which and what
-        error is estimated (`conservative.chooser`), and `AccuracyNotReached` is warned of where round-off is in the way.
+        Attitude error over the run, rad, instead of a method and a step: both are chosen, `trajectory.choice` says which and
+        what error is estimated (`conservative.chooser`); a warning `AccuracyNotReached` where round-off is in the way.
     on_failure
         "raise" or, to get what was reached with a status that says what failed, "return".
 
@@ -208,9 +208,7 @@ def _integrated_to(
 
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:
-        raise BadInput(
-            "method", repr(method), "None together with error, which chooses the method; or a method and dt without error"
-        )
+        raise BadInput("method", repr(method), "None together with error, which chooses the method")
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     spacing = None if dt is None else grid_for(scene, dt, end).dt
     return chosen(scene, error, end, spacing, positive_integer("sample_every", sample_every))
