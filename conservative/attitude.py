@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
 
 ROTATION_TOLERANCE = 1e-9
 """Largest |R'R - 1| accepted of an attitude that a user hands in."""
@@ -100,3 +101,9 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
 def polished(R: Array) -> Array:
     """Return the rotation next to a matrix (3, 3) that already is one to `ROTATION_TOLERANCE`, orthonormal to round-off."""
     return from_quaternion(to_quaternion(R))
+
+
+def triple(values: Array) -> Triple:
+    """Return three components (3,) as the tuple of floats that kernels take."""
+    x, y, z = values.tolist()
+    return x, y, z

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -57,6 +58,30 @@ class Diverged(IntegrationFailed):
         super().__init__(
             f"dt: got a run that {self.status}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
         )
+
+
+class PotentialFailed(RuntimeError):
+    """A function that a potential was made of raised an exception, which is this one's `__cause__`.
+
+    Kernels raise it without arguments; what was raised in the thread is kept in `pending` for it.
+    """
+
+    pending = threading.local()
+
+    def __init__(self) -> None:
+        self.__cause__ = getattr(self.pending, "cause", None)
+        super().__init__(
+            f"potential: got {self.__cause__!r} from its energy or gradient; "
+            "allowed: functions that give finite numbers for every matrix (3, 3) near a rotation"
+        )
+
+
+class AccuracyNotReached(UserWarning):
+    """The error asked for is below what round-off lets the scene have. Attributes: `error`, `estimate` (rad)."""
+
+    def __init__(self, error: float, estimate: float) -> None:
+        self.error, self.estimate = error, estimate
+        super().__init__(f"error: got {error:g} rad; allowed: what round-off leaves on this scene, an estimated {estimate:.2g} rad")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

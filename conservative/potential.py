@@ -6,7 +6,6 @@ shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -19,7 +18,15 @@ from .check import finite_array, finite_number
 
 @runtime_checkable
 class Potential(Protocol):
-    """What a potential offers. A frozen value; attitudes are (..., 3, 3), energies in J, gradients in J."""
+    """What a potential offers. A frozen value; attitudes are (..., 3, 3), energies in J, gradients in J.
+
+    There are two ways to a potential of one's own. The short one is `FunctionPotential(energy, gradient)`, two plain Python
+    functions, called from the compiled loop and differentiated by differences: some 50 times slower than a compiled field. The
+    fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own, for which numba
+    overloads of `finite_torque`, `body_torque` and `finite_derivative` are given: `conservative/point_potentials.py` and
+    `conservative/kernels/point_fields.py` are an example to follow. Whatever it is, `finite_derivative` must satisfy its
+    identity to round-off, since energy is conserved to no better than that.
+    """
 
     def energy(self, R_WB: Array) -> Array:
         """Return V, (...), in J."""
@@ -32,6 +39,13 @@ class Potential(Protocol):
 
     def scale(self) -> float:
         """Return a size of V in J that is above 0 wherever the potential acts: what energy errors are relative to."""
+
+    @property
+    def axis_W(self) -> Array | None:
+        """Return the unit vector (3,), world axes, about which the field is symmetric; None where there is none.
+
+        The component of the world momentum along it is conserved.
+        """
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the parameters for the compiled kernels in principal axes (see `conservative.kernels.fields`)."""
@@ -87,6 +101,11 @@ class UniformGravity:
         """Return V*, (3, 3): V is linear in the base vectors, so the gradient itself is exact."""
         return self.gradient(R_0)
 
+    @property
+    def axis_W(self) -> Array:
+        """Return the vertical, (3,)."""
+        return np.array([0.0, 0.0, 1.0])
+
     def scale(self) -> float:
         """Return weight times lever arm, J."""
         return float(np.linalg.norm(self.moment_B))
@@ -96,6 +115,3 @@ class UniformGravity:
         from .kernels.fields import Uniform
 
         return Uniform(*(self.moment_B @ R_BP))
-
-
-EnergyFunction = Callable[[Array], Array]

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from .attitude import Array, from_quaternion, to_quaternion
+from .attitude import Triple as Triple
 from .errors import Diverged, IntegrationFailed
 from .method import Grid
 from .scene import Scene
 from .trajectory import Counters, Trajectory, finite_prefix
 
-Triple = tuple[float, float, float]
 Quadruple = tuple[float, float, float, float]
 
 

@@ -1,7 +1,8 @@
 """Fields as the kernels see them: a named tuple of parameters in principal axes, and its torque, compiled per type.
 
 A kernel is compiled once for each type of field; `None` is the free body, for which the torque code is not compiled at all.
-A new field is a named tuple here (or in a module of its own) with overloads of `finite_torque` and `body_torque`.
+A new field is a named tuple in a module of its own with overloads of the three functions below. Newton's method relies on the
+derivatives that they return: it expects quadratic convergence.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 
 from . import kernel
-from .vector import cross, dot, vertical
+from .vector import cross, dot, scaled, vertical
 
 
 class Uniform(NamedTuple):
@@ -53,39 +54,42 @@ def _finite_torque_uniform(field, q, a):
         return None
 
     def torque(field, q, a):
-        # T = (M c) x (-gamma), M = (1 + Cay(2a)) / 2 = 1 + (hat(a) + hat(a)^2) / (1 + a.a), c = weight com
-        c = (field.x, field.y, field.z)
+        # T = (M c) x (-gamma), c = weight com
         g = vertical(q)
-        s = 1.0 / (1.0 + dot(a, a))
-        ac = cross(a, c)
-        aac = cross(a, ac)
-        m = (c[0] + s * (ac[0] + aac[0]), c[1] + s * (ac[1] + aac[1]), c[2] + s * (ac[2] + aac[2]))
-        # d(Mc)/da v = s [v x c + v x (a x c) + a x (v x c)] - 2 s (a.v) (Mc - c)
-        ax = dot(a, c)
-        columns = (
-            _derivative(0, a, c, ac, ax, m, s, g),
-            _derivative(1, a, c, ac, ax, m, s, g),
-            _derivative(2, a, c, ac, ax, m, s, g),
-        )
-        return cross(g, m), columns
+        m, dm = halfway(a, (field.x, field.y, field.z))
+        return cross(g, m), (cross(g, dm[0]), cross(g, dm[1]), cross(g, dm[2]))
 
     return torque
 
 
 @kernel
-def _derivative(k, a, c, ac, ax, m, s, g):
-    """Derivative of gamma x (M c) by a_k."""
-    v = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-    vc = cross(v, c)
-    vac = cross(v, ac)
-    avc = cross(a, vc)
-    f = 2.0 * s * a[k]
-    d = (
-        s * (vc[0] + vac[0] + avc[0]) - f * (m[0] - c[0]),
-        s * (vc[1] + vac[1] + avc[1]) - f * (m[1] - c[1]),
-        s * (vc[2] + vac[2] + avc[2]) - f * (m[2] - c[2]),
-    )
-    return cross(g, d)
+def halfway(a, c):
+    """Return M c, M = (1 + Cay(2a))/2, and its derivative by a (three columns): c on average over a step, in axes of its start.
+
+    M = 1 + (hat(a) + hat(a)^2) / (1 + a.a), and M' is M at -a.
+    """
+    s = 1.0 / (1.0 + dot(a, a))
+    ac = cross(a, c)
+    aac = cross(a, ac)
+    m = (c[0] + s * (ac[0] + aac[0]), c[1] + s * (ac[1] + aac[1]), c[2] + s * (ac[2] + aac[2]))
+    # d(M c)/da_k = s (e_k x c + (a.c) e_k + c_k a - 2 a_k M c)
+    f = dot(a, c)
+    t = scaled(2.0, m)
+    d0 = (s * (f + c[0] * a[0] - a[0] * t[0]), s * (c[0] * a[1] - c[2] - a[0] * t[1]), s * (c[0] * a[2] + c[1] - a[0] * t[2]))
+    d1 = (s * (c[1] * a[0] + c[2] - a[1] * t[0]), s * (f + c[1] * a[1] - a[1] * t[1]), s * (c[1] * a[2] - c[0] - a[1] * t[2]))
+    d2 = (s * (c[2] * a[0] - c[1] - a[2] * t[0]), s * (c[2] * a[1] + c[0] - a[2] * t[1]), s * (f + c[2] * a[2] - a[2] * t[2]))
+    return m, (d0, d1, d2)
+
+
+@kernel
+def in_body(q, v):
+    """A world vector v in the axes that the quaternion q, of any length, turns into world axes."""
+    n = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    u = (-q[1], -q[2], -q[3])
+    t = cross(u, v)
+    ut = cross(u, t)
+    f = 2.0 * n
+    return (v[0] + f * (q[0] * t[0] + ut[0]), v[1] + f * (q[0] * t[1] + ut[1]), v[2] + f * (q[0] * t[2] + ut[2]))
 
 
 @overload(body_torque)

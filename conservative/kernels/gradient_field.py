@@ -1,0 +1,89 @@
+"""The gradient of a far centre's gravity: V = rate^2/2 u' I u with u = R' e, quadratic in the base vectors.
+
+V* is therefore the gradient at their mean, with the columns rate^2 (I ubar)_j e, and the torque is rate^2 e x (Rbar I ubar).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+
+from . import kernel
+from .fields import body_torque, finite_derivative, finite_torque, halfway, in_body, is_field
+from .vector import add, cross, dot, scaled
+
+Triple = tuple[float, float, float]
+
+
+class Gradient(NamedTuple):
+    """Rows of rate^2 I, J, in the axes of the kernel; e, the direction of the centre, in world axes."""
+
+    first: Triple
+    second: Triple
+    third: Triple
+    e: Triple
+
+
+@kernel
+def _times(field, u):
+    return (dot(field.first, u), dot(field.second, u), dot(field.third, u))
+
+
+@overload(finite_torque)
+def _finite_torque_gradient(field, q, a):
+    if not is_field(field, Gradient):
+        return None
+
+    def torque(field, q, a):
+        e = in_body(q, field.e)
+        u, du = halfway(scaled(-1.0, a), e)
+        m, dm = halfway(a, _times(field, u))
+        return cross(e, m), (
+            _column(field, a, e, dm[0], du[0]),
+            _column(field, a, e, dm[1], du[1]),
+            _column(field, a, e, dm[2], du[2]),
+        )
+
+    return torque
+
+
+@kernel
+def _column(field, a, e, dm, du):
+    """Derivative of e x (M I u): M changes the product by dm, u changes by -du since it is taken at -a."""
+    return cross(e, add(dm, halfway(a, _times(field, scaled(-1.0, du)))[0]))
+
+
+@overload(body_torque)
+def _body_torque_gradient(field, q):
+    if not is_field(field, Gradient):
+        return None
+
+    def torque(field, q):
+        e = in_body(q, field.e)
+        return cross(e, _times(field, e))
+
+    return torque
+
+
+@overload(finite_derivative)
+def _finite_derivative_gradient(field, q0, q1):
+    if not is_field(field, Gradient):
+        return None
+
+    def derivative(field, q0, q1):
+        e = np.array(field.e)
+        mean = 0.5 * (q0 + q1)
+        u = (np.sum(mean[0:3] * e), np.sum(mean[3:6] * e), np.sum(mean[6:9] * e))
+        Iu = _times(field, u)
+        rows = (field.first, field.second, field.third)
+        V_star, dV_star = np.empty(9), np.empty((9, 9))
+        ee = 0.5 * np.outer(e, e)
+        for j in range(3):
+            V_star[3 * j : 3 * j + 3] = Iu[j] * e
+            for k in range(3):
+                dV_star[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] = rows[j][k] * ee
+        return V_star, dV_star
+
+    return derivative
