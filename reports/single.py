@@ -12,6 +12,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from benchmarks.errors import relative_drift
 from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.invariants import Invariant
@@ -76,9 +77,8 @@ def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, A
 
 def _drift(trajectory: Trajectory, invariant: Invariant) -> float:
     """Return the largest change of an invariant, relative to its scale."""
-    values = invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B)
-    change = np.abs(values - values[:1]) if values.ndim == 1 else np.linalg.norm(values - values[:1], axis=1)
-    return float(change.max(initial=0.0)) / invariant.scale
+    change = relative_drift(trajectory, invariant).reshape(len(trajectory), -1)
+    return float(np.linalg.norm(change, axis=1).max(initial=0.0))
 
 
 def _last(trajectory: Trajectory) -> dict[str, Any] | None:
