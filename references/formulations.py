@@ -69,7 +69,8 @@ def lean(scene: Scene) -> Formulation:
     """Return the form with the fewest products that does the scene."""
     axes = symmetric_axes(scene)
     if axes is None:
-        return _free_rates_and_angle(scene) if scene.free else body(scene)
+        # A body at rest has no momentum to turn about.
+        return _free_rates_and_angle(scene) if scene.free and scene.kinetic_energy0 > 0 else body(scene)
     lowest, highest = _heights(axes)
     if scene.free or max(1 + lowest, 1 - highest) < _SMALLEST_POLE_DISTANCE:
         return non_spinning(scene)

@@ -83,7 +83,9 @@ class Heyoka(Method):
         def run() -> Trajectory:
             # The integrator is shared by all scenes of its form, and holds what the last run left.
             integrator.time = 0.0
-            integrator.state[:], integrator.pars[:] = problem.start, problem.parameters
+            integrator.state[:] = problem.start
+            # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
+            integrator.pars[:] = problem.parameters[: len(integrator.pars)]
             states, steps, outcome = propagate(integrator, grid.t)
             R_WF, w = problem.readout(grid.t[: len(states)], states)
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), f"heyoka: {outcome.name}")

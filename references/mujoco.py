@@ -114,7 +114,9 @@ def _model(mj: Any, axes: Axes, dt: float, integrator: str, free_joint: bool) ->
     spec.option.gravity = (0, 0, -mass.gravity)
     spec.option.disableflags = _switched_off(mj, "GRAVITY" if mass.gravity == 0 else "")
     body = spec.worldbody.add_body(name="body", explicitinertial=True, mass=mass.mass, ipos=mass.com)
-    body.inertia = mass.body.moments
+    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
+    moments = mass.body.moments
+    body.inertia = np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
     body.iquat = to_quaternion(mass.body.R_BP)  # MuJoCo: scalar first
     body.add_joint(type=mj.mjtJoint.mjJNT_FREE if free_joint else mj.mjtJoint.mjJNT_BALL)
     return spec.compile()

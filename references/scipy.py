@@ -77,6 +77,8 @@ class SciPy(Method):
 
         def run() -> Trajectory:
             solver.steps = 0
+            if not np.isfinite(derivative(0.0, start)).all():  # SciPy would look for a first step for ever
+                return axes.trajectory(grid, self.label, from_quaternion(start[None, :4]), start[None, 4:], Counters(0))
             with np.errstate(all="ignore"):  # a diverging run is reported by its status
                 found = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
             q, w = found.y[:4].T, found.y[4:].T

@@ -90,7 +90,7 @@ def free_rates_and_angle(parameters: Sequence[Expression]) -> Equations:
     J3)/J1 and its kin (3), l/J3, c.
     """
     hy = heyoka()
-    w, (p,) = hy.make_vars("w1", "w2", "w3"), hy.make_vars("p", "p_")[:1]
+    w, p = hy.make_vars("w1", "w2", "w3"), hy.expression("p")
     gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
     return [*zip(w, gyroscopic, strict=True), (p, parameters[4] / (parameters[3] + w[2]))]
 
@@ -102,7 +102,7 @@ def axis_and_angle(parameters: Sequence[Expression]) -> Equations:
     constant; n must stay away from -e_z. Parameters: moment of the weight over J1, u3, u.n + u3.
     """
     hy = heyoka()
-    n, u, (p,) = hy.make_vars("n1", "n2", "n3"), hy.make_vars("u1", "u2"), hy.make_vars("p", "p_")[:1]
+    n, u, p = hy.make_vars("n1", "n2", "n3"), hy.make_vars("u1", "u2"), hy.expression("p")
     k, u3, numerator = parameters
     return [*zip(n, cross([*u, u3], n), strict=True), (u[0], -k * n[1]), (u[1], k * n[0]), (p, numerator / (1.0 + n[2]))]
 
