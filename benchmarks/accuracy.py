@@ -73,17 +73,16 @@ def convergence(study: Study, progress: Progress) -> Iterator[Measurement]:
     for i, scene in enumerate(study.scenes):
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
-            if method.order is None:
-                yield from without_order(Case(study.name, scene, method, ladder.samples(scene, method)), study.skip_missing)
-            else:
-                yield from converging(study, scene, method)
+            nothing = no_order(Case(study.name, scene, method, ladder.samples(scene, method)), study.skip_missing)
+            yield from nothing or converging(study, scene, method)
 
 
-def without_order(case: Case, skip_missing: bool) -> list[Measurement]:
-    """Return the rows of a method whose accuracy does not depend on dt, or whose engine is missing."""
+def no_order(case: Case, skip_missing: bool) -> list[Measurement]:
+    """Return the rows of a method that has no order on a scene and says why; none of one that may have."""
+    reason = case.method.unsupported(case.scene) or ("its accuracy does not depend on dt" if case.method.order is None else "")
     missing = attempt(case, skip_missing) if isinstance(case.method, Missing) else None
-    failed = missing if isinstance(missing, Failed) else Failed(UNSUPPORTED, "its accuracy does not depend on dt")
-    measures = [(name, "1") for _, name in CONVERGENCE]
+    failed = missing if isinstance(missing, Failed) else Failed(UNSUPPORTED, reason)
+    measures = [(name, "1") for _, name in CONVERGENCE] if failed.detail else []
     return [at_no_step(row) for row in case.blanks(measures, failed.status, failed.detail)]
 
 

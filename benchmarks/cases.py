@@ -81,8 +81,8 @@ def label_of(method: Method) -> str:
 def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     """Prepare and run a case once.
 
-    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become a status. Exceptions
-    out of our own methods are bugs and are not caught.
+    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become a status.
+    Exceptions out of our own methods are bugs and are not caught.
 
     Raises
     ------

@@ -131,6 +131,8 @@ def series_of(study: Study) -> list[Method]:
 def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     """Return the cases of one line, cheap to dear: steps, or tolerances of an adaptive method."""
     setting = tolerance_setting(method)
+    if method.unsupported(scene):
+        return [Case(study.name, scene, method, ladder.samples(scene, method))]  # its one row says so
     if method.order is not None:
         longest = ladder.LENGTH if method.order == 1 else None  # what comes after is dear and still far off
         grids = ladder.steps(scene, method)[:longest][:: 2 if study.quick else 1]

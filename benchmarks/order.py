@@ -20,8 +20,8 @@ ABOVE_FLOOR = 10.0
 """How far above the floor a point must be, so that the floor changes it by less than a tenth."""
 BEND = 0.05
 """Relative difference between the slopes of the coarsest pair and of the rest above which the coarsest point is left out."""
-SCATTER = 1.5
-"""Standard deviations by which those slopes may differ because the points scatter."""
+CALMER = 1.1
+"""Part by which the scatter about the fit must shrink when that point is left out: noise does not shrink, a bend does."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
        are left out. Should the data end in the bend, so that the last pair's slope is less than half that of the rest, its
        finer point goes too, once.
     3. The coarsest point is left out as long as the slope of its pair differs from the fit to the others by more than `BEND`,
-       and by more than the scatter of the others about their fit explains (`SCATTER`), and four points or more are there.
+       the scatter about the fit is less without it by more than `CALMER`, and four points or more are there.
 
     Points whose error is not finite, runs that failed, are passed over; errors of zero are at the floor.
 
@@ -132,9 +132,9 @@ def _without_bend(x: Array, y: Array, used: list[int]) -> list[int]:
 
 def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
     while len(used) > MIN_POINTS:
-        rest, _, scatter = _fit(x[used[1:]], y[used[1:]])
-        by_chance = SCATTER * math.sqrt(2) * scatter / float(x[used[0]] - x[used[1]])
-        if abs(_pair(x, y, used[:2]) - rest) <= max(BEND * abs(rest), by_chance):
+        _, _, scatter = _fit(x[used], y[used])
+        rest, _, rest_scatter = _fit(x[used[1:]], y[used[1:]])
+        if abs(_pair(x, y, used[:2]) - rest) <= BEND * abs(rest) or scatter <= CALMER * rest_scatter:
             break
         used = used[1:]
     return used

@@ -70,12 +70,12 @@ class Study:
     @property
     def rounds(self) -> int:
         """Rounds of interleaved timing."""
-        return 5 if self.quick else 9
+        return 4 if self.quick else 9
 
     @property
     def timing_budget(self) -> float:
         """Time, s, for all rounds of one run; slow ones get fewer rounds."""
-        return 0.2 if self.quick else 1.0
+        return 0.1 if self.quick else 1.0
 
     @property
     def longest_run(self) -> float:
