@@ -6,6 +6,9 @@
     [project.entry-points."conservative.scenes"]
     my_scene = "my_package.my_scenes:my_scene"          # a function whose parameters all have defaults, returning a Scene
 
+    [project.entry-points."conservative.body_files"]
+    my_format = "my_package.my_file:body_from_my_format"    # a function of a path and a name, returning a MassDistribution
+
 A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`.
 """
 
@@ -15,18 +18,22 @@ import inspect
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .errors import BadInput, nearest
 from .method import Method
 from .scene import Scene
 
-METHODS, SCENES = "conservative.methods", "conservative.scenes"
+if TYPE_CHECKING:
+    from .shapes import MassDistribution
+
+METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
 
 
 @cache
 def registered(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of `METHODS` or `SCENES` by name, in order of their names; nothing is imported."""
+    """Return the entry points of a group such as `SCENES` by name, in order of their names; nothing is imported."""
     return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
 
 
@@ -38,13 +45,17 @@ def _load(group: str, argument: str, name: str) -> Any:
 
 
 def scene(text: str) -> Scene:
-    """Return a scene from its name with parameters, such as `brick_flip` or `brick_flip:disturbance=1e-6`.
+    """Return a scene from its name with parameters, such as `brick_flip:disturbance=1e-6`, or from a file, `my_body.toml`.
 
     Raises
     ------
     BadInput
-        The name or a parameter is unknown, or a value cannot be used.
+        The name or a parameter is unknown, a value cannot be used, or the file (see `conservative.scene_file`) cannot.
     """
+    if text.endswith(".toml"):
+        from .scene_file import load
+
+        return load(text)
     name, settings = _split(text)
     builder: Callable[..., Scene] = _load(SCENES, "scene", name)
     return builder(**_arguments(f"scene {name}", builder, settings))
@@ -63,6 +74,18 @@ def method(text: str) -> Method:
     name, settings = _split(text)
     family: type[Method] = _load(METHODS, "method", name)
     return family(**_arguments(f"method {name}", family, settings))
+
+
+def body_file(kind: str) -> Callable[[Path, str], MassDistribution]:
+    """Return the function that reads a named body out of a file of a kind such as `mjcf` or `urdf`.
+
+    Raises
+    ------
+    BadInput
+        The kind is unknown.
+    """
+    loader: Callable[[Path, str], MassDistribution] = _load(BODY_FILES, "kind of file", kind)
+    return loader
 
 
 def _split(text: str) -> tuple[str, list[str]]:
