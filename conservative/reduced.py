@@ -38,7 +38,7 @@ class Reduced(Method):
         tol is not a number above 0.
     """
 
-    tol: float = 1e-16
+    tol: float = 1e-20
 
     family: ClassVar[str] = "reduced"
     room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"

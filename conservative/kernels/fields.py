@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from . import kernel
+from . import SMALL, small
 from .vector import cross, dot, scaled, vertical
 
 
@@ -48,7 +48,7 @@ def is_field(type_, field) -> bool:
     return getattr(type_, "instance_class", None) is field
 
 
-@overload(finite_torque)
+@overload(finite_torque, jit_options=SMALL)
 def _finite_torque_uniform(field, q, a):
     if not is_field(field, Uniform):
         return None
@@ -62,7 +62,7 @@ def _finite_torque_uniform(field, q, a):
     return torque
 
 
-@kernel
+@small
 def halfway(a, c):
     """Return M c, M = (1 + Cay(2a))/2, and its derivative by a (three columns): c on average over a step, in axes of its start.
 
@@ -81,7 +81,7 @@ def halfway(a, c):
     return m, (d0, d1, d2)
 
 
-@kernel
+@small
 def in_body(q, v):
     """A world vector v in the axes that the quaternion q, of any length, turns into world axes."""
     n = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -92,7 +92,7 @@ def in_body(q, v):
     return (v[0] + f * (q[0] * t[0] + ut[0]), v[1] + f * (q[0] * t[1] + ut[1]), v[2] + f * (q[0] * t[2] + ut[2]))
 
 
-@overload(body_torque)
+@overload(body_torque, jit_options=SMALL)
 def _body_torque_uniform(field, q):
     if not is_field(field, Uniform):
         return None

@@ -5,6 +5,9 @@ Unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal ax
     J a + a x (J a) = (h/2) (L0 + (h/2) (T - a x T))          T = Q0' tau*
     q1 = q0 (1, a) / sqrt(1 + a.a)
     L1 = Cay(2a)' (L0 + h T)
+
+Arithmetic is a chain of dependent operations here, so what counts is the length of that chain and not the number of operations:
+the first guess and its tangent need no L, so that a processor works on them while it still waits for the last step's L.
 """
 
 from __future__ import annotations
@@ -13,70 +16,87 @@ import math
 
 import numpy as np
 
-from . import kernel
+from . import kernel, small
 from .fields import body_torque, finite_torque
-from .vector import accumulate, add, cross, dot, product, scaled, solve, subtract, times
+from .vector import accumulate, add, applied, cross, dot, inverse, product, scaled, subtract, times
 
 MAX_ITERATIONS = 30
+SMOOTH = 0.04
+"""Square of the relative change of a from step to step up to which a is extrapolated."""
 
 
-@kernel
-def initial_guess(h, J_inverse, field, q, L):
-    """a of an explicit half step of Euler's equations: third order in h, so that Newton mostly needs two corrections."""
+@small
+def explicit_guess(h, J_inverse, field, q, L):
+    """a of an explicit half step of Euler's equations: third order in h."""
     rate = cross(L, times(J_inverse, L))
     if field is not None:
         rate = add(rate, body_torque(field, q))
     return scaled(0.5 * h, times(J_inverse, add(L, scaled(0.5 * h, rate))))
 
 
-@kernel
-def residual_and_tangent(h, J, field, q, L, a):
-    """Return (residual, columns of its derivative by a, T)."""
+@small
+def extrapolated(k, past):
+    """Component k of the next a by the polynomial of degree 5 through the last six, newest first."""
+    a, b, c, d, e, f = past
+    # The newest comes last: all else is summed while it is being solved for.
+    return ((20.0 * c[k] - 15.0 * (b[k] + d[k])) + (6.0 * e[k] - f[k])) + 6.0 * a[k]
+
+
+@small
+def residual(h, J, field, q, L, a):
+    """Left minus right side of the equation for a."""
     Ja = times(J, a)
     lhs = add(Ja, cross(a, Ja))
+    half = 0.5 * h
+    if field is None:
+        return subtract(lhs, scaled(half, L))
+    T = finite_torque(field, q, a)[0]
+    return subtract(lhs, scaled(half, add(L, scaled(half, subtract(T, cross(a, T))))))
+
+
+@small
+def inverse_tangent(h, J, field, q, a):
+    """Rows of the inverse of the residual's derivative by a."""
+    Ja = times(J, a)
     k0 = (J[0], a[2] * J[0] - Ja[2], Ja[1] - a[1] * J[0])
     k1 = (Ja[2] - a[2] * J[1], J[1], a[0] * J[1] - Ja[0])
     k2 = (a[1] * J[2] - Ja[1], Ja[0] - a[0] * J[2], J[2])
-    half = 0.5 * h
     if field is None:
-        return subtract(lhs, scaled(half, L)), (k0, k1, k2), (0.0, 0.0, 0.0)
+        return inverse((k0, k1, k2))
     T, dT = finite_torque(field, q, a)
-    rhs = add(L, scaled(half, subtract(T, cross(a, T))))
-    f = half * half
+    f = 0.25 * h * h
     k0 = subtract(k0, scaled(f, subtract(subtract(dT[0], (0.0, -T[2], T[1])), cross(a, dT[0]))))
     k1 = subtract(k1, scaled(f, subtract(subtract(dT[1], (T[2], 0.0, -T[0])), cross(a, dT[1]))))
     k2 = subtract(k2, scaled(f, subtract(subtract(dT[2], (-T[1], T[0], 0.0)), cross(a, dT[2]))))
-    return subtract(lhs, scaled(half, rhs)), (k0, k1, k2), T
+    return inverse((k0, k1, k2))
 
 
-@kernel
-def solved(h, J, J_inverse, field, q, L, tolerance):
-    """Return (a, T, corrections made, size of the last relative to a, or -1 times it where Newton gave up).
+@small
+def solved(h, J, field, q, L, a, tolerance):
+    """Return (a, corrections made, size of the last relative to a, or -1 times it where Newton gave up), from a first guess a.
 
-    Newton converges quadratically, so a correction of relative size s leaves an error of s^2: the loop ends AFTER the
-    correction with s^2 <= tolerance. Testing before it would bias the energy (method, section 9).
+    A Newton correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER
+    that one, if s^3 <= tolerance. Stopping where a residual is small enough instead would bias the energy (method, section 9).
     """
-    a = initial_guess(h, J_inverse, field, q, L)
+    bound = tolerance * tolerance
     size = math.inf
     for iteration in range(1, MAX_ITERATIONS + 1):
-        residual, tangent, T = residual_and_tangent(h, J, field, q, L, a)
-        correction = solve(tangent, residual)
+        rows = inverse_tangent(h, J, field, q, a)
+        correction = applied(rows, residual(h, J, field, q, L, a))
         a = subtract(a, correction)
         square = dot(correction, correction)
         scale = dot(a, a)
-        if square <= tolerance * scale:
-            if field is not None:
-                T = finite_torque(field, q, a)[0]
-            return a, T, iteration, math.sqrt(square)
+        if square * square * square <= bound * (scale * scale * scale):
+            return subtract(a, applied(rows, residual(h, J, field, q, L, a))), iteration + 1, math.sqrt(square)
         size = math.sqrt(square / scale)
-    return a, (0.0, 0.0, 0.0), MAX_ITERATIONS, -size
+    return a, MAX_ITERATIONS, -size
 
 
 @kernel
 def march(h_stages, n_steps, every, J, J_inverse, field, tolerance, q0, L0, q_out, L_out):
     """Take n_steps steps, each of the stages h_stages (s), and store every `every`-th state and the last.
 
-    Attitude and momentum are summed with compensation. Returns (steps done, Newton corrections, relative size of the last
+    Attitude and momentum are summed with compensation. Returns (steps done, corrections made, relative size of the last
     correction); steps done < n_steps means that the next one did not converge.
     """
     q, q_carry = q0, (0.0, 0.0, 0.0, 0.0)
@@ -84,44 +104,61 @@ def march(h_stages, n_steps, every, J, J_inverse, field, tolerance, q0, L0, q_ou
     q_out[0, :] = q
     L_out[0, :] = L
     row, corrections, size = 0, 0, 0.0
+    until_sample = every
+    # One stage a step: the last six solutions are equally spaced in time, and their extrapolation beats the explicit guess.
+    unknown = (math.nan, math.nan, math.nan)
+    past = (unknown, unknown, unknown, unknown, unknown, unknown)
+    known = 0
     for step in range(1, n_steps + 1):
         for h in h_stages:
-            a, T, iterations, size = solved(h, J, J_inverse, field, q, L, tolerance)
+            if known >= 6:
+                a = (extrapolated(0, past), extrapolated(1, past), extrapolated(2, past))
+            else:
+                a = explicit_guess(h, J_inverse, field, q, L)
+            a, iterations, size = solved(h, J, field, q, L, a, tolerance)
             corrections += iterations
             if not size >= 0.0:
                 return step - 1, corrections, -size
-            L, L_carry = turned_momentum(h, field, a, T, L, L_carry)
+            if len(h_stages) == 1:
+                change = subtract(a, past[0])
+                known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
+                past = (a, past[0], past[1], past[2], past[3], past[4])
+            L, L_carry = turned_momentum(h, J, field, q, a, L, L_carry)
             q, q_carry = turned_attitude(a, q, q_carry)
-        if step % every == 0 or step == n_steps:
+        until_sample -= 1
+        if until_sample == 0 or step == n_steps:
+            until_sample = every
             row += 1
             q_out[row, :] = q
             L_out[row, :] = L
     return n_steps, corrections, size
 
 
-@kernel
-def turned_momentum(h, field, a, T, L, carry):
-    """L1 = Cay(2a)' (L0 + h T) as a compensated increment."""
-    v = L if field is None else add(L, scaled(h, T))
-    av = cross(a, v)
-    s = 2.0 / (1.0 + dot(a, a))
-    d = scaled(s, subtract(cross(a, av), av))
-    if field is not None:
-        d = add(d, scaled(h, T))
+@small
+def turned_momentum(h, J, field, q, a, L, carry):
+    """L1 as a compensated increment: -(4/h) a x (J a) of a free body, whose L0 + L1 = (4/h) J a; else Cay(2a)' (L0 + h T)."""
+    if field is None:
+        d = scaled(4.0 / h, cross(times(J, a), a))
+    else:
+        T = finite_torque(field, q, a)[0]
+        hT = scaled(h, T)
+        v = add(L, hT)
+        av = cross(a, v)
+        d = add(scaled(2.0 / (1.0 + dot(a, a)), subtract(cross(a, av), av)), hT)
     x, cx = accumulate(L[0], carry[0], d[0])
     y, cy = accumulate(L[1], carry[1], d[1])
     z, cz = accumulate(L[2], carry[2], d[2])
     return (x, y, z), (cx, cy, cz)
 
 
-@kernel
+@small
 def turned_attitude(a, q, carry):
     """q1 = q0 (1, a) / sqrt(1 + a.a) as a compensated increment."""
     square = dot(a, a)
     root = math.sqrt(1.0 + square)
-    s = 1.0 / root
-    less = -square / (root * (1.0 + root))
-    d = product(q, (less, s * a[0], s * a[1], s * a[2]))
+    over = 1.0 / (root * (1.0 + root))
+    s = (1.0 + root) * over
+    d = product(q, (-square * over, s * a[0], s * a[1], s * a[2]))
     w, cw = accumulate(q[0], carry[0], d[0])
     x, cx = accumulate(q[1], carry[1], d[1])
     y, cy = accumulate(q[2], carry[2], d[2])

@@ -2,46 +2,46 @@
 
 from __future__ import annotations
 
-from . import kernel
+from . import small
 
 
-@kernel
+@small
 def dot(a, b):
     """a . b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@small
 def cross(a, b):
     """a x b"""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@kernel
+@small
 def add(a, b):
     """a + b"""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@kernel
+@small
 def subtract(a, b):
     """a - b"""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@kernel
+@small
 def scaled(s, a):
     """s a"""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@kernel
+@small
 def times(a, b):
     """Component by component: a diagonal matrix times a vector."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
-@kernel
+@small
 def product(q, p):
     """Quaternion product, scalar first."""
     return (
@@ -52,7 +52,7 @@ def product(q, p):
     )
 
 
-@kernel
+@small
 def vertical(q):
     """World e_z in the axes that the quaternion q turns into world axes: the last row of its matrix, over |q|^2."""
     n = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -63,16 +63,22 @@ def vertical(q):
     )
 
 
-@kernel
-def solve(columns, b):
-    """x with c0 x0 + c1 x1 + c2 x2 = b, by Cramer's rule: no branch, so it stays in registers."""
+@small
+def inverse(columns):
+    """Rows of the inverse of the matrix with these columns, by Cramer's rule: one division, no branch, all in registers."""
     c0, c1, c2 = columns
     c12 = cross(c1, c2)
-    inverse = 1.0 / dot(c0, c12)
-    return (inverse * dot(b, c12), inverse * dot(b, cross(c2, c0)), inverse * dot(b, cross(c0, c1)))
+    over = 1.0 / dot(c0, c12)
+    return scaled(over, c12), scaled(over, cross(c2, c0)), scaled(over, cross(c0, c1))
 
 
-@kernel
+@small
+def applied(rows, b):
+    """The matrix with these rows times b."""
+    return (dot(rows[0], b), dot(rows[1], b), dot(rows[2], b))
+
+
+@small
 def accumulate(total, carry, increment):
     """Compensated (Kahan) sum: the new total and what it lost, to be handed back with the next increment."""
     wanted = increment - carry
