@@ -28,7 +28,9 @@ SAFETY = 0.5
 """Share of the wanted error that steps are chosen for."""
 MOST_TRUSTED = 30.0
 """Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
-ATTEMPTS = 8
+ASYMPTOTIC = 0.2
+"""Difference of two runs, rad, from which on it says nothing about the error of either: angles end at pi."""
+ATTEMPTS = 12
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
 
@@ -116,8 +118,9 @@ def _checked_run(method: Method, scene: Scene, grid: Grid) -> tuple[float, Traje
         return math.inf, fine
     stride = 2 if odd else 1
     shared = fine.R_WB[::stride] if (len(fine) - 1) % stride == 0 else np.concatenate([fine.R_WB[::stride], fine.R_WB[-1:]])
-    truncation = float(angle_between(shared, coarse.R_WB).max()) / _trusted(method)
-    return truncation + _rounding(fine), fine
+    difference = float(angle_between(shared, coarse.R_WB).max())
+    estimate = difference / _trusted(method) + _rounding(fine)
+    return (estimate if difference < ASYMPTOTIC else math.inf), fine
 
 
 def _rounding(trajectory: Trajectory) -> float:

@@ -1,0 +1,98 @@
+"""The chooser's honesty: what it promises against what an independent truth says, over random bodies and starts."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, from_quaternion
+from conservative.errors import AccuracyNotReached
+from references.exact import Exact
+from references.precise import Precise
+
+SCENES = 200
+KINDS = ("free", "top", "free", "top", "free", "top", "heavy body", "heavy body, tilted axes")
+"""Three in four have a closed form, which is quick; the others wait for multi-precision."""
+
+
+def random_rotation(rng):
+    q = rng.normal(size=4)
+    return from_quaternion(q / np.linalg.norm(q))
+
+
+def random_scene(rng, kind):
+    """A physical body in turned axes with a generic start; rates 1 to 40 rad/s, durations 0.5 to 5 s."""
+    halves = rng.uniform(0.2, 1, 3)
+    moments = (halves.sum() - halves) * rng.uniform(0.1, 3)
+    R_BP = random_rotation(rng) if kind != "heavy body" else np.eye(3)
+    potential = None
+    if kind == "top":
+        moments[1] = moments[0]
+    if kind != "free":
+        com = rng.normal(size=3) * 0.3 * ([0, 0, 1] if kind == "top" else [1, 1, 1])
+        potential = cv.UniformGravity(rng.uniform(1, 10), R_BP @ com)
+    body = cv.RigidBody(R_BP @ np.diag(moments) @ R_BP.T)
+    rates = rng.normal(size=3) * rng.uniform(0.5, 20)
+    return cv.Scene(kind, body, random_rotation(rng), rates, rng.uniform(0.5, 5), potential)
+
+
+def true_error(trajectory):
+    truth = Exact()
+    if truth.unsupported(trajectory.scene):
+        truth = Precise(128)
+    grid = cv.Grid(trajectory.choice.dt, len(trajectory) - 1)
+    return angle_between(truth.prepare(trajectory.scene, grid)().R_WB, trajectory.R_WB).max()
+
+
+def test_true_errors_are_within_ten_times_what_was_asked_for():
+    rng = np.random.default_rng(20)
+    worse = []
+    for number in range(SCENES):
+        scene = random_scene(rng, KINDS[number % len(KINDS)])
+        error = 10 ** rng.uniform(-11, -2)
+        trajectory = cv.integrate(scene, error=error)
+        found = true_error(trajectory)
+        if found > 10 * error:
+            worse.append((scene.name, error, found, trajectory.choice))
+    assert len(worse) <= 0.02 * SCENES, worse  # measured 0 of 200, and no true error above 3 times the target
+
+
+def test_a_chooser_that_trusts_too_much_is_caught(monkeypatch):
+    """The negative control of the test above: estimates that are far too small."""
+    from conservative import chooser
+
+    monkeypatch.setattr(chooser, "_trusted", lambda method: 1e9)
+    rng = np.random.default_rng(3)
+    errors = [true_error(cv.integrate(random_scene(rng, "top"), error=1e-8)) for _ in range(5)]
+    assert max(errors) > 1e-7  # measured 2e-4
+
+
+def test_the_choice_is_told():
+    trajectory = cv.integrate(cv.scenes.lagrange_top(), error=1e-6)
+    choice = trajectory.choice
+    assert choice.reached
+    assert choice.estimate <= choice.error == 1e-6
+    assert choice.attempts[-1] == (choice.dt, choice.estimate)
+    assert trajectory.t[1] == pytest.approx(choice.dt)
+    assert cv.integrate(cv.scenes.lagrange_top(), 0.01).choice is None
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 10])
+def test_samples_fall_on_multiples_of_dt(every):
+    trajectory = cv.integrate(cv.scenes.lagrange_top(), dt=0.01, error=1e-9, sample_every=every, t_end=0.3)
+    np.testing.assert_allclose(trajectory.t, np.arange(0, 31, every) * 0.01, atol=1e-14)
+
+
+def test_what_round_off_forbids_is_a_warning():
+    with pytest.warns(AccuracyNotReached, match=r"error: got 1e-16 rad; allowed: what round-off leaves"):
+        trajectory = cv.integrate(cv.scenes.brick_flip(), error=1e-16)
+    assert not trajectory.choice.reached
+
+
+def test_other_fields_get_a_composition():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene = cv.scenes.brick_flip()
+        held = cv.Scene("held", scene.body, scene.R_WB0, scene.w_WB_B0, 0.5, cv.LinearSpring(50.0, (0.3, 0.1, 0), (1, 1, 0)))
+        assert cv.integrate(held, error=1e-6).choice.method.family == "reduced"
