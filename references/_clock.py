@@ -21,7 +21,7 @@ class Clock:
     period: Number
 
     def reduced(self, t: Array) -> tuple[Array, Array]:
-        """Return the phase (n,) within half a period of 0, and the whole periods (n,) taken off.
+        """Return the phase (n,) within half a period of 0, and the parity (n,), 0 or 1, of the periods taken off.
 
         The product with the time is carried in twice the digits: the error stays a rounding unit of the period, whatever t.
         """
@@ -32,11 +32,11 @@ class Clock:
         whole = np.rint(high)
         start, start_low = _two_parts(self.start / self.period)
         high, lost = _two_sum(high - whole, np.asarray(start))
-        low = low + (lost + start_low)
+        high, low = _two_sum(high, low + (lost + start_low))
         more = np.rint(high)
         high = high - more
         period, period_low = _two_parts(self.period)
-        return period * high + (period * low + period_low * high), whole + more
+        return period * high + (period * low + period_low * high), np.mod(np.mod(whole, 2) + more, 2)
 
     def turned(self, t: Array) -> ComplexArray:
         """Return exp(i phase), (n,); the period must be 2 pi."""

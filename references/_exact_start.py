@@ -18,7 +18,8 @@ Vector = list[Number]
 Matrix = Any
 """A matrix of `mp`."""
 
-_SAME = mp.mpf(10) ** -100
+_PARALLEL = mp.mpf(10) ** -130
+"""Sine of an angle that is rounding: principal axes come out with 150 digits."""
 
 SYMMETRIC = 1e-12
 """Moments that differ by less, relative to the largest, are those of a symmetric body whose tensor was rounded."""
@@ -66,7 +67,7 @@ class Start:
         moments, axes = self.principal
         w = self.rates(axes)
         L = [a * b for a, b in zip(moments, w, strict=True)]
-        return bool(norm(cross(w, L)) <= _SAME * norm(w) * norm(L))
+        return bool(norm(cross(w, L)) <= _PARALLEL * norm(w) * norm(L))
 
 
 def matrix(values: ArrayLike) -> Matrix:

@@ -62,8 +62,10 @@ class Polhode:
         """Periods of L in v; 1 - m = (L3min/L3max)^2 is 0 on the separatrix."""
         L2max, L3max = self.largest[1:]
         m = (L2max / L3max) ** 2 * self.gap(0, 1) / self.gap(0, 2)
-        least = (self.L[2] ** 2 * self.gap(1, 2) - self.L[0] ** 2 * self.gap(0, 1)) / self.gap(1, 2)
-        return Lattice.of(m, least / L3max**2)
+        # L3min^2 is the one difference. Without a division it is exact, so that the separatrix itself gives 0.
+        (J1, J2, J3), (L1, _, L3) = self.J, self.L
+        least = (J1 * (J3 - J2) * L3**2 - J3 * (J2 - J1) * L1**2) / (J1 * (J3 - J2))
+        return Lattice.of(m, max(least / L3max**2, mp.mpf(0)))
 
 
 def polhode(start: Start) -> Polhode:
@@ -98,10 +100,10 @@ class FreeMotion:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, periods = self.argument.reduced(t)
+        v, odd = self.argument.reduced(t)
         points = Points(self.lattice, v)
         sn, cn, dn = (points.quotient(part).real for part in self.parts)
-        flip = 1 - 2 * np.mod(periods, 2)
+        flip = 1 - 2 * odd
         m = np.stack([flip * cn, flip * sn, dn], axis=-1) * self.largest
         chi = self.turn.turned(t) * Points(self.phase.lattice, v).theta(self.phase)
         R_lP = from_halves(chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))

@@ -32,8 +32,8 @@ from ._theta import ComplexArray, Lattice, Number, Points, Quotient, jacobi, mp,
 _SAME = mp.mpf(10) ** -60
 """Roots of the cubic closer than this are one: its double roots come out with half of the 150 digits."""
 
-_NOTHING = mp.mpf(10) ** -30
-"""A factor below this is fitted by its slope: it vanishes, and what is left of it is rounding."""
+_UPRIGHT = mp.mpf(10) ** -24
+"""A tilt or a swing, rad, below which the axis is taken as vertical for good; the digits of the cubic end there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Top:
     @property
     def upright(self) -> bool:
         """Whether it stands or hangs without moving its axis."""
-        return bool(self.across == 0 and self.w == 0)
+        return bool(abs(self.across) < _UPRIGHT and abs(self.w) < _UPRIGHT * mp.sqrt(self.k))
 
     @property
     def slopes(self) -> tuple[Number, Number, Number]:
@@ -185,11 +185,14 @@ class Factor:
 
 
 def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, start: Number, slope: Number) -> Factor:
-    """Return the factor whose phase turns at `rate` where the argument is v, and that starts at v0 with a value and a slope."""
+    """Return the factor whose phase turns at `rate` where the argument is v, and that starts at v0 with a value and a slope.
+
+    The constant is taken from the larger of the two: a factor may start next to its zero.
+    """
     value, derivative = shape.value_and_slope(v)
     mu = rate - omega * (derivative / value).imag
     value, derivative = shape.value_and_slope(v0)
-    scale = start / value if abs(start) > _NOTHING else slope / (omega * derivative + mp.mpc(0, mu) * value)
+    scale = start / value if abs(omega * start) > abs(slope) else slope / (omega * derivative + mp.mpc(0, mu) * value)
     return Factor(rotation_clock(mp.mpf(0), mu), shape.scaled(scale))
 
 
@@ -208,10 +211,10 @@ class TopMotion:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, periods = self.argument.reduced(t)
+        v, odd = self.argument.reduced(t)
         points = Points(self.lattice, v)
         R_WP = from_halves(self.alpha.at(t, points), self.beta.at(t, points))
-        w = self.w_scale * (1 - 2 * np.mod(periods, 2)) * self.w.at(t, points)
+        w = self.w_scale * (1 - 2 * odd) * self.w.at(t, points)
         w_P = np.stack([w.real, w.imag, np.full_like(w.real, self.spin)], axis=-1)
         return R_WP @ self.R_BP.T, w_P @ self.R_BP.T
 

@@ -61,7 +61,8 @@ def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLik
     Jacobi's solution, split as by van Zon & Schofield, J. Comput. Phys. 225 (2007) 145, with a theta function in place of the
     elliptic integral of the third kind; formulas in `references._free_body`.
     """
-    return _evaluated(_free_motion(_start(body, R_WB0, w_WB_B0)), t)
+    start, times = _start(body, R_WB0, w_WB_B0), _times(t)
+    return _evaluated(_free_motion(start), times)
 
 
 def lagrange_top(
@@ -96,10 +97,13 @@ def lagrange_top(
     -----
     Klein & Sommerfeld, Theorie des Kreisels, VI; formulas in `references._lagrange_top`.
     """
+    start, times = _start(body, R_WB0, w_WB_B0), _times(t)
+    if not isinstance(potential, UniformGravity):
+        raise BadInput("potential", repr(potential), "a UniformGravity")
     reason = _reason(body, potential)
     if reason:
         raise Unsupported("potential", f"{potential!r} with {body!r}", f"what has a closed form ({reason})")
-    return _evaluated(_motion(_start(body, R_WB0, w_WB_B0), potential), t)
+    return _evaluated(_motion(start, potential), times)
 
 
 @dataclass(frozen=True)
@@ -178,7 +182,14 @@ def _motion(start: Start, potential: Potential | None) -> Motion:
     return steady_turn(start) if begun.upright else top_motion(begun)
 
 
-def _evaluated(motion: Motion, t: ArrayLike) -> tuple[Array, Array]:
-    times = finite_array("t", t, (np.shape(t),), "finite times (n,), s")
+def _times(t: ArrayLike) -> Array:
+    try:
+        shape = np.shape(t)
+    except ValueError:  # rows of different lengths: refused below like all that is no array
+        shape = ()
+    return finite_array("t", t, (shape,), "finite times (n,), s")
+
+
+def _evaluated(motion: Motion, times: Array) -> tuple[Array, Array]:
     R_WB, w_WB_B = motion.at(times.ravel())
     return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)

@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, rotation_about
+from conservative.method import Grid
+from references import truth
+
+R0 = rotation_about((0.3, -1, 0.4), 2.1)
+
+
+def test_a_closed_form_is_checked_by_integration():
+    scene = cv.scenes.brick_flip()
+    found = truth.reference(scene, Grid(0.1, 60, 3))
+    assert found.names[0].endswith("/exact")
+    assert found.names[1].startswith("heyoka==")
+    assert found.agreement_rad < 2e-14  # measured 1.2e-15
+    assert found.checked_until == 6
+    np.testing.assert_array_equal(found.trajectory.t, np.arange(0, 61, 3) * 0.1)
+
+
+def test_only_the_first_hundred_radians_of_a_closed_form_are_checked():
+    scene = cv.Scene("long", cv.RigidBody((1, 2, 2.5)), R0, (0.1, 0.2, 20), 1e6)
+    found = truth.reference(scene, Grid(1e5, 10))
+    assert found.checked_until == pytest.approx(truth.CHECKED_RADIANS / 20, rel=1e-2)
+    assert found.trajectory.t[-1] == 1e6
+
+
+def test_without_a_closed_form_two_integrations_are_compared():
+    scene = cv.Scene("heavy", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 3.0, cv.UniformGravity(1, (0, 0.2, 1)))
+    found = truth.reference(scene, Grid(0.5, 6))
+    assert [name.split("==")[0] for name in found.names] == ["heyoka", "scipy"]
+    assert found.agreement_rad < 1e-11  # measured 3e-13
+    assert found.checked_until == 3
+
+
+class Bowl:
+    """V = R33^2: a field that nobody here has met."""
+
+    def energy(self, R_WB):
+        return R_WB[..., 2, 2] ** 2
+
+    def gradient(self, R_WB):
+        out = np.zeros(np.shape(R_WB))
+        out[..., 2, 2] = 2 * R_WB[..., 2, 2]
+        return out
+
+    def finite_derivative(self, R_0, R_1):
+        return (self.gradient(R_0) + self.gradient(R_1)) / 2
+
+    def scale(self):
+        return 1.0
+
+    @property
+    def axis_W(self):
+        return np.array([0.0, 0, 1])
+
+    def kernel_field(self, R_BP):
+        raise NotImplementedError
+
+
+def test_a_field_of_ones_own_gets_two_integrations_in_doubles():
+    scene = cv.Scene("bowl", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 2.0, Bowl())
+    found = truth.reference(scene, Grid(0.5, 4))
+    assert [name.split("/")[1].split(",")[0] for name in found.names] == ["DOP853", "LSODA"]
+    assert found.agreement_rad < 1e-9  # measured 2e-11
+
+
+def test_truths_that_differ_are_refused(monkeypatch):
+    # the paper's own map is second order: no truth
+    monkeypatch.setattr(truth, "Precise", cv.Reduced)
+    scene = cv.scenes.brick_flip()
+    with pytest.raises(truth.Disagreement, match=r"scene: got 'brick_flip', on which .*exact and .*reduced differ by .* rad"):
+        truth.reference(scene, Grid(0.1, 60))
+
+
+def test_a_trajectory_that_ended_early_agrees_with_nothing():
+    scene = cv.scenes.brick_flip()
+    whole, half = (truth.Exact().prepare(scene, Grid(0.1, n))() for n in (20, 10))
+    assert truth.difference(whole, half) == np.inf
+    assert truth.difference(whole, whole) == angle_between(whole.R_WB, whole.R_WB).max() == 0
