@@ -75,6 +75,53 @@ def main() -> None:
     """
 
 
+def _listed(texts: tuple[str, ...]) -> list[str]:
+    """Return names out of `a,b:setting=1,other=2,c`: what has an equals sign and no colon belongs to the name before it."""
+    found: list[str] = []
+    for item in (item.strip() for text in texts for item in text.split(",")):
+        if found and "=" in item and ":" not in item:
+            found[-1] += f",{item}"
+        elif item:
+            found.append(item)
+    return found
+
+
+@main.command(
+    short_help="Measure everything and write a report.",
+    epilog=_epilog(
+        "conservative report",
+        "conservative report --quick --out quick_report",
+        "conservative report --scenes lagrange_top --methods reduced,mujoco:RK4,heyoka",
+    ),
+)
+@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=_names("scenes"), help="[default: the paper's two]")
+@click.option("--methods", multiple=True, metavar="M,N", shell_complete=_names("methods"), help="[default: all registered]")
+@click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
+@click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option("--png", is_flag=True, help="Pictures as PNG, too.")
+@click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), default="report", show_default=True, help="Folder, replaced as a whole."
+)
+def report(
+    scenes: tuple[str, ...], methods: tuple[str, ...], quick: bool, skip_missing: bool, png: bool, as_json: bool, out: Path
+) -> None:
+    """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
+
+    The folder is there whole or not at all. A family's bare name, such as mujoco, stands for all its variants.
+    """
+    from . import document, output
+    from .progress import progress
+
+    plan = document.plan(_listed(scenes), _listed(methods), quick, skip_missing, png)
+    with progress() as step:
+        measured = document.write(plan, out, step)
+    click.echo((out / output.MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
+    bad = document.failed(measured)
+    if bad:
+        raise click.ClickException("; ".join(bad))
+
+
 @main.command(
     "list",
     short_help="Show scenes and methods.",
@@ -92,6 +139,17 @@ def list_command(as_json: bool) -> None:
         click.echo(catalogue.as_json())
     else:
         catalogue.show()
+
+
+@main.command(
+    short_help="Write a scene file to start from.",
+    epilog=_epilog("conservative new > my_body.toml", "conservative run my_body.toml"),
+)
+def new() -> None:
+    """Print a scene file with every key explained; every command takes such a file where it takes the name of a scene."""
+    from conservative.scene_file import template
+
+    click.echo(template(), nl=False)
 
 
 @main.command(

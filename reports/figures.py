@@ -82,7 +82,7 @@ def _drift_panel(data: pd.DataFrame, kind: str, names: list[str]) -> Any:
         alt.Chart(data, width=2 * WIDTH - 180, height=HEIGHT - 40, title=f"{data['scene'].iloc[0]}: drift of {kind}")
         .mark_line(strokeWidth=1.8, clip=True)
         .encode(
-            x=alt.X("t:Q", title="t, s"),
+            x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)),
             y=y,
             color=alt.Color("series:N", scale=colour_scale(names), sort=names, legend=legend),
             strokeDash=alt.StrokeDash("series:N", scale=dash_scale(names), sort=names, legend=legend),

@@ -17,18 +17,12 @@ from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.invariants import Invariant
 from conservative.method import Method, grid_for, integrate, require_support
+from conservative.presentation import COLUMNS
+from conservative.presentation import samples as samples_of
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from .output import text_file
-
-COLUMNS = (
-    "t",
-    *(f"R_WB_{row}{column}" for row in "123" for column in "123"),
-    *(f"w_WB_B_{axis}" for axis in "123"),
-    "energy",
-    *(f"momentum_W_{axis}" for axis in "123"),
-)
 
 
 def run(scene_name: str, method_name: str, dt: float | None, t_end: float | None, samples: Path | None) -> dict[str, Any]:
@@ -95,13 +89,9 @@ def _last(trajectory: Trajectory) -> dict[str, Any] | None:
 
 def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
     """Write one line a sample, with every digit, under `COLUMNS` (SI units; R_WB by rows)."""
-    count = len(trajectory)
-    table = np.column_stack(
-        [trajectory.t, trajectory.R_WB.reshape(count, 9), trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W]
-    )
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows(table.tolist())
+    writer.writerows(samples_of(trajectory).tolist())
 
 
 def as_json(summary: dict[str, Any]) -> str:

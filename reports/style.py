@@ -1,6 +1,7 @@
 """One look for every picture: colours by family, marks by setting, sizes, and a number format.
 
-The colours are those of Okabe and Ito (2008) and Tol's muted scheme, told apart also by colour-blind readers; a setting is told by its mark and dash.
+The colours are those of Okabe and Ito (2008), then of Tol's muted scheme: colour-blind readers tell them apart. A setting is
+told by its mark and dash.
 """
 
 from __future__ import annotations
@@ -90,7 +91,7 @@ def power_axis(title: str, low: float, high: float) -> alt.Axis:
     first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
-    return alt.Axis(title=title, format="~e", **({"values": powers} if len(powers) > 1 else {}))
+    return alt.Axis(title=title, format="~e", values=powers if len(powers) > 1 else alt.Undefined)
 
 
 def styled(chart: Any) -> Any:

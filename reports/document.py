@@ -1,0 +1,202 @@
+"""The report: measure, draw, write; whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from benchmarks import measurement, selection, studies
+from benchmarks.cases import MISSING, SKIPPED, UNSUPPORTED
+from benchmarks.measurement import Measurement
+from conservative.method import Method
+from conservative.scene import Scene
+from conservative.trajectory import OK
+
+from . import drifts, figures, figures_of_paper, frontier, orders, output, paper, tables, verdict
+from .progress import Step
+from .provenance import Provenance, provenance
+
+SCHEMA = 1
+"""Version of the layout of measurements.json; a change that breaks a reader raises it."""
+
+SHARES = {"paper": 0.20, "convergence": 0.15, "speed": 0.15, "work_precision": 0.35, drifts.STUDY: 0.10, "pictures": 0.05}
+"""What part of the time each piece of work takes, for the time left."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a report is made of.
+
+    Raises
+    ------
+    BadInput
+        A name or a setting is unknown.
+    MissingEngine
+        An engine is not installed, and `skip_missing` is False.
+    """
+
+    scenes: tuple[Scene, ...]
+    methods: tuple[Method, ...]
+    quick: bool = False
+    skip_missing: bool = False
+    png: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.skip_missing:
+            for method in self.methods:
+                _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was measured: the tidy table, and drifts over time (see `drifts.samples`)."""
+
+    table: pd.DataFrame
+    drifts: pd.DataFrame
+
+
+def plan(scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False) -> Plan:
+    """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
+    chosen = selection.scenes(scenes) if scenes else selection.scenes()
+    return Plan(chosen, selection.methods(methods or None), quick, skip_missing, png)
+
+
+def write(made: Plan, out: Path, step: Step) -> Measured:
+    """Measure and write the report into the folder `out`; return what was measured.
+
+    Raises
+    ------
+    BadInput
+        The folder cannot be written; found before any work.
+    """
+    with output.report_folder(out) as folder:
+        measured = measure(made, step)
+        step(1 - SHARES["pictures"], "pictures")
+        write_files(made, measured, folder, provenance())
+    return measured
+
+
+def measure(made: Plan, step: Step) -> Measured:
+    """Return all rows: the four studies, then long runs for the drift over time."""
+    rows: list[Measurement] = []
+    start = 0.0
+    for study in studies.studies(made.scenes, made.methods, made.quick, made.skip_missing):
+        rows += studies.rows(study, _within(step, study.name, start))
+        start += SHARES[study.name]
+    pictures = []
+    for found, picture in _long_runs(made, _within(step, drifts.STUDY, start)):
+        rows += found
+        pictures.append(picture)
+    return Measured(measurement.frame(rows), pd.concat(pictures, ignore_index=True))
+
+
+def _within(step: Step, name: str, start: float) -> Callable[[int, int, str], None]:
+    """Return a study's progress as a share of the whole."""
+    return lambda done, total, what: step(start + SHARES[name] * done / total, f"{name.replace('_', ' ')}: {what}")
+
+
+def _long_runs(made: Plan, progress: Callable[[int, int, str], None]) -> Iterator[tuple[list[Measurement], pd.DataFrame]]:
+    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.room != "truth"]
+    for k, (scene, method) in enumerate(pairs):
+        progress(k, len(pairs), f"{scene.name}: {method.name}")
+        yield drifts.measured(drifts.case_for(scene, method), made.skip_missing)
+
+
+def write_files(made: Plan, measured: Measured, folder: Path, source: Provenance) -> None:
+    """Write pictures, tables, CSV, and last the JSON that lists them."""
+    text = render(made, measured, source, lambda name, chart: draw(chart, folder / name, made.png))
+    (folder / "report.md").write_text(text, encoding="utf-8")
+    measured.table.to_csv(folder / "measurements.csv", index=False)
+    files = sorted({path.name for path in folder.iterdir()} | {output.MANIFEST})
+    (folder / output.MANIFEST).write_text(as_json(measured.table, source, files), encoding="utf-8")
+
+
+def as_json(table: pd.DataFrame, source: Provenance, files: list[str]) -> str:
+    """Return measurements.json; a value that could not be measured is null."""
+    rows = json.loads(table.to_json(orient="records", double_precision=15))
+    return json.dumps({"schema": SCHEMA, **asdict(source), "files": files, "rows": rows}, indent=1, ensure_ascii=False)
+
+
+def draw(chart: Any, path: Path, png: bool) -> str:
+    """Write a picture as SVG, and as PNG where asked; return the name of the SVG."""
+    import vl_convert
+
+    specification = chart.to_json()
+    svg = path.with_suffix(".svg")
+    svg.write_text(vl_convert.vegalite_to_svg(specification), encoding="utf-8")
+    if png:
+        path.with_suffix(".png").write_bytes(vl_convert.vegalite_to_png(specification, scale=2))
+    return svg.name
+
+
+Draw = Callable[[str, Any], str]
+
+
+def render(made: Plan, measured: Measured, source: Provenance, draw: Draw) -> str:
+    """Return report.md; `draw(name, chart)` makes a picture and returns the name of its file."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    found = frontier.contests(frontier.points(measured.table))
+    environment = Environment(
+        loader=PackageLoader("reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
+    )
+    others = [f"{name} {version}" for name, version in source.packages.items() if name not in source.compared]
+    return environment.get_template("report.md.j2").render(
+        scenes=[scene.name for scene in made.scenes],
+        quick=made.quick,
+        verdict=verdict.lines(found),
+        by_scene={scene.name: _scene_parts(scene, measured, found, draw) for scene in made.scenes},
+        durations=f"{drifts.DURATIONS:g}",
+        paper=list(_paper_parts(made, draw)),
+        truths=tables.markdown(tables.truths(measured.table)),
+        failures=tables.markdown(tables.failures(measured.table)),
+        unsupported=tables.markdown(tables.unsupported(measured.table)),
+        made=source,
+        others=", ".join(others),
+    )
+
+
+def _scene_parts(scene: Scene, measured: Measured, contests: list[frontier.Contest], draw: Draw) -> dict[str, str]:
+    table, name = measured.table, scene.name
+    errors = orders.errors(table)
+    return {
+        "source": scene.source,
+        "t_end": f"{scene.t_end:g}",
+        "dt": f"{scene.dt:g}",
+        "contests": tables.markdown(tables.contests([c for c in contests if c.scene == name])),
+        "drift": tables.markdown(tables.drift(table, name)),
+        "accuracy": tables.markdown(tables.accuracy(table, name)),
+        "order": tables.markdown(tables.order(table, name)),
+        "time": tables.markdown(tables.time(table, name)),
+        "work_precision": draw(f"work_precision_{name}", figures.work_precision(frontier.points(table), name)),
+        "drift_picture": draw(f"drift_{name}", figures.drift(measured.drifts, name)),
+        "convergence": draw(f"convergence_{name}", figures.convergence(errors, orders.fits(errors), name)),
+    }
+
+
+def _paper_parts(made: Plan, draw: Draw) -> Iterator[str]:
+    """Yield the paper's figures that belong to the scenes of the report."""
+    scenes = {scene.name for scene in made.scenes}
+    if "brick_flip" in scenes:
+        picture = draw("paper_figure_1", figures_of_paper.figure_1(paper.body_rates(), paper.conservation()))
+        yield f"![Figure 1 of the paper: rates of the brick, errors of energy and momentum]({picture})"
+    if "lagrange_top" in scenes:
+        picture = draw("paper_figure_2", figures_of_paper.figure_2(paper.centre_of_mass()))
+        yield f"![Figure 2 of the paper: centre of mass of the top]({picture})"
+        yield "Error of the centre of mass of the top after one period of precession (the whole number of steps next to it):"
+        yield tables.markdown(tables.positions(paper.position_errors()))
+
+
+def failed(measured: Measured) -> list[str]:
+    """Return what of ours failed at the steps of the paper: one line each."""
+    rows = measured.table
+    bad = rows[
+        (rows["study"] == "paper") & (rows["room"] == "ours") & ~rows["status"].isin([OK, UNSUPPORTED, MISSING, SKIPPED])
+    ]
+    found = zip(bad["method"], bad["scene"], bad["dt"], bad["status"], strict=True)
+    return list(dict.fromkeys(f"{method} on {scene}, dt = {dt:g} s: {status}" for method, scene, dt, status in found))
