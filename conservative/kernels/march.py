@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from . import kernel, small
 from .fields import body_torque, finite_torque
 from .vector import accumulate, add, applied, cross, dot, inverse, product, scaled, subtract, times
@@ -164,8 +162,3 @@ def turned_attitude(a, q, carry):
     y, cy = accumulate(q[2], carry[2], d[2])
     z, cz = accumulate(q[3], carry[3], d[3])
     return (w, x, y, z), (cw, cx, cy, cz)
-
-
-def stage_steps(dt: float, weights: tuple[float, ...]) -> np.ndarray:
-    """Return the lengths of the stages, s, of one step dt."""
-    return dt * np.asarray(weights, dtype=float)
