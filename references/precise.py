@@ -223,7 +223,8 @@ def _real(x: Number, bits: int) -> Any:
     hy = taylor.heyoka()
     if isinstance(x, float | int):
         return hy.real(x, bits)
-    return hy.real(mpmath.nstr(_mpf(x), math.ceil(bits * 0.30103) + 5), bits)
+    with mpmath.workprec(bits + 32):
+        return hy.real(mpmath.nstr(_mpf(x), math.ceil(bits * 0.30103) + 5), bits)
 
 
 def _reals(values: Sequence[Number], bits: int) -> Reals:

@@ -1,0 +1,125 @@
+"""Names, labels, claims, and settings that cannot be used."""
+
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from references import formulations
+from references.heyoka import Heyoka
+from references.mujoco import MuJoCo
+from references.pinocchio import Pinocchio
+from references.precise import Precise
+from references.scipy import SciPy
+
+EVERYTHING = [method for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for method in cls.variants()]
+
+
+@pytest.mark.parametrize("method", EVERYTHING, ids=lambda m: m.name)
+def test_a_name_gives_the_method_back(method):
+    assert registry.method(method.name) == method
+
+
+@pytest.mark.parametrize(
+    ("method", "package", "setting"),
+    [
+        (MuJoCo("implicitfast"), "mujoco", "implicitfast"),
+        (Pinocchio("Euler"), "pin", "aba+Euler"),
+        (Heyoka(1e-9), "heyoka", "tol=1e-09,body"),
+        (Heyoka(1e-9, "lean"), "heyoka", "tol=1e-09,lean"),
+        (SciPy("RK45", 1e-6), "scipy", "RK45,rtol=1e-06"),
+        (Precise(128), "heyoka", "128 bits"),
+    ],
+)
+def test_labels_have_version_and_setting(method, package, setting):
+    assert method.label == f"{package}=={version(package)}/{setting}"
+
+
+def test_rooms_and_orders():
+    assert {method.room for method in EVERYTHING} == {"engine", "truth"}
+    assert [method.order for method in MuJoCo.variants()] == [1, 4, 1, 1, 1]
+    assert [method.order for method in Pinocchio.variants()] == [1, 4]
+    assert all(cls().order is None for cls in (Heyoka, SciPy, Precise))
+
+
+BAD = [
+    (MuJoCo, {"integrator": "rk4"}, r"integrator: got 'rk4'; allowed: one of 'Euler', 'RK4'"),
+    (Pinocchio, {"scheme": "leapfrog"}, r"scheme: got 'leapfrog'; allowed: one of 'Euler', 'RK4'"),
+    (Heyoka, {"tol": 0}, r"tol: got 0; allowed: a number above 0 and below 1"),
+    (Heyoka, {"tol": -1e-9}, r"tol: got -1e-09; allowed"),
+    (Heyoka, {"tol": 1.0}, r"tol: got 1.0; allowed"),
+    (Heyoka, {"tol": float("nan")}, r"tol: got nan; allowed"),
+    (Heyoka, {"frame": "slow"}, r"frame: got 'slow'; allowed: one of 'body', 'non_spinning', 'lean'"),
+    (SciPy, {"integrator": "dop853"}, r"integrator: got 'dop853'; allowed: one of 'DOP853'"),
+    (SciPy, {"rtol": 0.0}, r"rtol: got 0.0; allowed: a number from 2.3e-14"),
+    (SciPy, {"rtol": 1e-15}, r"rtol: got 1e-15; allowed"),
+    (SciPy, {"rtol": "tight"}, r"rtol: got 'tight'; allowed"),
+]
+
+
+@pytest.mark.parametrize(("method", "settings", "message"), BAD)
+def test_bad_settings(method, settings, message):
+    with pytest.raises(cv.BadInput, match=message):
+        method(**settings)
+
+
+def test_a_non_spinning_frame_needs_symmetry(free, heavy, top):
+    method = Heyoka(frame="non_spinning")
+    assert method.unsupported(top) is None
+    for scene in (free, heavy):
+        with pytest.raises(cv.Unsupported, match="symmetric about an axis"):
+            cv.integrate(scene, 0.1, method)
+
+
+def test_lean_takes_the_form_with_the_fewest_products(free, heavy, top, spun):
+    def chosen(scene):
+        return formulations.lean(scene).form.equations.__name__
+
+    assert chosen(free) == "free_rates_and_angle"
+    assert chosen(heavy) == "body"
+    assert chosen(spun) == "non_spinning"
+    assert chosen(cv.scenes.lagrange_top()) == "axis_and_angle"
+    hanging = top.renamed("hanging", potential=cv.UniformGravity(-30.0, top.potential.com_B))
+    assert chosen(hanging) == "axis_and_angle"
+    assert chosen(top) == "axis_and_angle"
+    over_both_poles = cv.Scene("swing", cv.RigidBody((2, 2, 1)), np.eye(3), (5, 0, 0), 1.0, cv.UniformGravity(3, (0, 0, 1)))
+    assert chosen(over_both_poles) == "non_spinning"
+    at_rest = free.renamed("rest", w_WB_B0=(0, 0, 0))
+    assert chosen(at_rest) == "body"
+
+
+def test_one_compiled_integrator_serves_all_scenes_of_a_form(free):
+    other = cv.Scene("other", cv.RigidBody((1, 2, 2.7)), np.eye(3), (0.1, 0.2, 2.0), 1.0)
+    assert formulations.body(free).form == formulations.body(other).form
+    assert formulations.lean(free).form == formulations.lean(other).form
+
+
+EDGES = [
+    ((1, 2, 2.5), (0, 0, 0), None),
+    ((1, 2, 2.5), (0, 2, 0), None),
+    ((1, 2, 2.5), (0, 0, -2), None),
+    ((2, 2, 2), (1, 2, 3), None),
+    ((2, 2, 2), (1, 2, 3), (0.3, 0.6, 0.9)),
+    ((2, 2, 1), (0, 0, 0), (0, 0, -3)),
+    ((2, 2, 1), (0, 0, 0), (0, 0, 3)),
+    ((2, 2, 1), (3, 0, 0), (0, 0, 3)),
+    ((2, 1.5, 1), (0, 0, 0), (0, 0, 3)),
+    ((1, 2, 2.5), (1, 2, 3), (0, 0, 0)),
+    ((1.1, 2.2, 3.3000000000000003), (1, 2, 3), None),
+]
+
+
+@pytest.mark.parametrize(("inertia", "w", "moment"), EDGES)
+def test_degenerate_scenes(inertia, w, moment):
+    field = None if moment is None else cv.UniformGravity(1, moment)
+    scene = cv.Scene("edge", cv.RigidBody(inertia), np.eye(3), w, 1.0, field)
+    truth = Precise(80).run(scene, 0.25)
+    for method in (Heyoka(), Heyoka(frame="non_spinning"), Heyoka(frame="lean"), SciPy(), MuJoCo(), Pinocchio()):
+        if method.unsupported(scene):
+            continue
+        found = method.run(scene, 0.25) if method.order is None else method.run(scene, 0.005, sample_every=50)
+        assert found.ok
+        bound = 1e-8 if method.order else 1e-10  # measured 3e-9 and 8e-12
+        assert cv.attitude.angle_between(truth.R_WB, found.R_WB).max() < bound
