@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .attitude import Array, from_quaternion, rotation_about
+from .attitude import Array, cayley, from_quaternion, rotation_about
 from .check import positive_number
 from .errors import BadInput, PotentialFailed
 
@@ -19,6 +19,7 @@ GradientFunction = Callable[[Array], Array]
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
+_NEWTON_DIFFERENCE = 1e-7
 _AGREEMENT = 1e-4
 _ROUND_OFF = 16 * 2.0**-53
 _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
@@ -28,8 +29,8 @@ _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
 class FunctionPotential:
     """A user's own potential, given by its energy and its gradient as functions of the matrix R_WB.
 
-    The compiled loop calls them through a pointer, some 15 times a step, so that a step costs tens of microseconds and not tens
-    of nanoseconds. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both attitudes and
+    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs most of a millisecond and not a
+    fraction of a microsecond. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both attitudes and
     D their difference:
 
         V* = G + (V(R1) - V(R0) - <G, D>) / <D, D> D        G = dV/dR at Rbar
@@ -120,7 +121,10 @@ class FunctionPotential:
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return Gonzalez's discrete gradient V*, (3, 3), in J."""
-        V_0, V_1 = self._energy_at(R_0), self._energy_at(R_1)
+        return self._discrete_gradient(self._energy_at(R_0), R_0, R_1)
+
+    def _discrete_gradient(self, V_0: float, R_0: Array, R_1: Array) -> Array:
+        V_1 = self._energy_at(R_1)
         gradient, step = self._gradient_at((R_0 + R_1) / 2), R_1 - R_0
         along = float(np.sum(gradient * step))
         lacking = V_1 - V_0 - along
@@ -133,31 +137,76 @@ class FunctionPotential:
         return self.size
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the pointer to a C function and the arrays it shares with the kernels; one of them a thread and a frame."""
+        """Return the pointer to a C function and the arrays it shares with the kernels: their own for each thread and frame."""
         from .kernels.function_field import Function
 
         key = (threading.get_ident(), R_BP.tobytes())
         if key not in self._fields:
-            R, out = np.zeros((3, 3)), np.zeros((3, 3))
-            callback = _Callback(self._answer(R, out, R_BP.copy()))
+            answers = _Answers(self, R_BP.copy())
+            callback = _Callback(answers)
             address = ctypes.cast(callback, ctypes.c_void_p).value or 0
-            self._fields[key] = callback, Function(address, R, out)  # the callback lives as long as the potential
+            self._fields[key] = callback, Function(address, answers.given, answers.answer)  # keeps the callback alive
         return self._fields[key][1]
 
-    def _answer(self, R: Array, out: Array, R_BP: Array) -> Callable[[int], int]:
-        """Return what the kernels call: 0 writes the energy, 1 the gradient; the answer is `FAILED` or 0."""
-        from .kernels.function_field import ENERGY, FAILED
 
-        def answer(what: int) -> int:
-            try:
-                R_WB = R @ R_BP.T
-                if what == ENERGY:
-                    out[0, 0] = self._energy_at(R_WB)
-                else:
-                    out[:] = self._gradient_at(R_WB) @ R_BP
-            except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
-                PotentialFailed.pending.cause = error
-                return FAILED
-            return 0
+class _Answers:
+    """What the kernels call: they put a question into `given` and read `answer` (see `kernels.function_field`)."""
 
-        return answer
+    def __init__(self, potential: FunctionPotential, R_BP: Array) -> None:
+        self.potential, self.R_BP = potential, R_BP
+        self.given, self.answer = np.zeros(18), np.zeros(90)
+
+    def __call__(self, what: int) -> int:
+        try:
+            (self._body_torque, self._finite_torque, self._finite_derivative)[what]()
+        except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
+            PotentialFailed.pending.cause = error
+            return 1
+        return 0
+
+    def _attitude(self) -> Array:
+        q = self.given[:4]
+        return from_quaternion(q / np.sqrt(q @ q)) @ self.R_BP.T
+
+    def _body_torque(self) -> None:
+        R = self._attitude()
+        self.answer[:3] = self._moment(R, R, self.potential._gradient_at(R))
+
+    def _finite_torque(self) -> None:
+        R_0, a = self._attitude(), self.given[4:7].copy()
+        V_0 = self.potential._energy_at(R_0)
+
+        def torque(a: Array) -> Array:
+            R_1 = R_0 @ self.R_BP @ cayley(2 * a) @ self.R_BP.T
+            return self._moment(R_0, (R_0 + R_1) / 2, self.potential._discrete_gradient(V_0, R_0, R_1))
+
+        self.answer[:3] = torque(a)
+        self.answer[3:12] = _derivative(torque, a, self.answer[:3]).T.ravel()
+
+    def _finite_derivative(self) -> None:
+        R_0 = self.given[:9].reshape(3, 3).T @ self.R_BP.T
+        V_0 = self.potential._energy_at(R_0)
+
+        def V_star(q_1: Array) -> Array:
+            R_1 = q_1.reshape(3, 3).T @ self.R_BP.T
+            return (self.potential._discrete_gradient(V_0, R_0, R_1) @ self.R_BP).T.ravel()
+
+        q_1 = self.given[9:].copy()
+        self.answer[:9] = V_star(q_1)
+        self.answer[9:] = _derivative(V_star, q_1, self.answer[:9]).ravel()
+
+    def _moment(self, R_0: Array, R: Array, gradient: Array) -> Array:
+        """Return the torque sum_j r_j x (-V*_j) in principal axes of the attitude R_0: the skew part of R V*'."""
+        product = R @ gradient.T
+        torque_W = [product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]]
+        return np.array(torque_W) @ R_0 @ self.R_BP
+
+
+def _derivative(function: Callable[[Array], Array], x: Array, value: Array) -> Array:
+    """Return d function/dx by differences from `value`, its value at x: good to about 1e-7, all but enough for Newton's method."""
+    columns = []
+    for k in range(len(x)):
+        beside = x.copy()
+        beside[k] += _NEWTON_DIFFERENCE
+        columns.append((function(beside) - value) / (beside[k] - x[k]))
+    return np.stack(columns, axis=1)

@@ -45,8 +45,8 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
 def invariants_of(scene: Scene) -> tuple[Invariant, ...]:
     """Return what follows from the body and the potential alone.
 
-    Energy always. World momentum (a vector) for a free body, its vertical component in uniform gravity. The axial momentum
-    where body and field are symmetric about one axis.
+    Energy always. World momentum (a vector) for a free body, its component along the axis of a field that has one (the vertical
+    in uniform gravity). The axial momentum where body and field are symmetric about one axis.
     """
     body, potential = scene.body, scene.potential
     found = [Invariant("energy", "J", scene.energy_scale, lambda R, w: energy(body, potential, R, w))]
@@ -55,8 +55,9 @@ def invariants_of(scene: Scene) -> tuple[Invariant, ...]:
     scale = size or float(np.sqrt(body.moments.max() * scene.energy_scale))
     if potential is None:
         found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
-    elif isinstance(potential, UniformGravity):
-        found.append(Invariant("vertical momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)[..., 2]))
+    elif (line := potential.axis_W) is not None:
+        name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
+        found.append(Invariant(name, "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w) @ line))
     axis = axial_direction(body, potential)
     if axis is not None:
         found.append(Invariant("axial momentum", "kg m^2/s", scale, lambda R, w: body.momentum(w) @ axis))

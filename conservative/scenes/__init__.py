@@ -14,6 +14,9 @@ from .nutating_tops import cusped_top as cusped_top
 from .nutating_tops import looping_top as looping_top
 from .nutating_tops import nutating_top as nutating_top
 from .nutating_tops import unduloid_top as unduloid_top
+from .other_fields import attracted_body as attracted_body
+from .other_fields import gravity_gradient_body as gravity_gradient_body
+from .other_fields import sprung_body as sprung_body
 from .pendulums import hanging_rest as hanging_rest
 from .pendulums import inverted_rest as inverted_rest
 from .pendulums import pendulum_over_top as pendulum_over_top

@@ -1,0 +1,184 @@
+"""Potentials: gradient against differences, the identity of the finite derivative, energy and momentum in motion, refusals."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import conservative as cv
+from conservative.attitude import angle_between, cayley, rotation_about
+from conservative.potential import torque_W
+
+TURNED = rotation_about((1, 2, 3), 0.7)
+INERTIA = TURNED @ np.diag([1.3, 0.9, 0.7]) @ TURNED.T
+POINT, ANCHOR = (0.4, -0.2, 0.3), (0.5, 0.6, -0.7)
+HOOK = np.array([0.2, -0.1, 0.4])
+
+
+def quartic_energy(R):
+    return 20 * (R[2] @ HOOK) ** 4 + np.sin(R[0] @ HOOK)
+
+
+def quartic_gradient(R):
+    return np.outer([0, 0, 80 * (R[2] @ HOOK) ** 3], HOOK) + np.outer([np.cos(R[0] @ HOOK), 0, 0], HOOK)
+
+
+POTENTIALS = {
+    "gravity": cv.UniformGravity(2.3, (0.1, 0.3, -0.2)),
+    "spring": cv.LinearSpring(3.1, POINT, ANCHOR),
+    "spring with rest length": cv.LinearSpring(3.1, POINT, ANCHOR, 0.3),
+    "attraction": cv.PointAttraction(1.7, POINT, ANCHOR),
+    "repulsion": cv.PointAttraction(-1.7, POINT, ANCHOR),
+    "gravity gradient": cv.GravityGradient(1.2, INERTIA, (1, 2, -0.5)),
+    "functions": cv.FunctionPotential(quartic_energy, quartic_gradient),
+}
+potentials = pytest.mark.parametrize("potential", POTENTIALS.values(), ids=POTENTIALS)
+attitudes = st.builds(rotation_about, st.tuples(*[st.floats(0.1, 1)] * 3), st.floats(-math.pi, math.pi))
+matrices = st.builds(lambda *values: np.reshape(values, (3, 3)) / 8 + np.eye(3), *[st.floats(-1, 1)] * 9)
+
+
+def scene_in(potential, t_end=5.0):
+    return cv.Scene("body", cv.RigidBody(INERTIA), rotation_about((3, -1, 2), 1.2), (0.5, 1.1, -0.8), t_end, potential)
+
+
+@potentials
+@settings(max_examples=30, deadline=None)
+@given(R=matrices)
+def test_gradient_is_that_of_the_energy(potential, R):
+    step, gradient = 1e-5, potential.gradient(R)
+    for index in np.ndindex(3, 3):
+        aside = np.zeros((3, 3))
+        aside[index] = step
+        difference = (potential.energy(R + aside) - potential.energy(R - aside)) / (2 * step)
+        assert abs(difference - gradient[index]) < 1e-7 * potential.scale()  # measured 1e-9
+
+
+@potentials
+@settings(max_examples=60, deadline=None)
+@given(R_0=matrices, R_1=matrices)
+def test_finite_derivative_gives_the_difference_of_energy(potential, R_0, R_1):
+    gained = np.sum(potential.finite_derivative(R_0, R_1) * (R_1 - R_0))
+    assert abs(gained - (potential.energy(R_1) - potential.energy(R_0))) < 1e-14 * potential.scale()  # measured 2e-15
+
+
+@potentials
+@settings(max_examples=30, deadline=None)
+@given(R=attitudes, exponent=st.floats(-18, -3))
+def test_finite_derivative_of_a_tiny_step_is_the_gradient(potential, R, exponent):
+    step = 10.0**exponent
+    there = R @ cayley(step * np.array([0.6, -0.7, 0.4]))
+    off = potential.finite_derivative(R, there) - potential.gradient(R)
+    assert np.abs(off).max() < (10 * step + 1e-9) * potential.scale()  # measured 3 step; 1e-10 round-off of the functions
+
+
+@potentials
+def test_torque_works_against_the_energy(potential):
+    R = rotation_about((1, -2, 0.5), 0.9)
+    for axis in np.eye(3):
+        gained = potential.energy(rotation_about(axis, 1e-5) @ R) - potential.energy(rotation_about(axis, -1e-5) @ R)
+        assert abs(gained / 2e-5 + torque_W(potential, R) @ axis) < 1e-8 * potential.scale()  # measured 2e-10
+
+
+@potentials
+def test_energy_of_many_attitudes_is_that_of_each(potential):
+    R = np.array([rotation_about((1, 2, 3), angle) for angle in (0.1, 0.5, 2.0)])
+    for one, energy, gradient in zip(R, potential.energy(R), potential.gradient(R), strict=True):
+        np.testing.assert_array_almost_equal_nulp(potential.energy(one), energy, 8)
+        np.testing.assert_allclose(potential.gradient(one), gradient, rtol=1e-14, atol=1e-15)
+
+
+@potentials
+def test_reduced_conserves_energy_and_momentum_along_the_axis(potential):
+    trajectory = cv.integrate(scene_in(potential), 0.02)
+    assert len(trajectory.scene.invariants) == (1 if potential.axis_W is None else 2)
+    for invariant in trajectory.scene.invariants:
+        value = invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B)
+        assert np.abs(value - value[0]).max() < 1e-14 * invariant.scale  # measured 2e-15
+
+
+@potentials
+def test_convected_and_reduced_are_the_same_map(potential):
+    scene = scene_in(potential, t_end=1.0)
+    convected, reduced = (cv.integrate(scene, 0.02, method) for method in (cv.Convected(tol=1e-13), cv.Reduced()))
+    assert angle_between(convected.R_WB, reduced.R_WB).max() < 1e-11  # measured 1e-12
+    drift = np.abs(convected.energy - convected.energy[0]).max()
+    assert drift < 1e-12 * scene.energy_scale  # measured 1e-13
+
+
+@potentials
+def test_motion_is_of_order_two(potential):
+    scene = scene_in(potential, t_end=1.0)
+    last = [cv.integrate(scene, dt).R_WB[-1] for dt in (0.01, 0.005, 0.0025)]
+    ratio = angle_between(last[0], last[1]) / angle_between(last[1], last[2])
+    assert abs(math.log2(ratio) - 2) < 0.01  # measured 1e-4
+
+
+def test_a_body_at_rest_falls_in_every_field():
+    for potential in POTENTIALS.values():
+        scene = scene_in(potential).renamed("at rest", w_WB_B0=(0, 0, 0))
+        trajectory = cv.integrate(scene, 0.01, t_end=0.3)
+        assert np.abs(trajectory.energy - trajectory.energy[0]).max() < 1e-14 * scene.energy_scale  # measured 1e-15
+        assert np.linalg.norm(trajectory.w_WB_B[-1]) > 0.01
+
+
+def test_functions_of_a_spring_move_as_the_compiled_spring():
+    spring = POTENTIALS["spring"]
+    functions = cv.FunctionPotential(spring.energy, spring.gradient)
+    compiled, called = (cv.integrate(scene_in(potential), 0.02) for potential in (spring, functions))
+    assert angle_between(compiled.R_WB, called.R_WB).max() < 1e-12  # measured 1e-14: both are exact for a quadratic
+
+
+def test_what_a_function_raises_while_integrating_is_told():
+    calls = []
+
+    def energy(R):
+        calls.append(R)
+        if len(calls) > 100:
+            raise ZeroDivisionError("the hundredth")
+        return 0.0
+
+    potential = cv.FunctionPotential(energy, lambda R: np.zeros((3, 3)), scale=1.0)
+    for method in (cv.Reduced(), cv.Convected()):
+        calls.clear()
+        with pytest.raises(cv.PotentialFailed, match="the hundredth") as caught:
+            cv.integrate(scene_in(potential), 0.02, method)
+        assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+@pytest.mark.parametrize(
+    ("make", "argument"),
+    [
+        (lambda: cv.LinearSpring(0, POINT, ANCHOR), "stiffness"),
+        (lambda: cv.LinearSpring(math.nan, POINT, ANCHOR), "stiffness"),
+        (lambda: cv.LinearSpring(1, (1, 2), ANCHOR), "point_B"),
+        (lambda: cv.LinearSpring(1, POINT, (1, 2, math.inf)), "anchor_W"),
+        (lambda: cv.LinearSpring(1, POINT, ANCHOR, -0.1), "rest_length"),
+        (lambda: cv.PointAttraction(0, POINT, ANCHOR), "strength"),
+        (lambda: cv.PointAttraction(1, (0, 0, 0), (0, 0, 0)), "anchor_W"),
+        (lambda: cv.GravityGradient(-1, INERTIA), "rate"),
+        (lambda: cv.GravityGradient(1, (1, 2, -3)), "inertia"),
+        (lambda: cv.GravityGradient(1, INERTIA, (0, 0, 0)), "direction_W"),
+        (lambda: cv.FunctionPotential(3, quartic_gradient), "energy"),
+        (lambda: cv.FunctionPotential(quartic_energy, None), "gradient"),
+        (lambda: cv.FunctionPotential(quartic_energy, lambda R: R[0]), "gradient"),
+        (lambda: cv.FunctionPotential(quartic_energy, lambda R: -quartic_gradient(R)), "gradient"),
+        (lambda: cv.FunctionPotential(quartic_energy, lambda R: quartic_gradient(R) * np.nan), "gradient"),
+        (lambda: cv.FunctionPotential(quartic_energy, quartic_gradient, scale=0), "scale"),
+    ],
+)
+def test_bad_parameters_are_named(make, argument):
+    with pytest.raises(cv.BadInput) as caught:
+        make()
+    assert caught.value.argument == argument
+    assert str(caught.value.got)
+    assert caught.value.allowed
+
+
+def test_parameters_cannot_be_changed():
+    spring = POTENTIALS["spring"]
+    with pytest.raises(AttributeError):
+        spring.stiffness = 2.0
+    with pytest.raises(ValueError, match="read-only"):
+        spring.point_B[0] = 1.0
