@@ -1,0 +1,174 @@
+"""Bad input over the whole public API and the command line: what is wrong, what was got, what is allowed, and nothing left behind.
+
+A row is a call, the argument that the message must name, a piece of what was got, and a piece of what is allowed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative import registry
+from references import exact
+from references.heyoka import Heyoka
+from references.mujoco import MuJoCo
+from references.pinocchio import Pinocchio
+from references.precise import Precise
+from references.scipy import SciPy
+from reports.cli import main
+
+NAN, INF = math.nan, math.inf
+ONE = np.eye(3)
+BODY = cv.RigidBody((1.0, 2.0, 2.5))
+BRICK = cv.scenes.brick_flip()
+TOP = cv.scenes.lagrange_top()
+SHEAR = ONE + 1e-3 * np.outer((1, 0, 0), (0, 1, 0))
+
+
+def scene(**changed):
+    arguments = {"name": "s", "body": BODY, "R_WB0": ONE, "w_WB_B0": (0, 0, 1), "t_end": 1.0} | changed
+    return cv.Scene(**arguments)
+
+
+API = [
+    # bodies
+    (lambda: cv.RigidBody((1, 2, NAN)), "inertia", "nan", "three positive moments"),
+    (lambda: cv.RigidBody((1, INF, 2)), "inertia", "inf", "three positive moments"),
+    (lambda: cv.RigidBody((1, -2, 2)), "inertia", "-2", "positive"),
+    (lambda: cv.RigidBody((1, 0, 2)), "inertia", "0.0", "positive"),
+    (lambda: cv.RigidBody([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), "inertia", "off by 0.1", "symmetric"),
+    (lambda: cv.RigidBody([[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "inertia", "-1", "positive definite"),
+    (lambda: cv.RigidBody((1, 2)), "inertia", "shape (2,)", "(3,)"),
+    (lambda: cv.RigidBody(np.eye(4)), "inertia", "shape (4, 4)", "(3, 3)"),
+    (lambda: cv.RigidBody("heavy"), "inertia", "'heavy'", "(3,)"),
+    # scenes
+    (lambda: scene(name=""), "name", "''", "one character"),
+    (lambda: scene(body=(1, 2, 3)), "body", "(1, 2, 3)", "RigidBody"),
+    (lambda: scene(R_WB0=SHEAR), "R_WB0", "|R'R - 1| = 0.001", "rotation"),
+    (lambda: scene(R_WB0=np.diag([1, 1, -1])), "R_WB0", "reflection", "determinant +1"),
+    (lambda: scene(R_WB0=2 * ONE), "R_WB0", "|R'R - 1| = 3", "rotation"),
+    (lambda: scene(R_WB0=(1, 0, 0, 0)), "R_WB0", "shape (4,)", "(3, 3)"),
+    (lambda: scene(R_WB0=np.full((3, 3), NAN)), "R_WB0", "not finite", "rotation"),
+    (lambda: scene(w_WB_B0=(0, 1)), "w_WB_B0", "shape (2,)", "(3,)"),
+    (lambda: scene(w_WB_B0=(0, NAN, 1)), "w_WB_B0", "nan", "finite"),
+    (lambda: scene(t_end=0), "t_end", "0", "above 0"),
+    (lambda: scene(t_end=-1), "t_end", "-1", "above 0"),
+    (lambda: scene(t_end=NAN), "t_end", "nan", "finite"),
+    (lambda: scene(t_end="long"), "t_end", "'long'", "finite"),
+    (lambda: scene(potential="gravity"), "potential", "'gravity'", "Potential"),
+    (lambda: scene(dt=-0.1), "dt", "-0.1", "above 0"),
+    # potentials
+    (lambda: cv.UniformGravity(NAN, (0, 0, 1)), "weight", "nan", "finite"),
+    (lambda: cv.UniformGravity(1.0, (0, 0)), "com_B", "shape (2,)", "(3,)"),
+    (lambda: cv.UniformGravity(1.0, (0, 0, INF)), "com_B", "inf", "finite"),
+    (lambda: cv.LinearSpring(INF, (1, 0, 0), (0, 0, 1)), "stiffness", "inf", "finite"),
+    (lambda: cv.LinearSpring(1.0, (1, 0), (0, 0, 1)), "point_B", "shape (2,)", "(3,)"),
+    (lambda: cv.PointAttraction(1.0, (1, 0, 0), (0, NAN, 1)), "anchor_W", "nan", "finite"),
+    (lambda: cv.GravityGradient(0.0, (1, 2, 2.5)), "rate", "0.0", "above 0"),
+    (lambda: cv.GravityGradient(1.0, (1, 2, 2.5), (0, 0, 0)), "direction_W", "[0.0, 0.0, 0.0]", "not all 0"),
+    # runs
+    (lambda: cv.integrate("brick_flip"), "scene", "'brick_flip'", "Scene"),
+    (lambda: cv.integrate(BRICK, 0), "dt", "0", "above 0"),
+    (lambda: cv.integrate(BRICK, -0.01), "dt", "-0.01", "above 0"),
+    (lambda: cv.integrate(BRICK, NAN), "dt", "nan", "finite"),
+    (lambda: cv.integrate(BRICK, True), "dt", "True", "finite"),
+    (lambda: cv.integrate(BRICK, 7.0), "dt", "7", "at most t_end = 6"),
+    (lambda: cv.integrate(BRICK, 0.01, t_end=-1), "t_end", "-1", "above 0"),
+    (lambda: cv.integrate(BRICK, 0.01, sample_every=0), "sample_every", "0", "1 or more"),
+    (lambda: cv.integrate(BRICK, 0.01, sample_every=1.5), "sample_every", "1.5", "integer"),
+    (lambda: cv.integrate(BRICK, 0.01, method="reduced"), "method", "'reduced'", "Method"),
+    (lambda: cv.integrate(BRICK, 0.01, on_failure="ignore"), "on_failure", "'ignore'", "'raise', 'return'"),
+    (lambda: cv.integrate(BRICK, error=0.0), "error", "0.0", "above 0"),
+    (lambda: cv.integrate(BRICK, error=NAN), "error", "nan", "finite"),
+    (lambda: cv.integrate(BRICK, method=cv.Reduced(), error=1e-6), "method", "Reduced", "None together with error"),
+    # methods
+    (lambda: cv.Convected(tol=0), "tol", "0", "above 0"),
+    (lambda: cv.Convected(tol=NAN), "tol", "nan", "finite"),
+    (lambda: cv.Reduced(tol=-1e-9), "tol", "-1e-09", "above 0"),
+    (lambda: cv.Reduced(order=3), "order", "3", "2, 4, 6, 8, 10"),
+    (lambda: cv.Gauss(stages=0), "stages", "0", "1 to 10"),
+    (lambda: cv.Gauss(stages=11), "stages", "11", "1 to 10"),
+    (lambda: cv.Gauss(frame="spinning"), "frame", "'spinning'", "'non_spinning'"),
+    (lambda: cv.MoserVeselov(order=3), "order", "3", "'exact'"),
+    (lambda: cv.integrate(TOP, 0.01, cv.MoserVeselov()), "method", "lagrange_top", "free bod"),
+    (lambda: cv.integrate(BRICK, 0.3, cv.MoserVeselov()), "dt", "0.3", "|w| dt < 1.5"),
+    (lambda: cv.integrate(BRICK, 0.01, cv.Gauss(frame="non_spinning")), "method", "brick_flip", "symmetric"),
+    (lambda: MuJoCo("RK5"), "integrator", "'RK5'", "'RK4'"),
+    (lambda: Pinocchio("verlet"), "scheme", "'verlet'", "RK4"),
+    (lambda: Heyoka(tol=0), "tol", "0", "above 0"),
+    (lambda: SciPy("Euler"), "integrator", "'Euler'", "DOP853"),
+    (lambda: SciPy(rtol=-1.0), "rtol", "-1.0", "below 1"),
+    (lambda: Precise(bits=10), "bits", "10", "53"),
+    (lambda: exact.free_body(BODY, SHEAR, (0, 0, 1), [0.0]), "R_WB0", "0.001", "rotation"),
+    (lambda: exact.free_body(BODY, ONE, (0, 0, 1), [0.0, NAN]), "t", "nan", "finite"),
+    # names
+    (lambda: registry.scene("brick_flipp"), "scene", "'brick_flipp'", "'brick_flip' (nearest)"),
+    (lambda: registry.scene("brick_flip:wobble=1"), "scene brick_flip", "wobble", "disturbance"),
+    (lambda: registry.method("mujocco"), "method", "'mujocco'", "'mujoco' (nearest)"),
+    (lambda: registry.method("mujoco:RK5"), "integrator", "'RK5'", "'RK4'"),
+    (lambda: registry.method("convected:eps=1e-8"), "method convected", "eps", "tol"),
+]
+
+
+@pytest.mark.parametrize(("call", "argument", "got", "allowed"), API, ids=[f"{i}-{row[1]}" for i, row in enumerate(API)])
+def test_api(call, argument, got, allowed, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(cv.BadInput) as caught:
+        call()
+    error = caught.value
+    assert error.argument == argument
+    before, _, after = str(error).partition("allowed:")
+    assert before.startswith(f"{argument}: got ")
+    assert got in before
+    assert allowed in after
+    assert not list(tmp_path.iterdir())
+
+
+@dataclass
+class Line:
+    """A command line, and what its one line on stderr must say."""
+
+    words: str
+    argument: str
+    got: str
+    allowed: str
+
+
+COMMANDS = [
+    Line("run brickflip", "scene", "'brickflip'", "'brick_flip' (nearest)"),
+    Line("run brick_flip --method redused", "method", "'redused'", "'reduced' (nearest)"),
+    Line("run brick_flip --dt 0 --csv out.csv", "dt", "0.0", "above 0"),
+    Line("run brick_flip --dt nan --csv out.csv", "dt", "nan", "finite"),
+    Line("run brick_flip --dt 100", "dt", "100", "at most t_end"),
+    Line("run brick_flip --dt fast", "--dt", "'fast'", "float"),
+    Line("run brick_flip --t-end -1", "t_end", "-1", "above 0"),
+    Line("run brick_flip -m convected:tol=-1", "tol", "-1", "above 0"),
+    Line("run lagrange_top -m moser_veselov", "method", "lagrange_top", "free bod"),
+    Line("run brick_flip --csv no/such/folder/out.csv", "csv", "no/such/folder", "folder"),
+    Line("run no_such_file.toml", "no_such_file.toml", "no_such_file.toml", "file"),
+    Line("report --scenes nope", "scene", "'nope'", "one of"),
+    Line("report --methods reduced,nope", "method", "'nope'", "one of"),
+    Line("report --out kept.txt", "out", "kept.txt", "folder"),
+    Line("reprot", "reprot", "reprot", "report"),
+]
+
+
+@pytest.mark.parametrize("line", COMMANDS, ids=[line.words for line in COMMANDS])
+def test_command_line(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kept.txt").write_text("mine")
+    outcome = CliRunner().invoke(main, line.words.split())
+    assert outcome.exit_code == 2, outcome.output
+    assert "Traceback" not in outcome.output
+    assert outcome.stdout == ""
+    for piece in (line.argument, line.got, line.allowed):
+        assert piece in outcome.stderr
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+    assert (tmp_path / "kept.txt").read_text() == "mine"
+
+
+def test_the_table_is_as_long_as_it_was_meant_to_be():
+    assert len(API) + len(COMMANDS) >= 60
