@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -142,15 +143,22 @@ def _body_rates(axes: Axes, R_WF: Array, u12: Array, u3: float) -> Array:
 
 
 def _heights(axes: Axes) -> tuple[float, float]:
-    """Return the lowest and highest n_z of a symmetric top: the roots about the start of the cubic J1^2 n_z'^2."""
+    """Return the lowest and highest n_z of a symmetric top: the roots, about the start, of the cubic that is J1^2 n_z'^2."""
     (J1, _, J3), M = axes.J.tolist(), float(axes.moment[2])
     n = float(axes.R_WF0[2, 2])
     l3, L3 = float(axes.R_WF0[2] @ (axes.J * axes.w0)), J3 * float(axes.w0[2])
     energy = J1 * float(axes.w0[:2] @ axes.w0[:2]) / 2 + M * n
     cubic = np.polysub(2 * J1 * np.polymul([-1, 0, 1], [-M, energy]), np.polymul([-L3, l3], [-L3, l3]))
     roots = np.roots(cubic)
-    real = roots[np.abs(roots.imag) < 1e-6].real
-    return max(real[real <= n + 1e-6], default=-1.0), min(real[real >= n - 1e-6], default=1.0)
+    turning = np.sort(roots[(np.abs(roots.imag) < 1e-6) & (np.abs(roots) < 1)].real)
+    ends = np.concatenate([[-1.0], turning, [1.0]])
+    # Where the start is a turning point itself, the motion is on the side on which the cubic is positive; on none if it stays.
+    reached = [
+        (low, high)
+        for low, high in pairwise(ends)
+        if low - 1e-6 <= n <= high + 1e-6 and np.polyval(cubic, (low + high) / 2) > 0
+    ]
+    return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
 
 
 def _circulating(axes: Axes) -> Axes:

@@ -16,32 +16,16 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Run
-from conservative.potential import Potential, UniformGravity
+from conservative.potential import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from . import taylor
 from .engine import Axes, version
-
-Number = Any
-"""A float, an `mpmath.mpf` or a text with as many digits as one likes."""
+from .fields import FIELDS, Field, Number
 
 Reals = NDArray[Any]
 """An array of `heyoka.real`."""
-
-
-@dataclass(frozen=True)
-class Field:
-    """A potential as expressions: the values of its parameters, and the torque in body axes from quaternion and parameters."""
-
-    values: Callable[[Any], Sequence[Number]]
-    torque: Callable[[Sequence[taylor.Expression], Sequence[taylor.Expression]], list[taylor.Expression]]
-
-
-FIELDS: dict[type[Potential], Field] = {
-    UniformGravity: Field(lambda potential: potential.moment_B.tolist(), lambda q, m: taylor.cross(taylor.vertical(q), m)),
-}
-"""Potentials that truth knows; one entry adds one."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +68,7 @@ class Precise(Method):
     def unsupported(self, scene: Scene) -> str | None:
         if scene.potential is None or type(scene.potential) in FIELDS:
             return None
-        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to references.precise.FIELDS"
+        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to references.fields.FIELDS"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         field = None if scene.potential is None else FIELDS[type(scene.potential)]

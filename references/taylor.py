@@ -137,6 +137,20 @@ def vertical(q: Sequence[Expression]) -> list[Expression]:
     return [2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]), 1 - 2 * (q[1] * q[1] + q[2] * q[2])]
 
 
+def to_body(q: Sequence[Expression], vector: Sequence[Expression]) -> list[Expression]:
+    """Return a vector given in world axes in body axes, for a unit q."""
+    rows = (
+        [1 - 2 * (q[2] * q[2] + q[3] * q[3]), 2 * (q[1] * q[2] - q[0] * q[3]), 2 * (q[1] * q[3] + q[0] * q[2])],
+        [2 * (q[1] * q[2] + q[0] * q[3]), 1 - 2 * (q[1] * q[1] + q[3] * q[3]), 2 * (q[2] * q[3] - q[0] * q[1])],
+        vertical(q),
+    )
+    found = [0.0, 0.0, 0.0]
+    for component, row in zip(vector, rows, strict=True):
+        if not _is_zero(component):
+            found = [x + component * y for x, y in zip(found, row, strict=True)]
+    return found
+
+
 def product(matrix: Sequence[Expression], vector: Sequence[Expression]) -> list[Expression]:
     """Return the product of a matrix (9, row by row) and a vector, without the terms that are zero."""
     terms = ([(c, v) for c, v in zip(matrix[i : i + 3], vector, strict=True) if not _is_zero(c)] for i in (0, 3, 6))
