@@ -1,4 +1,4 @@
-"""Bad input over the whole public API and the command line: what is wrong, what was got, what is allowed, and nothing left behind.
+"""Bad input over the public API and the command line: what is wrong, what was got, what is allowed, and nothing left behind.
 
 A row is a call, the argument that the message must name, a piece of what was got, and a piece of what is allowed.
 """
