@@ -47,11 +47,11 @@ def slopes(values):
 @pytest.mark.parametrize("name", ["free", "heavy"])
 def test_observed_order_is_the_one_claimed(method, name, request):
     attitude, rates, energy, momentum = slopes(errors(request.getfixturevalue(name), method))
-    # Measured over both scenes: 0.98 to 1.02 and 3.90 to 4.03, energy to 5.1.
-    assert attitude == pytest.approx(method.order, abs=0.12)
-    assert rates == pytest.approx(method.order, abs=0.12)
-    assert momentum > method.order - 0.12
-    assert energy > method.order - 0.12
+    # Measured over both scenes: 0.98 to 1.01 and 3.96 to 4.01.
+    assert attitude == pytest.approx(method.order, abs=0.1)
+    assert rates == pytest.approx(method.order, abs=0.1)
+    assert momentum > method.order - 0.1
+    assert energy > method.order - 0.1
 
 
 # Relative drift of energy on the brick after 6 s of steps of 0.01 s: (method, least, most).
@@ -71,4 +71,4 @@ def test_implicitfast_and_discrete_are_semi_implicit_euler_on_a_ball_joint(heavy
     """The implicit treatment of the gyroscopic term that they give a free joint is not given to a ball joint."""
     euler, *others = (MuJoCo(name).run(heavy, 0.01) for name in ("Euler", "implicitfast", "discrete"))
     for other in others:
-        assert angle_between(euler.R_WB, other.R_WB).max() < 1e-12  # measured 2e-15
+        assert angle_between(euler.R_WB, other.R_WB).max() < 1e-12  # measured 0
