@@ -14,6 +14,9 @@ from .errors import IntegrationFailed
 from .scene import Scene
 
 if TYPE_CHECKING:
+    import altair
+    import pandas
+
     from .chooser import Choice
 
 OK = "ok"
@@ -84,6 +87,37 @@ class Trajectory:
     def momentum_W(self) -> Array:
         """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row for each sample: t, R_WB (by rows), w_WB_B, energy, momentum_W; units as above.
+
+        Raises
+        ------
+        MissingEngine
+            pandas is not installed.
+        """
+        from .presentation import table
+
+        return table(self)
+
+    def plot(self) -> altair.VConcatChart:
+        """Return a chart of the body rates and of the drift of every invariant over time.
+
+        Raises
+        ------
+        BadInput
+            There are no samples.
+        MissingEngine
+            Altair or pandas is not installed.
+        """
+        from .presentation import picture
+
+        return picture(self)
+
+    def _repr_html_(self) -> str:
+        from .presentation import card
+
+        return card(self)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -71,9 +71,9 @@ def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | No
     """Return where the body's joints hold it (3,), m, world axes; None if it is free."""
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     joints = range(first, first + count)
-    if any(model.jnt_type[joint] == mj.mjtJoint.mjJNT_FREE for joint in joints):
+    if any(model.jnt_type[joint] == int(mj.mjtJoint.mjJNT_FREE) for joint in joints):
         return None
-    turning = (mj.mjtJoint.mjJNT_BALL, mj.mjtJoint.mjJNT_HINGE)
+    turning = (int(mj.mjtJoint.mjJNT_BALL), int(mj.mjtJoint.mjJNT_HINGE))  # NumPy's integers never equal the enumeration's
     anchors = np.array([data.xanchor[joint] for joint in joints if model.jnt_type[joint] in turning])
     if not len(anchors):
         others = [

@@ -71,7 +71,7 @@ def test_the_template_loads_as_it_is_and_integrates(written):
     np.testing.assert_allclose(scene.potential.moment_B, cone.gravity(9.81).moment_B, rtol=1e-15)
     trajectory = cv.integrate(scene, scene.dt, t_end=0.1)
     drift = np.abs(trajectory.energy - trajectory.energy[0]).max() / scene.energy_scale
-    assert drift < 1e-13  # measured 8e-16
+    assert drift < 1e-13  # measured 5e-16
 
 
 @pytest.mark.parametrize(

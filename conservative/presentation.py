@@ -1,0 +1,142 @@
+"""How a trajectory looks: as a table, as a picture, as a card in a notebook. pandas and Altair are imported when asked for."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .errors import BadInput, MissingEngine
+
+if TYPE_CHECKING:
+    import altair
+    import pandas
+
+    from .attitude import Array
+    from .invariants import Invariant
+    from .trajectory import Trajectory
+
+COLUMNS = (
+    "t",
+    *(f"R_WB_{row}{column}" for row in "123" for column in "123"),
+    *(f"w_WB_B_{axis}" for axis in "123"),
+    "energy",
+    *(f"momentum_W_{axis}" for axis in "123"),
+)
+"""Columns of a table of samples: s; R_WB by rows; rad/s, body axes; J; kg m^2/s, world axes."""
+
+LEAST_DRAWN = 1e-17
+"""Relative drift at which smaller ones are drawn, 0 too: a tenth of the round-off of one number."""
+
+MOST_DRAWN = 1000
+"""Samples that a picture has at most, evenly chosen: more than its pixels, fewer than the 5,000 rows that Altair takes."""
+
+_WIDTH, _HEIGHT = 480, 160
+
+
+def samples(trajectory: Trajectory) -> Array:
+    """Return the samples (n, 17) under `COLUMNS`."""
+    R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
+    return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
+
+
+def drift(trajectory: Trajectory, invariant: Invariant) -> Array:
+    """Return the change (n,) of an invariant since the scene's start, relative to its scale; of a vector its length."""
+    scene = trajectory.scene
+    start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
+    change = (invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B) - start) / invariant.scale
+    return np.abs(change) if change.ndim == 1 else np.linalg.norm(change, axis=-1)
+
+
+def table(trajectory: Trajectory) -> pandas.DataFrame:
+    """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and status.
+
+    Raises
+    ------
+    MissingEngine
+        pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError:
+        raise MissingEngine("pandas", "pandas") from None
+    frame = pd.DataFrame(samples(trajectory), columns=list(COLUMNS))
+    frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "status": trajectory.status}
+    return frame
+
+
+def picture(trajectory: Trajectory) -> altair.VConcatChart:
+    """Return the body rates, and under them the drift of every invariant, over time; zoom and hover for values.
+
+    Raises
+    ------
+    BadInput
+        The trajectory has no samples.
+    MissingEngine
+        Altair or pandas is not installed.
+    """
+    try:
+        import altair as alt
+    except ImportError:
+        raise MissingEngine("altair", "altair") from None
+    if not len(trajectory):
+        raise BadInput("trajectory", repr(trajectory), "one with a sample or more")
+    rates = {f"about axis {number}": rate for number, rate in enumerate(trajectory.w_WB_B.T, start=1)}
+    drifts = {
+        invariant.name: np.maximum(drift(trajectory, invariant), LEAST_DRAWN) for invariant in trajectory.scene.invariants
+    }
+    title = alt.Title(trajectory.scene.name, subtitle=[trajectory.label, trajectory.status])
+    rows = [
+        _lines(trajectory, rates, "body rate, rad/s", "linear"),
+        _lines(trajectory, drifts, "relative drift", "log"),
+    ]
+    chart: altair.VConcatChart = alt.vconcat(*rows, title=title).resolve_scale(color="independent")
+    return chart
+
+
+def _lines(trajectory: Trajectory, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
+    """Return one line for each of `series`, (n,), over time."""
+    import altair as alt
+    import pandas as pd
+
+    drawn = np.unique(np.linspace(0, len(trajectory) - 1, MOST_DRAWN).astype(int))
+    t = trajectory.t[drawn]
+    data = pd.concat([pd.DataFrame({"t": t, "of": name, "value": values[drawn]}) for name, values in series.items()])
+    chart: altair.Chart = (
+        alt.Chart(data, width=_WIDTH, height=_HEIGHT)
+        .mark_line()
+        .encode(
+            x=alt.X("t:Q", title="time, s"),
+            y=alt.Y(
+                "value:Q", title=quantity, axis=alt.Axis(format=".0e" if scale == "log" else ""), scale=alt.Scale(type=scale)
+            ),
+            color=alt.Color("of:N", title=quantity, sort=list(series)),
+            tooltip=[
+                alt.Tooltip("of:N", title="what"),
+                alt.Tooltip("t:Q", title="time, s"),
+                alt.Tooltip("value:Q", format=".6g"),
+            ],
+        )
+        .interactive(name=f"zoom_{scale}", bind_y=False)
+    )
+    return chart
+
+
+def card(trajectory: Trajectory) -> str:
+    """Return a small HTML table: what was run, how it ended, what it cost and what drifted."""
+    work = [f"{count} {name}" for name, count in vars(trajectory.counters).items() if count is not None]
+    end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"
+    rows = [
+        ("scene", trajectory.scene.name),
+        ("method", trajectory.label),
+        ("status", trajectory.status),
+        ("samples", f"{len(trajectory)} to {end}"),
+        ("work", ", ".join(work)),
+        *(
+            (f"drift of {i.name}", f"{drift(trajectory, i).max(initial=0.0):.2e} (relative)")
+            for i in trajectory.scene.invariants
+        ),
+    ]
+    body = "".join(f'<tr><th scope="row" style="text-align:left">{escape(k)}</th><td>{escape(v)}</td></tr>' for k, v in rows)
+    return f"<table><caption>Trajectory</caption>{body}</table>"

@@ -1,0 +1,213 @@
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry, scene_file
+from conservative.attitude import from_quaternion, rotation_about
+from references.model_files import body_from_mjcf, body_from_urdf
+
+# One body of generic parameters, written in every way that a format has.
+MASS, COM, ANCHOR = 2.5, np.array([0.1, -0.2, 0.3]), np.array([-0.05, 0.07, 0.02])
+MOMENTS = np.array([0.5, 0.6, 0.7])
+RPY = (0.3, -0.5, 0.7)
+R_BI = rotation_about((0, 0, 1), RPY[2]) @ rotation_about((0, 1, 0), RPY[1]) @ rotation_about((1, 0, 0), RPY[0])
+TENSOR_I = np.array([[0.5, 0.01, -0.02], [0.01, 0.6, 0.03], [-0.02, 0.03, 0.7]])
+QUATERNION = np.array([0.8, 0.2, -0.4, 0.4])  # scalar first, of unit length
+
+
+def about(com, inertia_com, mass=MASS):
+    """Return the inertia about the point from which `com` is, by the sum over (c.c 1 - c c')."""
+    return inertia_com + mass * (com @ com * np.eye(3) - np.outer(com, com))
+
+
+def numbers(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="robot.xml"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def mjcf(inside, pose='pos="1 2 3" quat="0.5 0.5 -0.5 0.5"'):
+    return f"""<mujoco><worldbody><body name="carrier"><freejoint/><geom type="sphere" size="0.1"/>
+    <body name="arm" {pose}>{inside}</body></body></worldbody></mujoco>"""
+
+
+JOINT = f'<joint type="ball" pos="{numbers(ANCHOR)}"/>'
+FULL = (
+    f'<inertial mass="{MASS}" pos="{numbers(COM)}" fullinertia="0.5 0.6 0.7 0.01 -0.02 0.03"/>',
+    TENSOR_I,
+)
+TURNED = (
+    f'<inertial mass="{MASS}" pos="{numbers(COM)}" quat="{numbers(QUATERNION)}" diaginertia="{numbers(MOMENTS)}"/>',
+    from_quaternion(QUATERNION) @ np.diag(MOMENTS) @ from_quaternion(QUATERNION).T,
+)
+
+
+@pytest.mark.parametrize(("inertial", "inertia_com"), [FULL, TURNED], ids=["fullinertia", "turned diaginertia"])
+def test_an_mjcf_body_turns_about_its_joint(written, inertial, inertia_com):
+    found = body_from_mjcf(written(mjcf(JOINT + inertial)), "arm")
+    assert found.mass == MASS
+    np.testing.assert_allclose(found.com_B, COM - ANCHOR, atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(found.inertia, about(COM - ANCHOR, inertia_com), atol=1e-12)  # measured 7e-15
+
+
+def test_hinges_through_one_point_are_a_fixed_point(written):
+    hinges = "".join(f'<joint type="hinge" axis="{axis}" pos="{numbers(ANCHOR)}"/>' for axis in ("1 0 0", "0 1 0.5"))
+    found = body_from_mjcf(written(mjcf(hinges + FULL[0])), "arm")
+    np.testing.assert_allclose(
+        found.inertia, about(COM - ANCHOR, TENSOR_I), atol=1e-12
+    )  # measured 7e-15, MuJoCo's principal axes
+
+
+def test_a_free_mjcf_body_turns_about_its_centre(written):
+    text = (
+        f'<mujoco><worldbody><body name="arm" pos="1 2 3" euler="10 20 30"><freejoint/>{TURNED[0]}</body></worldbody></mujoco>'
+    )
+    found = body_from_mjcf(written(text), "arm")
+    np.testing.assert_array_equal(found.com_B, np.zeros(3))
+    np.testing.assert_allclose(found.inertia, TURNED[1], atol=1e-12)  # measured 4e-16
+
+
+def test_what_is_welded_to_an_mjcf_body_counts_and_what_hangs_on_a_joint_does_not(written):
+    pose = f'pos="0.3 0.1 -0.2" quat="{numbers(QUATERNION)}"'
+    welded = f'<body name="tip" {pose}><inertial mass="0.5" pos="0.01 0.02 0.03" diaginertia="0.05 0.06 0.07"/></body>'
+    hanging = f'<body name="child" pos="1 1 1"><joint type="ball"/>{TURNED[0]}</body>'
+    found = body_from_mjcf(written(mjcf(JOINT + FULL[0] + welded + hanging)), "arm")
+    R = from_quaternion(QUATERNION)
+    com_tip = np.array([0.3, 0.1, -0.2]) + R @ (0.01, 0.02, 0.03) - ANCHOR
+    expected = about(COM - ANCHOR, TENSOR_I) + about(com_tip, R @ np.diag([0.05, 0.06, 0.07]) @ R.T, 0.5)
+    assert found.mass == pytest.approx(3.0, rel=1e-15)
+    np.testing.assert_allclose(found.com_B, (MASS * (COM - ANCHOR) + 0.5 * com_tip) / 3, atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(found.inertia, expected, atol=1e-12)  # measured 7e-15
+
+
+SMALL = '<inertial><mass value="0.5"/><inertia ixx="0.05" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def urdf(joint="revolute", inertial=True):
+    values = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), (0.5, 0.6, 0.7, 0.01, -0.02, 0.03), strict=True))
+    inertia = "<inertia " + " ".join(f'{name}="{value}"' for name, value in values.items()) + "/>"
+    origin = f'<origin xyz="{numbers(COM)}" rpy="{numbers(RPY)}"/>'
+    body = f'<inertial>{origin}<mass value="{MASS}"/>{inertia}</inertial>' if inertial else ""
+    return f"""<robot name="r"><link name="base">{SMALL}</link><link name="arm">{body}</link><link name="tip"/>
+    <joint name="j" type="{joint}"><parent link="base"/><child link="arm"/><origin xyz="1 2 3" rpy="0.1 0.2 0.3"/>
+    <axis xyz="0.6 0 0.8"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="f" type="fixed"><parent link="arm"/><child link="tip"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("joint", ["revolute", "continuous"])
+def test_a_urdf_link_turns_about_its_joint(written, joint):
+    found = body_from_urdf(written(urdf(joint), "robot.urdf"), "arm")
+    assert found.mass == MASS
+    np.testing.assert_allclose(found.com_B, COM, atol=1e-15)  # measured 0
+    np.testing.assert_allclose(found.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T), atol=1e-14)  # measured 6e-17
+
+
+def test_the_root_of_a_urdf_is_free(written):
+    found = body_from_urdf(written(urdf(), "robot.urdf"), "base")
+    np.testing.assert_array_equal(found.com_B, np.zeros(3))
+    np.testing.assert_allclose(found.inertia, np.diag([0.05, 0.06, 0.07]), atol=1e-16)
+
+
+def test_what_is_welded_to_a_urdf_link_counts(written):
+    text = urdf().replace(
+        '<link name="tip"/>',
+        f'<link name="tip">{SMALL}</link>',
+    )
+    weld = '<child link="tip"/><origin xyz="0.3 0.1 -0.2" rpy="0.3 -0.5 0.7"/></joint></robot>'
+    found = body_from_urdf(written(text.replace('<child link="tip"/></joint></robot>', weld), "robot.urdf"), "arm")
+    welded = about(np.array([0.3, 0.1, -0.2]), R_BI @ np.diag([0.05, 0.06, 0.07]) @ R_BI.T, 0.5)
+    assert found.mass == pytest.approx(3.0, rel=1e-15)
+    np.testing.assert_allclose(found.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T) + welded, atol=1e-14)  # measured 9e-16
+
+
+def test_both_formats_say_the_same(written):
+    inertial = f'<inertial mass="{MASS}" pos="{numbers(COM)}" fullinertia="0.5 0.6 0.7 0.01 -0.02 0.03"/>'
+    by_mujoco = body_from_mjcf(written(mjcf('<joint type="hinge"/>' + inertial)), "arm")
+    untilted = urdf().replace(numbers(RPY), "0 0 0")
+    by_pinocchio = body_from_urdf(written(untilted, "robot.urdf"), "arm")
+    np.testing.assert_allclose(by_mujoco.inertia, by_pinocchio.inertia, atol=1e-12)  # measured 7e-15
+
+
+SCENE = """t_end = 1.0
+[body]
+{kind} = "{file}"
+name = "{name}"
+{more}
+[potential]
+kind = "uniform_gravity"
+g = 9.81
+[start]
+w_WB_B = [1, 2, 3]
+"""
+
+
+@pytest.mark.parametrize(("kind", "text", "lever"), [("mjcf", mjcf(JOINT + FULL[0]), COM - ANCHOR), ("urdf", urdf(), COM)])
+def test_a_scene_file_takes_a_body_of_another_file_in_its_folder(written, tmp_path, kind, text, lever):
+    written(text, f"robot.{kind}")
+    scene = registry.scene(str(written(SCENE.format(kind=kind, file=f"robot.{kind}", name="arm", more=""), "my.toml")))
+    tensor = TENSOR_I if kind == "mjcf" else R_BI @ TENSOR_I @ R_BI.T
+    np.testing.assert_allclose(scene.body.inertia, about(lever, tensor), atol=1e-12)  # measured 7e-15
+    np.testing.assert_allclose(scene.potential.moment_B, MASS * 9.81 * lever, rtol=1e-13)  # measured 2e-16
+    path = written(SCENE.format(kind=kind, file=f"robot.{kind}", name="arm", more="com_B = [0, 0, 0.5]"), "my.toml")
+    overridden = scene_file.load(path).body.inertia
+    np.testing.assert_allclose(overridden, about(np.array([0, 0, 0.5]), tensor), atol=1e-12)  # measured 7e-15
+
+
+def test_a_body_that_is_not_in_the_file_is_answered_at_the_line_of_its_name(written):
+    written(urdf(), "robot.urdf")
+    path = written(SCENE.format(kind="urdf", file="robot.urdf", name="arn", more=""), "my.toml")
+    with pytest.raises(cv.BadInput) as caught:
+        scene_file.load(path)
+    assert caught.value.argument == f"{path}, line 4: body.name"
+    assert "'arn', which is not in" in caught.value.got
+    assert "'arm' (nearest)" in caught.value.allowed
+
+
+SLIDE = '<joint type="slide"/>'
+APART = '<joint type="hinge"/><joint type="hinge" axis="1 0 0" pos="0 0 0.1"/>'
+BAD = {
+    "mjcf: no file": (body_from_mjcf, None, "arm", "path", "No such file", "<mujoco>"),
+    "mjcf: no XML": (body_from_mjcf, "hello", "arm", "path", "line 1", "<mujoco>"),
+    "mjcf: a URDF": (body_from_mjcf, urdf(), "arm", "path", "root element <robot>", "<mujoco>"),
+    "mjcf: not compiled": (body_from_mjcf, mjcf(JOINT), "arm", "path", "mass and inertia", "MuJoCo compiles"),
+    "mjcf: unknown": (body_from_mjcf, mjcf(JOINT + FULL[0]), "amr", "name", "'amr', which is not in", "'arm' (nearest)"),
+    "mjcf: world": (body_from_mjcf, mjcf(JOINT + FULL[0]), "world", "name", "'world'", "arm, carrier"),
+    "mjcf: welded": (body_from_mjcf, mjcf(FULL[0]), "arm", "name", "which no joint turns", "a joint turns"),
+    "mjcf: slides": (body_from_mjcf, mjcf(SLIDE + FULL[0]), "arm", "name", "which no joint turns", "a joint turns"),
+    "mjcf: joints apart": (body_from_mjcf, mjcf(APART + FULL[0]), "arm", "name", "0.1 m apart", "through one point"),
+    "urdf: no file": (body_from_urdf, None, "arm", "path", "No such file", "<robot>"),
+    "urdf: no XML": (body_from_urdf, "<robot", "arm", "path", "line 1", "<robot>"),
+    "urdf: an MJCF": (body_from_urdf, mjcf(JOINT), "arm", "path", "root element <mujoco>", "<robot>"),
+    "urdf: unknown": (body_from_urdf, urdf(), "amr", "name", "'amr', which is not in", "'arm' (nearest)"),
+    "urdf: welded": (body_from_urdf, urdf(), "tip", "name", "which no joint turns", "arm, base"),
+    "urdf: slides": (body_from_urdf, urdf("prismatic"), "arm", "name", "which no joint turns", "a joint turns: base"),
+    "urdf: no mass": (body_from_urdf, urdf(inertial=False), "arm", "name", "has no mass", "mass and inertia"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_named(written, tmp_path, case):
+    read, text, name, argument, got, allowed = BAD[case]
+    path = tmp_path / "no.xml" if text is None else written(text)
+    with pytest.raises(cv.BadInput) as caught:
+        read(path, name)
+    assert caught.value.argument == argument
+    assert got in caught.value.got
+    assert allowed in caught.value.allowed
+
+
+def test_loaders_are_registered_and_unknown_kinds_named():
+    assert list(registry.registered(registry.BODY_FILES)) == ["mjcf", "urdf"]
+    assert registry.body_file("mjcf") is body_from_mjcf
+    with pytest.raises(cv.BadInput) as caught:
+        registry.body_file("urfd")
+    assert (caught.value.argument, caught.value.got) == ("kind of file", "'urfd'")
+    assert "'urdf' (nearest)" in caught.value.allowed
