@@ -6,6 +6,7 @@ trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 """
 
 from . import scenes as scenes
+from . import shapes as shapes
 from .body import RigidBody as RigidBody
 from .collocation import Gauss as Gauss
 from .convected import Convected as Convected
