@@ -184,7 +184,9 @@ def calibration_series(p, tau):
     """
     # On a symmetric body whose momentum lies across the axis both sides of K3 = c3 / (...) vanish; the limit is even in A3.
     A3 = max(p.A3, 1e-8 * p.l)
-    nu = p.nu * tau if p.A3 >= A3 or p.nu == 0.0 else math.copysign(abs(1.0 / p.J1 - 1.0 / p.J3) * A3 * tau, p.nu)
+    nu = p.nu * tau
+    if p.A3 < A3 and p.J3 != p.J2:
+        nu = (1.0 / p.J1 - 1.0 / p.J3) * A3 * tau
     s, c, d, e, w = np.zeros(TERMS), np.zeros(TERMS), np.zeros(TERMS), np.zeros((3, TERMS)), np.zeros((3, TERMS))
     ew = np.zeros(TERMS)
     c[0], d[0] = 1.0, 1.0

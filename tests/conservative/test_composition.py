@@ -1,0 +1,98 @@
+"""Sets of coefficients: their order conditions, their symmetry, the order that a run shows, and wrong digits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, rotation_about
+from conservative.composition import BEST, COMPOSITIONS, Composition, composition_of
+
+TURN = rotation_about((1, 2, 3), 0.8)
+TOP = cv.Scene(
+    "generic top",
+    cv.RigidBody(TURN @ np.diag([2.0, 1.5, 0.9]) @ TURN.T),
+    rotation_about((1, -1, 0.4), 0.9),
+    TURN @ [0.5, -0.3, 4.0],
+    3.0,
+    cv.UniformGravity(9.0, TURN @ [0.1, 0.05, 0.6]),
+)
+REFERENCE = {}
+# Steps over the run: coarse enough that the error stands well above round-off, fine enough that the leading term rules it.
+STEPS = {2: (200, 400, 800, 1600), 4: (100, 200, 400, 800), 6: (60, 90, 135, 200), 8: (30, 40, 55, 75), 10: (14, 18, 23, 30)}
+
+
+def reference() -> np.ndarray:
+    if not REFERENCE:
+        REFERENCE["R"] = cv.Gauss(10).run(TOP, 0.01).R_WB[-1]
+    return REFERENCE["R"]
+
+
+@pytest.mark.parametrize("name", COMPOSITIONS)
+def test_lengths_are_symmetric_and_add_up(name: str) -> None:
+    found = COMPOSITIONS[name]
+    assert len(found.weights) == found.stages
+    assert found.weights == found.weights[::-1]
+    for dt in (0.01, 0.3, 1 / 7):
+        lengths = found.lengths(dt)
+        assert lengths == lengths[::-1]
+        # Rounding of the middle length alone is left: half a unit in its last place.
+        off = abs(sum(Fraction(length) for length in lengths) - Fraction(dt))
+        assert off <= Fraction(abs(lengths[found.stages // 2])) / 2**53
+
+
+@pytest.mark.parametrize("name", COMPOSITIONS)
+def test_a_run_shows_the_claimed_order(name: str) -> None:
+    found = COMPOSITIONS[name]
+    method = cv.Reduced(found.order, name)
+    # The coarsest and the most accurate set need finer steps until the leading term rules.
+    finer = {"forest_ruth_3": 2, "hairer_lubich_wanner_33": 1.3}.get(name, 1)
+    steps = np.floor(finer * np.array(STEPS[found.order]))
+    errors = [float(angle_between(reference(), method.run(TOP, 3.0 / n, sample_every=10**9).R_WB[-1])) for n in steps]
+    slope = np.polyfit(np.log(1 / steps), np.log(errors), 1)[0]
+    assert abs(slope - found.order) < 0.35  # measured within 0.1 up to order 8, 9.75 and 9.86 for order 10
+
+
+@pytest.mark.parametrize("order", BEST)
+def test_energy_and_vertical_momentum_are_kept_at_every_order(order: int) -> None:
+    trajectory = cv.Reduced(order).run(TOP, 0.05)
+    vertical = trajectory.momentum_W[:, 2]
+    assert np.ptp(trajectory.energy) / TOP.energy_scale < 3e-15  # measured 8e-16
+    assert np.ptp(vertical) / np.linalg.norm(trajectory.momentum_W[0]) < 3e-14  # measured 2e-15
+
+
+def test_a_wrong_digit_does_not_get_in() -> None:
+    good = COMPOSITIONS["kahan_li_9"]
+    wrong = good.half[0][:12] + str((int(good.half[0][12]) + 1) % 10) + good.half[0][13:]
+    with pytest.raises(cv.BadInput, match="half"):
+        replace(good, half=(wrong, *good.half[1:]))
+    with pytest.raises(cv.BadInput, match="order"):
+        replace(good, order=3)
+    with pytest.raises(cv.BadInput, match="half"):
+        Composition("suzuki as order 6", 6, "", COMPOSITIONS["suzuki_5"].half)
+
+
+def test_the_default_set_is_the_best_of_its_order() -> None:
+    for order, name in BEST.items():
+        assert composition_of(order) is COMPOSITIONS[name]
+        rivals = [known for known in COMPOSITIONS.values() if known.order == order]
+        # As many stages for each, hence about as much work: 3 s in about 990 stages, for order 10 in 400.
+        work = 400 if order == 10 else 990
+        errors = {}
+        for rival in rivals:
+            n = round(work / rival.stages)
+            run = cv.Reduced(order, rival.name).run(TOP, 3.0 / n, sample_every=10**9)
+            errors[rival.name] = float(angle_between(reference(), run.R_WB[-1]))
+        assert min(errors, key=lambda rival: errors[rival]) == name
+
+
+@pytest.mark.parametrize(
+    ("order", "name"), [(3, None), (0, None), (True, None), ("4", None), (4, "kahan_li_9"), (4, "no_such")]
+)
+def test_unknown_orders_and_names_are_refused(order: object, name: str | None) -> None:
+    with pytest.raises(cv.BadInput):
+        cv.Reduced(order, name)
