@@ -20,6 +20,7 @@ from .errors import Unsupported as Unsupported
 from .function_potential import FunctionPotential as FunctionPotential
 from .gravity_gradient import GravityGradient as GravityGradient
 from .invariants import Invariant as Invariant
+from .lame import Lame as Lame
 from .method import Grid as Grid
 from .method import Method as Method
 from .method import integrate as integrate

@@ -25,9 +25,9 @@ class Gauss(Method):
     """Collocation at s Gauss points: order 2s; energy, momenta and orthonormality to round-off, whatever the step.
 
     In the body momentum L and the vertical gamma = R' e_z (of a free body: the direction of the world momentum) the motion is a
-    closed system with quadratic invariants only, and collocation at Gauss points keeps all of those (Hairer, Lubich & Wanner, IV.2.1).
-    The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is the
-    implicit midpoint rule.
+    closed system with quadratic invariants only, and collocation at Gauss points keeps all of those (Hairer, Lubich & Wanner,
+    IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
+    the implicit midpoint rule.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Gauss collocation for a body with a fixed point in uniform gravity or without a field.
 
-Unknowns are the momentum L and the vertical gamma = R' e_z, both in principal axes (for a free body gamma is the direction of the
-world momentum): a closed system of six with quadratic invariants only,
+Unknowns are the momentum L and the vertical gamma = R' e_z, both in principal axes (for a free body gamma is the direction of
+the world momentum): a closed system of six with quadratic invariants only,
 
     L' = L x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
 
@@ -68,7 +68,7 @@ def stages_from(A, h, F, U, D, Z):
 
 @kernel
 def swept(A, h, J_inverse, c, U, F, D, Z):
-    """Iterate D = h A f(U + D) to stagnation; return (sweeps, last change, whether it got there)."""
+    """Iterate D = h A f(U + D) to stagnation; return (sweeps, last change, success)."""
     before = math.inf
     for sweep in range(1, MAX_SWEEPS + 1):
         rates(J_inverse, c, Z, F)
@@ -84,7 +84,7 @@ def swept(A, h, J_inverse, c, U, F, D, Z):
 
 @kernel
 def newton(A, h, J_inverse, c, U, F, D, Z):
-    """Solve the same equations by Newton from an explicit Euler guess; return (iterations, last change, whether it got there)."""
+    """Solve the same equations by Newton from an explicit Euler guess; return (iterations, last change, success)."""
     s = A.shape[0]
     tangent = np.empty((6 * s, 6 * s))
     residual = np.empty(6 * s)
@@ -183,7 +183,8 @@ def turn_rate(h, b, chart, J_inverse, Z):
 def march(A, A_low, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_out, L_out):
     """Take n_steps steps of h s and store attitude and momentum of every `every`-th and the last.
 
-    Returns (steps done, sweeps and Newton corrections, size of the last change). Steps done < n_steps: the next did not converge.
+    Returns (steps done, sweeps and Newton corrections, size of the last change); steps done < n_steps means that the next one
+    did not converge.
     """
     s = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)

@@ -10,11 +10,13 @@ from conservative.tableau import MOST_STAGES, tableau
 
 
 def generic(kind: str, seed: int = 0) -> cv.Scene:
-    """A body in axes of its own: free, asymmetric in gravity, or symmetric with its centre of mass on either side of the tip."""
+    """A body in axes of its own: free, asymmetric in gravity, or symmetric with its centre of mass on either side."""
     random = np.random.default_rng(seed)
     turn = rotation_about(random.normal(size=3), random.uniform(0.5, 3))
     moments = (1.1, 1.1, 0.6) if kind.startswith("symmetric") else (0.9, 1.7, 1.2)
-    com = {"free": None, "asymmetric": random.normal(size=3), "symmetric+": 0.5 * turn[:, 2], "symmetric-": -0.5 * turn[:, 2]}[kind]
+    com = {"free": None, "asymmetric": random.normal(size=3), "symmetric+": 0.5 * turn[:, 2], "symmetric-": -0.5 * turn[:, 2]}[
+        kind
+    ]
     return cv.Scene(
         kind,
         cv.RigidBody(turn @ np.diag(moments) @ turn.T),
@@ -130,7 +132,7 @@ def test_round_off_grows_like_the_root_of_the_steps() -> None:
 
 @pytest.mark.parametrize("stages", [0, 11, 2.0, "6", True])
 def test_refuses_other_stages(stages: object) -> None:
-    with pytest.raises(cv.BadInput, match="stages: got .*; allowed: an integer of 1 to 10"):
+    with pytest.raises(cv.BadInput, match=r"stages: got .*; allowed: an integer of 1 to 10"):
         cv.Gauss(stages)  # type: ignore[arg-type]
 
 

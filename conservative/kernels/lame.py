@@ -1,0 +1,233 @@
+"""The step of the symmetric top by addition theorems, and its constants; derivation and symbols in `conservative/lame.py`.
+
+State: attitude q of the slow frame, whose third axis is the body's, and momentum L in its axes. Quaternions are scalar first.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import kernel
+from .twofold import minus, over, plus, scaled, times, two
+from .vector import dot, product
+
+TERMS = 22
+SERIES_RADIUS = 0.125
+DAMPING = 0.3
+LARGEST_POLE = 1.5
+
+
+@kernel
+def curve(J, kappa, gamma, L):
+    """Twofold E, z, w3, k/2, -E/6, g2, g3 and the three B (alpha, beta, M); gamma need be a unit vector to round-off only."""
+    Ji = over(two(1.0), two(J))
+    square = plus(
+        plus(times(two(gamma[0]), two(gamma[0])), times(two(gamma[1]), two(gamma[1]))), times(two(gamma[2]), two(gamma[2]))
+    )
+    # 1/|gamma| = 1 - (|gamma|^2 - 1)/2 up to the square of a rounding error
+    inverse = minus(two(1.5), scaled(0.5, square))
+    g = (times(inverse, two(gamma[0])), times(inverse, two(gamma[1])), times(inverse, two(gamma[2])))
+    w = (scaled(L[0], Ji), scaled(L[1], Ji), scaled(L[2], Ji))
+    k = scaled(kappa, Ji)
+    ww = plus(plus(times(w[0], w[0]), times(w[1], w[1])), times(w[2], w[2]))
+    E = plus(scaled(0.5, ww), times(k, g[2]))
+    z = plus(plus(times(w[0], g[0]), times(w[1], g[1])), times(w[2], g[2]))
+    nu, x0 = scaled(0.5, k), times(E, over(two(-1.0), two(6.0)))
+    upper = plus(x0, nu)
+    g2 = minus(scaled(12.0, times(x0, x0)), scaled(2.0, times(nu, minus(times(z, w[2]), scaled(2.0, nu)))))
+    slip = times(nu, minus(z, w[2]))
+    g3 = plus(minus(scaled(4.0, times(upper, times(upper, upper))), times(g2, upper)), times(slip, slip))
+    B_M = minus(scaled(-2.0, x0), scaled(0.25, times(w[2], w[2])))
+    return E, z, w[2], nu, x0, g2, g3, np.array((minus(x0, nu), upper, B_M))
+
+
+@kernel
+def scale_of(g2, g3, B):
+    """A rate, 1/s, above which the series of this curve have nothing left to resolve."""
+    size = max(math.sqrt(abs(g2[0])), abs(g3[0]) ** (1.0 / 3.0))
+    for n in range(3):
+        size = max(size, abs(B[n, 0]))
+    return math.sqrt(size)
+
+
+@kernel
+def series(g2, g3, B, t):
+    """p, p' and for each of three B the regular solution f of f'' = (2 p + B) f and f', at a short time t (twofold)."""
+    c = np.zeros((TERMS, 2))
+    T = times(t, t)
+    c[2] = over(g2, two(20.0))
+    c[3] = over(g3, two(28.0))
+    for k in range(4, TERMS):
+        total = (0.0, 0.0)
+        for i in range(2, k - 1):
+            total = plus(total, times((c[i, 0], c[i, 1]), (c[k - i, 0], c[k - i, 1])))
+        c[k] = over(scaled(3.0, total), two((2.0 * k + 1.0) * (k - 3.0)))
+    p, dp = (0.0, 0.0), (0.0, 0.0)
+    for k in range(TERMS - 1, 0, -1):
+        ck = (c[k, 0], c[k, 1])
+        p, dp = plus(times(p, T), ck), plus(times(dp, T), scaled(2.0 * k - 2.0, ck))
+    # p = 1/T + sum_k c_k T^(k-1), with k = 1 empty
+    inverse = over(two(1.0), T)
+    p, dp = plus(inverse, p), over(plus(scaled(-2.0, inverse), dp), t)
+    f = np.empty((3, 2, 2))
+    a = np.empty((TERMS, 2))
+    for n in range(3):
+        b = (B[n, 0], B[n, 1])
+        a[0, 0], a[0, 1] = 1.0, 0.0
+        for j in range(1, TERMS):
+            total = times(b, (a[j - 1, 0], a[j - 1, 1]))
+            for k in range(2, j + 1):
+                total = plus(total, scaled(2.0, times((c[k, 0], c[k, 1]), (a[j - k, 0], a[j - k, 1]))))
+            a[j] = over(total, two((2.0 * j + 2.0) * (2.0 * j + 1.0) - 2.0))
+        y, dy = (0.0, 0.0), (0.0, 0.0)
+        for j in range(TERMS - 1, -1, -1):
+            aj = (a[j, 0], a[j, 1])
+            y, dy = plus(times(y, T), aj), plus(times(dy, T), scaled(2.0 * j + 2.0, aj))
+        f[n, 0], f[n, 1] = times(y, T), times(dy, t)
+    return p, dp, f
+
+
+@kernel
+def constants(g2, g3, B, h):
+    """p(h), p'(h) and (f, f') for each B, as floats: the series at h / 2^m, doubled m times by the addition theorems."""
+    halvings = 0
+    size = scale_of(g2, g3, B)
+    while h * size > SERIES_RADIUS * 2.0**halvings:
+        halvings += 1
+    p, dp, f = series(g2, g3, B, two(h * 0.5**halvings))
+    for _ in range(halvings):
+        S = over(minus(scaled(6.0, times(p, p)), scaled(0.5, g2)), scaled(2.0, dp))
+        p2 = minus(times(S, S), scaled(2.0, p))
+        dp2 = minus(scaled(2.0, times(S, minus(p, p2))), dp)
+        for n in range(3):
+            b = (B[n, 0], B[n, 1])
+            y, dy = (f[n, 0, 0], f[n, 0, 1]), (f[n, 1, 0], f[n, 1, 1])
+            third = over(two(1.0), two(3.0))
+            slope = times(dy, S)
+            A = times(third, minus(times(y, plus(scaled(2.0, p), b)), slope))
+            D = times(third, minus(times(y, plus(plus(p, p2), b)), slope))
+            b_ = times(third, minus(dy, times(y, S)))
+            C = over(minus(times(A, D), two(1.0)), b_)
+            f[n, 0], f[n, 1] = plus(times(A, y), times(b_, dy)), plus(times(C, y), times(D, dy))
+        p, dp = p2, dp2
+    return p[0] + p[1], dp[0] + dp[1], f[:, :, 0] + f[:, :, 1]
+
+
+@kernel
+def split(g2, g3, B, h):
+    """How many equal parts to take a step in, and the constants of a part.
+
+    Multiples of the period of nutation are poles of p, where the formulas cancel, and beyond half of it the map amplifies what
+    leaves the motion that its constants belong to. p(h) h^2 grows from 1 at h = 0 to about 2 there.
+    """
+    parts = 1
+    while True:
+        part = h / parts
+        p, dp, f = constants(g2, g3, B, part)
+        if p * part * part <= LARGEST_POLE:
+            return parts, p, dp, f
+        parts += 1
+
+
+@kernel
+def turn(a, b, gamma, w):
+    """Quaternion d of the step, q1 = q d, where alpha1 = a[0] alpha + b[0] alpha' and beta1 = a[1] beta + b[1] beta'.
+
+    d = (mean a) + (mean b) w/2 - (half difference of a) gamma k - (half difference of b) gamma w k / 2
+    """
+    m, d = 0.5 * (a[0] + a[1]), 0.5 * (a[0] - a[1])
+    n, e = 0.25 * (b[0] + b[1]), 0.25 * (b[0] - b[1])
+    g0, g1, g2 = gamma
+    w0, w1, w2 = w
+    r = -e * (g0 * w0 + g1 * w1 + g2 * w2)
+    x = d * g0 + e * (g1 * w2 - g2 * w1)
+    y = d * g1 + e * (g2 * w0 - g0 * w2)
+    z = d * g2 + e * (g0 * w1 - g1 * w0)
+    return (m + z, n * w0 - y, n * w1 + x, n * w2 - r)
+
+
+@kernel
+def unit_vertical(q):
+    """The last row of the matrix of a unit quaternion."""
+    return (
+        2.0 * (q[1] * q[3] - q[0] * q[2]),
+        2.0 * (q[2] * q[3] + q[0] * q[1]),
+        q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3],
+    )
+
+
+@kernel
+def restored(E, z, k, rate, gamma, w):
+    """Smallest change (dw0, dw1) of w and small turn (3,) of the attitude that bring w.gamma back to z and the energy to E.
+
+    One Gauss-Newton correction, damped so much that it takes back a good part of what was lost, step by step, but never turns
+    the rounding error of a residual into a larger one of the state where the gradients are small (a sleeping top) or parallel
+    (steady precession).
+    """
+    w0, w1, w2 = w
+    g0, g1, g2 = gamma
+    r = z - (w0 * g0 + w1 * g1 + w2 * g2)
+    i = 1.0 / rate
+    s = i * (E - 0.5 * (w0 * w0 + w1 * w1 + w2 * w2) - k * g2)
+    a0, a1 = rate * g0, rate * g1
+    a2, a3, a4 = w1 * g2 - w2 * g1, w2 * g0 - w0 * g2, w0 * g1 - w1 * g0
+    f = i * k
+    b2, b3 = -f * g1, f * g0
+    aa = a0 * a0 + a1 * a1 + a2 * a2 + a3 * a3 + a4 * a4
+    ab = a0 * w0 + a1 * w1 + a2 * b2 + a3 * b3
+    bb = w0 * w0 + w1 * w1 + b2 * b2 + b3 * b3
+    damping = DAMPING * rate * rate
+    aa += damping
+    bb += damping
+    inverse = 1.0 / (aa * bb - ab * ab)
+    m, n = inverse * (bb * r - ab * s), inverse * (aa * s - ab * r)
+    return (rate * (m * a0 + n * w0), rate * (m * a1 + n * w1)), (m * a2 + n * b2, m * a3 + n * b3, m * a4)
+
+
+@kernel
+def march(h, J, kappa, n_steps, every, q0, L0, q_out, L_out):
+    """Take n_steps steps of h s, store the state after every `every`-th and the last; return the number of parts of a step."""
+    gamma = unit_vertical(q0)
+    E_, z_, spin_, nu_, x0_, g2, g3, B = curve(J, kappa, gamma, L0)
+    parts, p_h, dp_h, f = split(g2, g3, B, h)
+    h /= parts
+    E, z, w2, nu, x0 = E_[0], z_[0], spin_[0], nu_[0], x0_[0]
+    k = kappa / J
+    rate = scale_of(g2, g3, B)
+    rate = rate if rate > 0.0 else 1.0 / h
+    (ya, da), (yb, db), (ym, dm) = (f[0, 0], f[0, 1]), (f[1, 0], f[1, 1]), (f[2, 0], f[2, 1])
+    ca, cb, cm = p_h + B[0, 0], p_h + B[1, 0], p_h + B[2, 0]
+    third = 1.0 / 3.0
+    half = 0.5 * w2
+    cos, sin = math.cos(half * h), math.sin(half * h)
+    q = q0
+    w0, w1 = L0[0] / J, L0[1] / J
+    q_out[0, :] = q0
+    L_out[0, :] = L0
+    row = 0
+    for step in range(1, n_steps + 1):
+        for _ in range(parts):
+            g0, g1, g2_ = gamma
+            x = nu * g2_ + x0
+            S = 0.5 * (nu * (g0 * w1 - g1 * w0) - dp_h) / (x - p_h)
+            a = ((ya * (ca + x) - da * S) * third, (yb * (cb + x) - db * S) * third)
+            b = ((da - ya * S) * third, (db - yb * S) * third)
+            d = turn(a, b, gamma, (w0, w1, w2))
+            am, bm = (ym * (cm + x) - dm * S) * third, (dm - ym * S) * third
+            m0, m1 = am * w0 + bm * (k * g1 - half * w1), am * w1 + bm * (half * w0 - k * g0)
+            w0, w1 = cos * m0 + sin * m1, cos * m1 - sin * m0
+            q = product(q, d)
+            gamma = unit_vertical(q)
+            dw, t = restored(E, z, k, rate, gamma, (w0, w1, w2))
+            w0, w1 = w0 + dw[0], w1 + dw[1]
+            q = product(q, (1.0, 0.5 * t[0], 0.5 * t[1], 0.5 * t[2]))
+            size = 1.5 - 0.5 * (q[0] * q[0] + dot((q[1], q[2], q[3]), (q[1], q[2], q[3])))
+            q = (size * q[0], size * q[1], size * q[2], size * q[3])
+            gamma = unit_vertical(q)
+        if step % every == 0 or step == n_steps:
+            row += 1
+            q_out[row, :] = q
+            L_out[row, 0], L_out[row, 1], L_out[row, 2] = J * w0, J * w1, L0[2]
+    return parts

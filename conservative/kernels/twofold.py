@@ -1,0 +1,61 @@
+"""Twofold arithmetic: a number as the pair (high, low) of floats, about 31 digits (Dekker 1971)."""
+
+from __future__ import annotations
+
+from . import kernel
+
+SPLIT = 134217729.0  # 2^27 + 1
+
+
+@kernel
+def two(x):
+    """The float x."""
+    return (x, 0.0)
+
+
+@kernel
+def _fast(a, b):
+    s = a + b
+    return (s, b - (s - a))
+
+
+@kernel
+def plus(x, y):
+    """x + y"""
+    s = x[0] + y[0]
+    v = s - x[0]
+    return _fast(s, ((x[0] - (s - v)) + (y[0] - v)) + (x[1] + y[1]))
+
+
+@kernel
+def minus(x, y):
+    """x - y"""
+    return plus(x, (-y[0], -y[1]))
+
+
+@kernel
+def times(x, y):
+    """x y"""
+    p = x[0] * y[0]
+    t = SPLIT * x[0]
+    xh = t - (t - x[0])
+    xl = x[0] - xh
+    t = SPLIT * y[0]
+    yh = t - (t - y[0])
+    yl = y[0] - yh
+    e = ((xh * yh - p) + xh * yl + xl * yh) + xl * yl
+    return _fast(p, e + (x[0] * y[1] + x[1] * y[0]))
+
+
+@kernel
+def scaled(f, x):
+    """f x for a float f."""
+    return times((f, 0.0), x)
+
+
+@kernel
+def over(x, y):
+    """x / y"""
+    q = x[0] / y[0]
+    r = minus(x, scaled(q, y))
+    return _fast(q, (r[0] + r[1]) / y[0])
