@@ -23,7 +23,10 @@ UNIT = "reduced"
 
 def number(value: float, digits: int = 2) -> str:
     """Return a number to `digits` significant digits, a dash for nan."""
-    return "–" if math.isnan(value) else f"{value:.{digits}g}" if 0.01 <= abs(value) < 1e4 else f"{value:.{digits - 1}e}"
+    if math.isnan(value):
+        return "–"
+    plain = value == 0 or 0.01 <= abs(value) < 1e4
+    return f"{value:.{digits}g}" if plain else f"{value:.{digits - 1}e}"
 
 
 def _named(rows: pd.DataFrame) -> pd.DataFrame:
@@ -80,7 +83,9 @@ def order(table: pd.DataFrame, scene: str) -> Table:
     header = ["method", "order, attitude", "order, rates", "fit window, s", "points", "floor, rad"]
     attitude, rates = (_fits(table, scene, measure) for measure in (orders.ERROR, orders.RATES))
     texts = {fit["series"]: fit["text"] for fit in rates}
-    return header, [[fit["series"], fit["text"], texts.get(fit["series"], "–"), *_window(fit)] for fit in attitude]
+    return header, [
+        [str(fit["series"]), str(fit["text"]), str(texts.get(fit["series"], "–")), *_window(fit)] for fit in attitude
+    ]
 
 
 def _fits(table: pd.DataFrame, scene: str, measure: str) -> list[pd.Series[float]]:
@@ -130,7 +135,7 @@ def _cost(cost: frontier.Cost | None) -> tuple[str, str]:
 
 
 def positions(errors: pd.DataFrame) -> Table:
-    """Return errors of the top's centre of mass after one period (`paper.position_errors`): of the x1 drawn, and the distance."""
+    """Return errors of the top's centre of mass after one period (`paper.position_errors`): of x1, and the distance."""
     header = ["dt, s", "t, s", "error of x1, m", "distance, m"]
     return header, [[f"{e.dt:g}", f"{e.t:g}", f"{e.x1:.4f}", f"{e.distance:.4f}"] for e in errors.itertuples()]
 
@@ -139,8 +144,8 @@ def failures(table: pd.DataFrame) -> Table:
     """Return the runs that did not reach their end or that the study did not wait for."""
     rows = _named(table[~table["status"].isin([OK, UNSUPPORTED, MISSING, NO_ORDER])])
     body = [
-        [scene, name, status, ", ".join(members["study"].unique()), _steps(members)]
-        for (scene, name, status), members in rows.groupby(["scene", "name", "status"], sort=False)
+        [*map(str, key), ", ".join(members["study"].unique()), _steps(members)]
+        for key, members in rows.groupby(["scene", "name", "status"], sort=False)
     ]
     return ["scene", "method", "status", "studies", "at steps, s"], body
 
@@ -156,8 +161,8 @@ def unsupported(table: pd.DataFrame) -> Table:
     reasons = [_reason(study, detail) for study, detail in zip(rows["study"], rows["detail"], strict=True)]
     rows = rows.assign(reason=reasons, kind=[_DIGITS.sub("…", reason) for reason in reasons])
     body = [
-        [scene, status, str(members["reason"].iloc[0]), ", ".join(members["name"].unique())]
-        for (scene, status, _), members in rows.groupby(["scene", "status", "kind"], sort=False)
+        [*map(str, key[:2]), str(members["reason"].iloc[0]), ", ".join(members["name"].unique())]
+        for key, members in rows.groupby(["scene", "status", "kind"], sort=False)
     ]
     return ["scene", "status", "why (numbers: of the first)", "methods"], body
 

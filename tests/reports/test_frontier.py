@@ -1,0 +1,80 @@
+import math
+
+import pytest
+
+from reports import frontier, verdict
+
+from .rows import point, table
+
+OURS = (point("ours", "ours", 1e-2, 1.0, dt=0.4), point("ours", "ours", 1e-4, 4.0, dt=0.2), point("ours", "ours", 1e-6, 16.0))
+ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine", 1e-8, 8.0))
+
+
+def contest(error, *groups):
+    return next(c for c in frontier.contests(frontier.points(table(*groups)), [error]))
+
+
+def test_measured_point_is_its_own_cost():
+    found = contest(1e-4, *OURS, *ENGINE)
+    assert found.ours == frontier.Cost("ours", 4.0)
+
+
+def test_between_points_the_cost_is_log_log():
+    found = contest(1e-3, *OURS, *ENGINE)
+    assert found.ours.time == pytest.approx(2.0, rel=1e-14)  # half way in the exponent from 1 to 4
+    assert found.ratio == pytest.approx(1.0, rel=1e-14)
+
+
+def test_a_more_accurate_point_counts_for_a_larger_error():
+    assert contest(1e-1, *OURS, *ENGINE).theirs.time == 2.0
+
+
+def test_nothing_is_extrapolated():
+    found = contest(1e-7, *OURS, *ENGINE)
+    assert found.ours is None
+    assert found.lost
+    assert math.isnan(found.ratio)
+    assert frontier.contests(frontier.points(table(*OURS, *ENGINE)), [1e-9]) == []
+
+
+def test_points_of_failed_runs_and_of_truths_do_not_compete():
+    failed = point("ours", "ours", float("nan"), float("nan"), status="not converged", dt=0.01)
+    truth = point("exact", "truth", 1e-15, 1e-9)
+    found = contest(1e-5, *OURS, *ENGINE, failed, truth)
+    assert found.ours.time == pytest.approx(8.0, rel=1e-14)
+    assert found.theirs.series == "engine"
+
+
+def test_lines_that_differ_in_tolerance_alone_are_one():
+    groups = [
+        point("heyoka", "engine", 10.0**-k, k, method=f"heyoka:tol=1e-{k}", label=f"heyoka==7.13.2/tol=1e-{k},body")
+        for k in (3, 9)
+    ]
+    assert frontier.points(table(*groups))["series"].unique().tolist() == ["heyoka 7.13.2 body"]
+
+
+def test_front_is_what_nothing_beats():
+    groups = (*OURS, *ENGINE, point("bad", "engine", 1e-3, 9.0))
+    front = frontier.front(frontier.points(table(*groups)))
+    assert front["error"].tolist() == [1e-2, 1e-3, 1e-4, 1e-8]
+
+
+def test_verdict_names_the_engine_the_errors_and_the_factor():
+    decades = [1e-2, 1e-6, 1e-7]
+    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS, *ENGINE)), decades))
+    assert lines == [
+        "**made_up**: engine beats us: it is faster than anything of ours at 1e-06 rad, by 3.5 times, "  # 16 / (2 x 4^0.6)
+        "and reaches 1e-07 rad, which nothing of ours was measured to reach.",
+        "**made_up**: ours is faster at 1e-02 rad, by 2 times.",
+    ]
+
+
+def test_verdict_where_ours_wins_everywhere():
+    lines = verdict.lines(frontier.contests(frontier.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2]))
+    assert lines[0] == "**made_up**: no engine beats us at any error that it reaches."
+
+
+def test_verdict_without_engines_claims_nothing():
+    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS)), [1e-2]))
+    assert lines == ["**made_up**: no engine was measured."]
+    assert "No engine" in verdict.lines([])[0]

@@ -1,0 +1,175 @@
+import json
+import re
+import xml.etree.ElementTree as ET
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.measurement import COLUMNS
+from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
+from reports import document, style
+from reports.cli import _listed, main
+from reports.provenance import provenance
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A real report, of one scene and three methods; the folder, and what the command said."""
+    folder = tmp_path_factory.mktemp("made") / "report"
+    methods = "reduced,mujoco:RK4,heyoka:tol=1e-9,frame=non_spinning"
+    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", methods, "--out", str(folder)])
+    assert done.exit_code == 0, done.output
+    return folder, done
+
+
+def test_report_has_its_files_and_lists_them(made):
+    folder, done = made
+    names = {path.name for path in folder.iterdir()}
+    pictures = {f"{kind}_brick_flip.svg" for kind in ("work_precision", "drift", "convergence")} | {"paper_figure_1.svg"}
+    assert names == pictures | {"report.md", "measurements.csv", "measurements.json"}
+    assert set(json.loads((folder / "measurements.json").read_text())["files"]) == names
+    assert done.stdout.strip().endswith("report.md")
+
+
+def test_progress_is_plain_lines_that_end_near_the_whole(made):
+    lines = made[1].stderr.splitlines()
+    shares = [int(re.match(r"\[ *(\d+)%\] .+", line)[1]) for line in lines]
+    assert shares == sorted(shares)
+    assert shares[0] == 0
+    assert shares[-1] >= 90
+
+
+def test_table_and_json_hold_the_same_rows_with_their_origin(made):
+    folder, _ = made
+    table = pd.read_csv(folder / "measurements.csv")
+    stored = json.loads((folder / "measurements.json").read_text())
+    assert tuple(table.columns) == COLUMNS
+    assert len(stored["rows"]) == len(table) > 100
+    assert {"paper", "convergence", "speed", "work_precision", "drift"} == set(table["study"])
+    assert stored["schema"] == document.SCHEMA
+    assert stored["packages"]["mujoco"]
+    assert stored["machine"]["cores"]
+    for key in ("command", "python", "commit", "date"):
+        assert stored[key]
+    energy = table[(table["study"] == "paper") & (table["measure"] == "energy drift max") & (table["method"] == "reduced")]
+    assert energy["value"].max() < 1e-13  # measured 5e-16
+
+
+def test_text_shows_every_picture_table_and_what_cannot_be_done(made):
+    folder, _ = made
+    text = (folder / "report.md").read_text()
+    linked = set(re.findall(r"\]\((\w+\.svg)\)", text))
+    assert linked == {path.name for path in folder.glob("*.svg")}
+    for part in ("## Where an engine beats us", "### Drift", "### Attitude", "### Observed order", "### Wall time", "## Truth"):
+        assert part in text
+    for part in (
+        "mujoco 4",
+        "heyoka 7",
+        "non-spinning frame needs a body symmetric",
+        "| commit |",
+        "| date |",
+        "`conservative",
+    ):
+        assert part in text
+    assert "nan" not in text
+
+
+def test_pictures_are_drawings_with_lines(made):
+    for path in made[0].glob("*.svg"):
+        root = ET.parse(path).getroot()
+        assert root.tag.endswith("svg")
+        assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 20, path.name
+
+
+def test_report_that_is_stopped_leaves_nothing(tmp_path):
+    def stop(share, what):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_is_checked_before_any_work(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+
+    def fail(share, what):
+        pytest.fail("work was begun")
+
+    with pytest.raises(BadInput, match=r"out: got .*mine.txt"):
+        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path, fail)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--scenes", "brik_flip"], "'brick_flip' (nearest)"),
+        (["--methods", "reduced,mujocco"], "'mujoco' (nearest)"),
+        (["--methods", "mujoco:RK5"], "RK5"),
+        (["--out", "file.txt"], "out: got"),
+    ],
+)
+def test_mistakes_end_before_any_work(arguments, part, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file.txt").write_text("mine")
+    done = CliRunner().invoke(main, ["report", *arguments])
+    assert done.exit_code == 2
+    assert part in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["file.txt"]
+
+
+def test_missing_engine_stops_the_plan_unless_it_is_skipped(monkeypatch):
+    def missing(self):
+        raise MissingEngine("mujoco", "mujoco")
+
+    monkeypatch.setattr(type(registry.method("mujoco")), "label", property(missing))
+    with pytest.raises(MissingEngine, match="pip install mujoco"):
+        document.plan(["brick_flip"], ["mujoco"])
+    assert len(document.plan(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
+
+
+def test_failure_of_ours_is_told(monkeypatch):
+    from benchmarks.measurement import Measurement, frame
+
+    status = NotConverged(3, 0.02, 1.0).status
+    common = (
+        "paper",
+        "brick_flip",
+        "reduced",
+        "conservative==0.1.0/reduced",
+        "ours",
+        0.01,
+        "energy drift max",
+        float("nan"),
+        "1",
+    )
+    measured = document.Measured(frame([Measurement(*common, status), Measurement(*common, "unsupported")]), pd.DataFrame())
+    assert document.failed(measured) == [f"reduced on brick_flip, dt = 0.01 s: {status}"]
+    monkeypatch.setattr(document, "write", lambda plan, out, step: measured)
+    done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
+    assert done.exit_code == 1
+    assert "not converged in step 3" in done.stderr
+
+
+def test_names_with_settings_are_kept_together():
+    assert _listed(("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
+    assert _listed(()) == []
+
+
+def test_colours_belong_to_families_whatever_else_is_drawn():
+    some = style.colours(["reduced", "mujoco 4.0.0 RK4"])
+    more = style.colours(["heyoka 7.13.2 body", "mujoco 4.0.0 Euler", "reduced", "their_own x"])
+    assert some["reduced"] == more["reduced"]
+    assert some["mujoco 4.0.0 RK4"] == more["mujoco 4.0.0 Euler"]
+    assert len(set(more.values())) == 4
+    marks = style.within_family(["mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler", "reduced"])
+    assert list(marks.values()) == [0, 1, 0]
+
+
+def test_provenance_names_what_can_change_a_number():
+    found = provenance(["report", "--out", "a b"])
+    assert found.command == "conservative report --out 'a b'"
+    assert Reduced().label.partition("/")[0] == f"conservative=={found.compared['conservative-rotation']}"
+    assert re.fullmatch(r"([0-9a-f]{40}(\+changes)?)|unknown", found.commit)
