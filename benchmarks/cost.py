@@ -35,6 +35,8 @@ CALL = 0.004
 """Duration, s, that one timed call is stretched to, so that what a call costs beside its steps stays a few per cent."""
 STRETCH = 256
 """Limit of the stretching."""
+POINT_ROUNDS = 5
+"""Rounds at most for each of the hundreds of points of a picture over many decades."""
 
 
 def end_only(grid: Grid, times: int = 1) -> Grid:
@@ -165,6 +167,6 @@ def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
         else:
             yield from case.blanks([(TIME, "s/s")], outcome.status, series(case.method))
     runs = {key: timed.done.run for key, timed in ready.items()}
-    timings = interleaved(runs, study.rounds, min_time=CALL / 2, budget=study.timing_budget)
+    timings = interleaved(runs, min(study.rounds, POINT_ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
     for key, timed in ready.items():
         yield timed.case.row(TIME, timings[key].minimum / timed.simulated, "s/s", detail=series(timed.case.method))
