@@ -22,7 +22,7 @@ def test_a_family_stands_for_its_variants_and_a_name_with_settings_for_one():
 
 
 def test_ours_come_first_and_nothing_comes_twice():
-    found = methods(["scipy", "reduced", "scipy:rtol=1e-9", "convected"])
+    found = methods(["scipy", "reduced:order=2", "scipy:rtol=1e-9", "convected"])
     assert [method.room for method in found] == ["ours", "ours", "engine", "engine"]
     assert len(set(found)) == len(found)
 
@@ -48,7 +48,7 @@ def without_mujoco(monkeypatch):
 def test_a_missing_engine_is_an_error_unless_skipped():
     with pytest.raises(MissingEngine, match="pip install mujoco"):
         methods(["reduced", "mujoco"])
-    ours, missing = methods(["reduced", "mujoco"], skip_missing=True)
+    ours, missing = methods(["reduced:order=2", "mujoco"], skip_missing=True)
     assert ours == Reduced()
     assert missing == Missing("mujoco", "MuJoCo", "mujoco")
     assert (missing.name, missing.label, missing.room, missing.order) == ("mujoco", "mujoco", "engine", None)
