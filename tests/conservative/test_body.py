@@ -20,7 +20,9 @@ def test_principal_moments_keep_their_axes_and_order():
     np.testing.assert_array_equal(body.R_BP, np.eye(3))
 
 
-@pytest.mark.parametrize(("moments", "axis"), [((2, 2, 1), 2), ((1, 2, 2), 0), ((2, 1, 2), 1), ((2, 2, 2), 2), ((1, 2, 3), None)])
+@pytest.mark.parametrize(
+    ("moments", "axis"), [((2, 2, 1), 2), ((1, 2, 2), 0), ((2, 1, 2), 1), ((2, 2, 2), 2), ((1, 2, 3), None)]
+)
 def test_symmetry_axis(moments, axis):
     assert cv.RigidBody(moments).symmetry_axis() == axis
 
