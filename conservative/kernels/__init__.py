@@ -25,7 +25,7 @@ _drop_stale_caches(Path(__file__).parent)
 kernel: Any = partial(njit, cache=True, error_model="numpy")
 """The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""
 
-SMALL = {"forceinline": True, "fastmath": {"contract"}}
+SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
 """Options of small functions in the inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
 
 small: Any = partial(kernel, **SMALL)
