@@ -90,6 +90,12 @@ def norm(a: Vector) -> Number:
     return mp.sqrt(sum(x * x for x in a))
 
 
+def rounded_halves(R: Matrix) -> tuple[complex, complex]:
+    """Return `halves` in double precision."""
+    alpha, beta = halves(R)
+    return complex(alpha), complex(beta)
+
+
 def halves(R: Matrix) -> tuple[Number, Number]:
     """Return alpha = q0 + i q3 and beta = q1 + i q2 of a rotation (Shepperd's choice of the largest component)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -103,6 +109,12 @@ def halves(R: Matrix) -> tuple[Number, Number]:
         q = [odd[k], *(squares[largest] if i == k else R[i, k] + R[k, i] for i in range(3))]
     q = [x / (2 * mp.sqrt(squares[largest])) for x in q]
     return mp.mpc(q[0], q[3]), mp.mpc(q[1], q[2])
+
+
+def turned(left: Any, right: Any) -> Any:
+    """Return the product of two quaternions, each a pair (alpha, beta): of numbers or of arrays (n,)."""
+    (a, b), (c, d) = left, right
+    return a * c - b * np.conj(d), a * d + b * np.conj(c)
 
 
 def root(square: Number) -> Number:

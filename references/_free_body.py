@@ -22,7 +22,7 @@ import numpy as np
 from conservative.attitude import Array
 
 from ._clock import Clock, rotation_clock
-from ._exact_start import Matrix, Start, Vector, as_array, cross, from_halves, norm
+from ._exact_start import Matrix, Start, Vector, as_array, cross, from_halves, norm, rounded_halves, turned
 from ._theta import Lattice, Number, Points, Quotient, Theta, jacobi, mp, theta
 
 
@@ -96,7 +96,8 @@ class FreeMotion:
     parts: tuple[Quotient, Quotient, Quotient]
     phase: Theta
     R_BP: Array
-    R_Wl: Array
+    q_PB: tuple[complex, complex]
+    q_Wl: tuple[complex, complex]
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
@@ -106,8 +107,9 @@ class FreeMotion:
         flip = 1 - 2 * odd
         m = np.stack([flip * cn, flip * sn, dn], axis=-1) * self.largest
         chi = self.turn.turned(t) * Points(self.phase.lattice, v).theta(self.phase)
-        R_lP = from_halves(chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
-        return self.R_Wl @ R_lP @ self.R_BP.T, (float(self.size) * m * self.inverse_J) @ self.R_BP.T
+        q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
+        R_WB = from_halves(*turned(turned(self.q_Wl, q_lP), self.q_PB))
+        return R_WB, (m * (float(self.size) * self.inverse_J)) @ self.R_BP.T
 
 
 def free_motion(start: Start) -> FreeMotion:
@@ -132,7 +134,8 @@ def free_motion(start: Start) -> FreeMotion:
         jacobi(lattice),
         phase,
         as_array(axes.R_BP),
-        as_array(start.attitude * axes.R_BP * R_lP0.T),
+        rounded_halves(axes.R_BP.T),
+        rounded_halves(start.attitude * axes.R_BP * R_lP0.T),
     )
 
 

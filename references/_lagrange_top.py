@@ -26,7 +26,7 @@ import numpy as np
 from conservative.attitude import Array
 
 from ._clock import Clock, rotation_clock
-from ._exact_start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, root, unit
+from ._exact_start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, root, rounded_halves, turned, unit
 from ._theta import ComplexArray, Lattice, Number, Points, Quotient, jacobi, mp, quotient
 
 _SAME = mp.mpf(10) ** -60
@@ -208,15 +208,16 @@ class TopMotion:
     w_scale: float
     spin: float
     R_BP: Array
+    q_PB: tuple[complex, complex]
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
         v, odd = self.argument.reduced(t)
         points = Points(self.lattice, v)
-        R_WP = from_halves(self.alpha.at(t, points), self.beta.at(t, points))
+        R_WB = from_halves(*turned((self.alpha.at(t, points), self.beta.at(t, points)), self.q_PB))
         w = self.w_scale * (1 - 2 * odd) * self.w.at(t, points)
         w_P = np.stack([w.real, w.imag, np.full_like(w.real, self.spin)], axis=-1)
-        return R_WP @ self.R_BP.T, w_P @ self.R_BP.T
+        return R_WB, w_P @ self.R_BP.T
 
 
 def top_motion(start: Top) -> TopMotion:
@@ -239,6 +240,6 @@ def top_motion(start: Top) -> TopMotion:
     values = (start.alpha, start.beta, start.w / w_scale)
     slopes = (*start.slopes[:2], start.slopes[2] / w_scale)
     factors = [factor(a, omega, v0, v, *rest) for a, *rest in zip(shapes, rates, values, slopes, strict=True)]
-    return TopMotion(
-        Clock(v0, omega, 2 * lattice.K), lattice, *factors, float(w_scale), float(start.spin), as_array(start.R_BP)
-    )
+    R_BP = as_array(start.R_BP)
+    argument = Clock(v0, omega, 2 * lattice.K)
+    return TopMotion(argument, lattice, *factors, float(w_scale), float(start.spin), R_BP, rounded_halves(start.R_BP.T))

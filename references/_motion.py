@@ -21,6 +21,19 @@ class Motion(Protocol):
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at t (n,)."""
 
 
+_BLOCK = 16384
+"""Samples evaluated together: what fits into a cache."""
+
+
+def in_blocks(motion: Motion, t: Array) -> tuple[Array, Array]:
+    """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at any number of times."""
+    R_WB, w_WB_B = np.empty((len(t), 3, 3)), np.empty((len(t), 3))
+    for begin in range(0, len(t), _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        R_WB[block], w_WB_B[block] = motion.at(t[block])
+    return R_WB, w_WB_B
+
+
 @dataclass(frozen=True, eq=False)
 class SteadyTurn:
     """A turn about an axis fixed in body and world, or rest."""

@@ -27,7 +27,7 @@ Number = Any
 """A real or complex number of `mp`."""
 ComplexArray = NDArray[np.complex128]
 
-_TERMS = 14  # exp(-pi)^(14^2) is below 2^-800
+_BITS_KEPT = 600  # of a series, beside its first term: more than `mp` has
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +60,17 @@ class Lattice:
     def nome(self) -> Number:
         """The smaller nome, at most exp(-pi)."""
         return mp.exp(-mp.pi * max(self.K, self.K_prime) / self.short)
+
+    @cached_property
+    def terms(self) -> int:
+        """How many terms of a series count: their size falls like nome^(n (n - 1))."""
+        bits = -mp.log(self.nome, 2) if self.nome > 0 else mp.inf
+        return 2 + int(mp.ceil(mp.sqrt(_BITS_KEPT / bits)))
+
+    @cached_property
+    def theta_4(self) -> Theta:
+        """theta_4(v), below every quotient."""
+        return theta(self, 4, mp.mpf(0), self.K_prime)
 
     @cached_property
     def s(self) -> Number:
@@ -109,11 +120,13 @@ class Theta:
             return self.odd * mp.conj(value), -self.odd * mp.conj(slope)
         grown, fallen, _ = self.lattice.exponentials(v)
         value, slope = mp.mpc(0), mp.mpc(0)
+        a_power, b_power = mp.mpf(1), mp.mpf(1)
         for n, (up, down) in enumerate(zip(self.rising, self.falling, strict=True)):
-            a, b = up * grown**n, down * fallen**n
-            value, slope = value + a + b, slope + 2 * n * self.lattice.s * (a - b)
+            a, b = up * a_power, down * b_power
+            value, slope = value + a + b, slope + n * (a - b)
+            a_power, b_power = a_power * grown, b_power * fallen
         turn = mp.expj(self.kappa * v)
-        return turn * value, turn * (slope + mp.mpc(0, self.kappa) * value)
+        return turn * value, turn * (2 * self.lattice.s * slope + mp.mpc(0, self.kappa) * value)
 
     def arrays(self, grown: Any, fallen: Any) -> Any:
         """Return the series at exp(2 w) and exp(-2 w), each (n,), in double precision and without exp(i kappa v)."""
@@ -138,8 +151,8 @@ def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
         step, back, lead = mp.exp(-mp.pi * y_rest / lattice.K), mp.exp(-mp.pi * y / lattice.K), mp.mpf(1)
         kappa = mp.mpf(0)
     nome, first, second = lattice.nome, (0 if half else -1), (-1 if half else 0)
-    rising = [lead * sign**n * nome ** (n * (n + first)) * step**n for n in range(_TERMS)]
-    falling = [mp.mpf(0), *(lead * sign**n * nome ** (n * (n + second)) * back**n for n in range(1, _TERMS))]
+    rising = [lead * sign**n * nome ** (n * (n + first)) * step**n for n in range(lattice.terms)]
+    falling = [mp.mpf(0), *(lead * sign**n * nome ** (n * (n + second)) * back**n for n in range(1, lattice.terms))]
     return Theta(lattice, tuple(rising), tuple(falling), kappa, half, -1 if series == 1 and hyperbolic else 1)
 
 
@@ -182,7 +195,7 @@ class Quotient:
 def quotient(lattice: Lattice, number: int, y: Number = 0, y_rest: Number | None = None, mirrored: bool = False) -> Quotient:
     """Return a multiple of theta_j(v - i y) / theta_4(v), with + i y where `mirrored`."""
     rest = lattice.K_prime if y_rest is None else y_rest
-    return Quotient(theta(lattice, number, mp.mpf(y), rest), theta(lattice, 4, mp.mpf(0), lattice.K_prime), mirrored)
+    return Quotient(theta(lattice, number, mp.mpf(y), rest), lattice.theta_4, mirrored)
 
 
 def jacobi(lattice: Lattice) -> tuple[Quotient, Quotient, Quotient]:
@@ -206,8 +219,7 @@ class Points:
 
     @cached_property
     def _theta_4(self) -> Array:
-        series = theta(self._lattice, 4, mp.mpf(0), self._lattice.K_prime)
-        return np.asarray(np.real(series.arrays(self._grown, self._fallen)))
+        return np.asarray(np.real(self._lattice.theta_4.arrays(self._grown, self._fallen)))
 
     def theta(self, function: Theta) -> Any:
         """Return the function (n,), up to a positive factor."""

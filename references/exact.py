@@ -27,7 +27,7 @@ from conservative.version import VERSION
 from ._exact_start import Start
 from ._free_body import free_motion
 from ._lagrange_top import top, top_motion
-from ._motion import Motion, steady_turn
+from ._motion import Motion, in_blocks, steady_turn
 
 
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
@@ -135,7 +135,7 @@ class Exact(Method):
         motion = _motion(Start(_swinging(scene) or scene.body, scene.R_WB0, scene.w_WB_B0), scene.potential)
 
         def run() -> Trajectory:
-            R_WB, w_WB_B = motion.at(grid.t)
+            R_WB, w_WB_B = in_blocks(motion, grid.t)
             return Trajectory(scene, grid.t, R_WB, w_WB_B, self.label, Counters(steps=0, evaluations=grid.n_samples))
 
         return run
@@ -191,5 +191,5 @@ def _times(t: ArrayLike) -> Array:
 
 
 def _evaluated(motion: Motion, times: Array) -> tuple[Array, Array]:
-    R_WB, w_WB_B = motion.at(times.ravel())
+    R_WB, w_WB_B = in_blocks(motion, times.ravel())
     return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)

@@ -53,7 +53,7 @@ class Case:
 
     @property
     def bits(self) -> int:
-        """Bits for an integration, in steps of 64: errors may grow e-fold in every time constant of the unstable equilibrium."""
+        """Bits for an integration, in steps of 64: errors may grow e-fold in each time constant of the unstable equilibrium."""
         if self.potential is None:
             a, b, c = np.sort(self.body.moments)
             spin = float(np.linalg.norm(self.body.momentum(self.w_WB_B0))) / b
