@@ -16,7 +16,7 @@ from .method import Grid, Method, Run
 from .potential import UniformGravity
 from .principal import PrincipalStart, Quadruple, Triple, principal_start
 from .scene import Scene
-from .tableau import MOST_STAGES, tableau
+from .tableau import MOST_STAGES, Tableau, tableau
 from .trajectory import Counters, Trajectory
 
 
@@ -83,21 +83,27 @@ class Gauss(Method):
 
 def _prepared(stages: int, scene: Scene, grid: Grid, label: str) -> Run:
     from .kernels.gauss import march
+    from .kernels.simd import LANES
 
     start = principal_start(scene)
-    table = tableau(stages)
+    coefficients = padded(tableau(stages), LANES)
     model = closed_system(start)
 
     def run() -> Trajectory:
         q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-        done, work, change = march(
-            table.A, table.A_low, table.E, table.b, table.b_low, grid.dt, grid.n_steps, grid.every, *model.arguments, q, L
-        )
+        done, work, change = march(stages, *coefficients, grid.dt, grid.n_steps, grid.every, *model.arguments, q, L)
         failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, change)
         counters = Counters(steps=done, stages=done * stages, iterations=work)
         return start.trajectory(label, grid, done, turned_to(start.q, q), L * model.unit, counters, failure)
 
     return run
+
+
+def padded(table: Tableau, lanes: int) -> tuple[Array, ...]:
+    """Return A, E by columns and b, b_low, each in one dimension, stages filled up with zeros to a multiple of `lanes`."""
+    extra = (0, -len(table.b) % lanes)
+    rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
+    return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
 
 
 @dataclass(frozen=True)

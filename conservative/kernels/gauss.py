@@ -21,11 +21,15 @@ import math
 import numpy as np
 
 from . import kernel
+from .simd import LANES, four, fused, larger_size, place, put, splat
 from .vector import accumulate, cross, dot, product
 
-MAX_SWEEPS = 60
+MAX_SWEEPS = 120
 MAX_NEWTON = 25
 ROUND_OFF = 2e-17
+STAGNATION = 2e-15
+SLOWEST = 0.85
+"""Sweeps that gain less than this are left for Newton, whose step costs as much as a hundred sweeps."""
 
 # Chart k + 3 (s < 0) has a = s e_k; the quaternion is that of the constant rotation C.
 _R = math.sqrt(0.5)
@@ -37,55 +41,81 @@ KEPT_CHART = 0.5
 
 @kernel
 def rates(J_inverse, c, Z, F):
-    """F = (L', gamma') at the states Z, both (6, stages)."""
-    for i in range(Z.shape[1]):
-        l0, l1, l2 = Z[0, i], Z[1, i], Z[2, i]
-        g0, g1, g2 = Z[3, i], Z[4, i], Z[5, i]
-        w0, w1, w2 = J_inverse[0] * l0, J_inverse[1] * l1, J_inverse[2] * l2
-        F[0, i] = l1 * w2 - l2 * w1 + (g1 * c[2] - g2 * c[1])
-        F[1, i] = l2 * w0 - l0 * w2 + (g2 * c[0] - g0 * c[2])
-        F[2, i] = l0 * w1 - l1 * w0 + (g0 * c[1] - g1 * c[0])
-        F[3, i] = g1 * w2 - g2 * w1
-        F[4, i] = g2 * w0 - g0 * w2
-        F[5, i] = g0 * w1 - g1 * w0
+    """F = (L', gamma') at the states Z: both (6, width) in one dimension, width a multiple of four."""
+    width = Z.shape[0] // 6
+    for i in range(0, width, LANES):
+        L = (four(Z, i), four(Z, width + i), four(Z, 2 * width + i))
+        g = (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
+        w = (J_inverse[0] * L[0], J_inverse[1] * L[1], J_inverse[2] * L[2])
+        L_rate = cross(L, w)
+        g_rate = cross(g, w)
+        put(F, i, L_rate[0] + (c[2] * g[1] - c[1] * g[2]))
+        put(F, width + i, L_rate[1] + (c[0] * g[2] - c[2] * g[0]))
+        put(F, 2 * width + i, L_rate[2] + (c[1] * g[0] - c[0] * g[1]))
+        put(F, 3 * width + i, g_rate[0])
+        put(F, 4 * width + i, g_rate[1])
+        put(F, 5 * width + i, g_rate[2])
 
 
 @kernel
-def stages_from(A, h, F, U, D, Z):
-    """D = h F A' and Z = U + D; return the largest change of D."""
-    change = 0.0
-    for k in range(6):
-        for i in range(A.shape[0]):
-            total = 0.0
-            for j in range(A.shape[1]):
-                total += A[i, j] * F[k, j]
-            total *= h
-            change = max(change, abs(total - D[k, i]))
-            D[k, i] = total
-            Z[k, i] = U[k] + total
+def stages_from(A, s, h, F, U, D, Z):
+    """D = h F A' and Z = U + D; return the largest change of D. A is (stages, width), column j of the matrix in row j."""
+    width = Z.shape[0] // 6
+    change = splat(0.0)
+    for i in range(0, width, LANES):
+        d0 = d1 = d2 = d3 = d4 = d5 = splat(0.0)
+        for j in range(s):
+            a = four(A, j * width + i)
+            d0 = fused(a, splat(F[j]), d0)
+            d1 = fused(a, splat(F[width + j]), d1)
+            d2 = fused(a, splat(F[2 * width + j]), d2)
+            d3 = fused(a, splat(F[3 * width + j]), d3)
+            d4 = fused(a, splat(F[4 * width + j]), d4)
+            d5 = fused(a, splat(F[5 * width + j]), d5)
+        change = placed(h * d0, U[0], D, Z, i, change)
+        change = placed(h * d1, U[1], D, Z, width + i, change)
+        change = placed(h * d2, U[2], D, Z, 2 * width + i, change)
+        change = placed(h * d3, U[3], D, Z, 3 * width + i, change)
+        change = placed(h * d4, U[4], D, Z, 4 * width + i, change)
+        change = placed(h * d5, U[5], D, Z, 5 * width + i, change)
+    return max(max(place(change, 0), place(change, 1)), max(place(change, 2), place(change, 3)))
+
+
+@kernel
+def placed(d, u, D, Z, i, change):
+    """Store four increments d and the states u + d; return the largest change so far."""
+    change = larger_size(d - four(D, i), change)
+    put(D, i, d)
+    put(Z, i, splat(u) + d)
     return change
 
 
 @kernel
-def swept(A, h, J_inverse, c, U, F, D, Z):
+def swept(A, s, h, J_inverse, c, U, F, D, Z):
     """Iterate D = h A f(U + D) to stagnation; return (sweeps, last change, success)."""
     before = math.inf
     for sweep in range(1, MAX_SWEEPS + 1):
         rates(J_inverse, c, Z, F)
-        change = stages_from(A, h, F, U, D, Z)
+        change = stages_from(A, s, h, F, U, D, Z)
         ratio = change / before if sweep > 1 else 1.0
-        if change * min(ratio, 1.0) <= ROUND_OFF or (ratio >= 0.5 and change < 1e-14):
+        if (ratio < 0.9 and change * ratio <= ROUND_OFF * (1.0 - ratio)) or (ratio >= 0.5 and change < STAGNATION):
             return sweep, change, True
-        if sweep > 2 and not ratio < 0.5:
+        if sweep > 3 and not ratio < SLOWEST:
             return sweep, change, False
         before = change
     return MAX_SWEEPS, before, False
 
 
 @kernel
-def newton(A, h, J_inverse, c, U, F, D, Z):
+def newton(A, s, h, J_inverse, c, U, F, D, Z):
     """Solve the same equations by Newton from an explicit Euler guess; return (iterations, last change, success)."""
-    s = A.shape[0]
+    width = Z.shape[0] // 6
+    states, slopes, increments, matrix = (
+        Z.reshape((6, width)),
+        F.reshape((6, width)),
+        D.reshape((6, width)),
+        A.reshape((s, width)),
+    )
     tangent = np.empty((6 * s, 6 * s))
     residual = np.empty(6 * s)
     block = np.empty((6, 6))
@@ -93,21 +123,21 @@ def newton(A, h, J_inverse, c, U, F, D, Z):
     for iteration in range(1, MAX_NEWTON + 1):
         rates(J_inverse, c, Z, F)
         for j in range(s):
-            tangent_block(J_inverse, c, Z[:, j], block)
+            tangent_block(J_inverse, c, states[:, j], block)
             for k in range(6):
                 total = 0.0
                 for m in range(s):
-                    total += A[j, m] * F[k, m]
-                residual[6 * j + k] = h * total - D[k, j]
+                    total += matrix[m, j] * slopes[k, m]
+                residual[6 * j + k] = h * total - increments[k, j]
                 for i in range(s):
                     for n in range(6):
-                        tangent[6 * i + k, 6 * j + n] = (1.0 if i == j and k == n else 0.0) - h * A[i, j] * block[k, n]
+                        tangent[6 * i + k, 6 * j + n] = (1.0 if i == j and k == n else 0.0) - h * matrix[j, i] * block[k, n]
         correction = np.linalg.solve(tangent, residual)
         change = 0.0
         for j in range(s):
             for k in range(6):
-                D[k, j] += correction[6 * j + k]
-                Z[k, j] = U[k] + D[k, j]
+                increments[k, j] += correction[6 * j + k]
+                states[k, j] = U[k] + increments[k, j]
                 change = max(change, abs(correction[6 * j + k]))
         if change * change <= ROUND_OFF or (change >= before and change < 1e-12):
             return iteration, change, True
@@ -168,29 +198,60 @@ def best_chart(gamma):
 
 
 @kernel
-def turn_rate(h, b, chart, J_inverse, Z):
+def turned(h, b, chart, J_inverse, Z):
     """Integral of phi' over the step."""
-    a0, a1, a2 = CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2]
-    total = 0.0
-    for i in range(Z.shape[1]):
-        g0, g1, g2 = Z[3, i], Z[4, i], Z[5, i]
-        top = J_inverse[0] * Z[0, i] * (g0 + a0) + J_inverse[1] * Z[1, i] * (g1 + a1) + J_inverse[2] * Z[2, i] * (g2 + a2)
-        total += b[i] * top / (1.0 + g0 * a0 + g1 * a1 + g2 * a2)
-    return h * total
+    width = Z.shape[0] // 6
+    a = (CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2])
+    total = splat(0.0)
+    for i in range(0, width, LANES):
+        w = (J_inverse[0] * four(Z, i), J_inverse[1] * four(Z, width + i), J_inverse[2] * four(Z, 2 * width + i))
+        g = (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
+        top = w[0] * (g[0] + splat(a[0])) + w[1] * (g[1] + splat(a[1])) + w[2] * (g[2] + splat(a[2]))
+        total = total + four(b, i) * top / (splat(1.0) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
+    return h * summed(total)
 
 
 @kernel
-def march(A, A_low, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_out, L_out):
+def summed(v):
+    """Sum of four floats."""
+    return (place(v, 0) + place(v, 2)) + (place(v, 1) + place(v, 3))
+
+
+@kernel
+def advance(h, b, b_low, F, U, carry):
+    """U += h sum_j b_j F_j, compensated."""
+    width = F.shape[0] // 6
+    for k in range(6):
+        total = splat(0.0)
+        for i in range(0, width, LANES):
+            total = fused(four(b_low, i), four(F, k * width + i), total)
+        for i in range(0, width, LANES):
+            total = fused(four(b, i), four(F, k * width + i), total)
+        U[k], carry[k] = accumulate(U[k], carry[k], h * summed(total))
+
+
+@kernel
+def start(A, s, h, J_inverse, c, U, F, D, Z):
+    """First guess of the stages: the rates at the start of the step held constant."""
+    width = Z.shape[0] // 6
+    for k in range(6):
+        Z[k * width : (k + 1) * width] = U[k]
+    rates(J_inverse, c, Z, F)
+    stages_from(A, s, h, F, U, D, Z)
+
+
+@kernel
+def march(s, A, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_out, L_out):
     """Take n_steps steps of h s and store attitude and momentum of every `every`-th and the last.
 
     Returns (steps done, sweeps and Newton corrections, size of the last change); steps done < n_steps means that the next one
-    did not converge.
+    did not converge. Coefficients come with their stages filled up with zeros to a multiple of four.
     """
-    s = b.shape[0]
+    width = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)
     for k in range(3):
         U[k], U[3 + k] = L0[k], gamma0[k]
-    F, D, Z = np.empty((6, s)), np.zeros((6, s)), np.empty((6, s))
+    F, D, Z = np.empty(6 * width), np.zeros(6 * width), np.empty(6 * width)
     chart = best_chart(gamma0)
     phi, phi_carry = 0.0, 0.0
     q_out[0, :] = attitude(chart, phi, gamma0)
@@ -198,55 +259,29 @@ def march(A, A_low, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_
     row, work, change = 0, 0, 0.0
     for step in range(1, n_steps + 1):
         if step == 1:
-            start(A, h, J_inverse, c, U, F, D, Z)
+            start(A, s, h, J_inverse, c, U, F, D, Z)
         else:
-            stages_from(E, h, F, U, D, Z)
-        sweeps, change, good = swept(A, h, J_inverse, c, U, F, D, Z)
+            stages_from(E, s, h, F, U, D, Z)
+        sweeps, change, good = swept(A, s, h, J_inverse, c, U, F, D, Z)
         work += sweeps
         if not good:
-            start(A, h, J_inverse, c, U, F, D, Z)
-            corrections, change, good = newton(A, h, J_inverse, c, U, F, D, Z)
+            start(A, s, h, J_inverse, c, U, F, D, Z)
+            corrections, change, good = newton(A, s, h, J_inverse, c, U, F, D, Z)
             work += corrections
             if not good:
                 return step - 1, work, change
-        add_low(A_low, h, F, U, D, Z)
         rates(J_inverse, c, Z, F)
-        middle = (Z[3, s // 2], Z[4, s // 2], Z[5, s // 2])
+        m = 3 * width + s // 2
+        middle = (Z[m], Z[m + width], Z[m + 2 * width])
         if dot(middle, (CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2])) < KEPT_CHART:
             gamma = (U[3], U[4], U[5])
             q = attitude(chart, phi - phi_carry, gamma)
             chart = best_chart(middle)
             phi, phi_carry = angle_in(chart, q, gamma), 0.0
-        phi, phi_carry = accumulate(phi, phi_carry, turn_rate(h, b, chart, J_inverse, Z))
-        for k in range(6):
-            low, high = 0.0, 0.0
-            for i in range(s):
-                low += b_low[i] * F[k, i]
-                high += b[i] * F[k, i]
-            U[k], carry[k] = accumulate(U[k], carry[k], h * (high + low))
+        phi, phi_carry = accumulate(phi, phi_carry, turned(h, b, chart, J_inverse, Z))
+        advance(h, b, b_low, F, U, carry)
         if step % every == 0 or step == n_steps:
             row += 1
             q_out[row, :] = attitude(chart, phi - phi_carry, (U[3], U[4], U[5]))
             L_out[row, :] = U[:3]
     return n_steps, work, change
-
-
-@kernel
-def add_low(A_low, h, F, U, D, Z):
-    """Add what the rounding of A took from the stages: without it each step changes the energy by 1e-18 always the same way."""
-    for k in range(6):
-        for i in range(A_low.shape[0]):
-            total = 0.0
-            for j in range(A_low.shape[1]):
-                total += A_low[i, j] * F[k, j]
-            D[k, i] += h * total
-            Z[k, i] = U[k] + D[k, i]
-
-
-@kernel
-def start(A, h, J_inverse, c, U, F, D, Z):
-    """First guess of the stages: the rates at the start of the step held constant."""
-    for k in range(6):
-        Z[k, :] = U[k]
-    rates(J_inverse, c, Z, F)
-    stages_from(A, h, F, U, D, Z)
