@@ -29,9 +29,9 @@ _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
 class FunctionPotential:
     """A user's own potential, given by its energy and its gradient as functions of the matrix R_WB.
 
-    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs most of a millisecond and not a
-    fraction of a microsecond. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both attitudes and
-    D their difference:
+    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs about a millisecond and not a
+    fraction of a microsecond. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both
+    attitudes and D their difference:
 
         V* = G + (V(R1) - V(R0) - <G, D>) / <D, D> D        G = dV/dR at Rbar
 
@@ -155,13 +155,18 @@ class _Answers:
     def __init__(self, potential: FunctionPotential, R_BP: Array) -> None:
         self.potential, self.R_BP = potential, R_BP
         self.given, self.answer = np.zeros(18), np.zeros(90)
+        self.answered = b""
 
     def __call__(self, what: int) -> int:
+        question = bytes([what]) + self.given.tobytes()
+        if question == self.answered:  # residual and tangent of one iteration ask the same
+            return 0
         try:
             (self._body_torque, self._finite_torque, self._finite_derivative)[what]()
         except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
             PotentialFailed.pending.cause = error
             return 1
+        self.answered = question
         return 0
 
     def _attitude(self) -> Array:
@@ -203,7 +208,7 @@ class _Answers:
 
 
 def _derivative(function: Callable[[Array], Array], x: Array, value: Array) -> Array:
-    """Return d function/dx by differences from `value`, its value at x: good to about 1e-7, all but enough for Newton's method."""
+    """Return d function/dx at x, where it is `value`, by differences: good to 1e-7, so that Newton is all but quadratic."""
     columns = []
     for k in range(len(x)):
         beside = x.copy()
