@@ -1,7 +1,7 @@
 """Four floats at once as a numba type, so that stage loops are vector code by construction and not by a compiler's mood.
 
-`four(a, i)` loads a[i:i+4] and `put(a, i, v)` stores it; + - * / work between fours, and * also with a float; `fused(a, b, c)` is
-a b + c with one rounding. On processors without 256-bit registers LLVM splits the operations.
+`four(a, i)` loads a[i:i+4] and `put(a, i, v)` stores it; + - * / work between fours, and * also with a float; `fused(a, b, c)`
+is a b + c with one rounding. On processors without 256-bit registers LLVM splits the operations.
 """
 
 from __future__ import annotations
