@@ -48,7 +48,7 @@ class Convected(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from .kernels.convected import G, conjugate_momentum, march
 
-        q0 = np.ascontiguousarray(scene.R_WB0.T).reshape(9)
+        q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
         p0 = conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))
         J_inverse = np.ascontiguousarray(scene.body.inverse)
         field = None if scene.potential is None else scene.potential.kernel_field(np.eye(3))
