@@ -7,6 +7,7 @@ told by its mark and dash.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -14,7 +15,7 @@ import altair as alt
 
 from .naming import family
 
-BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, TEAL = (
+BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE = (
     "#0072B2",
     "#56B4E9",
     "#009E73",
@@ -24,14 +25,16 @@ BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, TEAL = (
     "#000000",
     "#7F7F7F",
     "#332288",
-    "#44AA99",
+    "#882255",
+    "#999933",
 )
 
 FAMILY_COLOURS = {
     "reduced": BLUE,
     "convected": SKY,
     "gauss": INDIGO,
-    "moser_veselov": TEAL,
+    "moser_veselov": WINE,
+    "lame": OLIVE,
     "heyoka": GREEN,
     "mujoco": VERMILION,
     "scipy": ORANGE,
@@ -39,7 +42,7 @@ FAMILY_COLOURS = {
     "exact": BLACK,
     "precise": GREY,
 }
-_OTHERS = ("#882255", "#999933", "#661100", "#117733", "#AA4499", "#DDCC77")
+_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#44AA99", "#88CCEE")
 """For families registered by other packages, in the order of their names (Tol's muted scheme)."""
 
 SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-left", "triangle-right")
@@ -49,9 +52,16 @@ WIDTH, HEIGHT = 420, 260
 
 
 def series_order(names: Iterable[str]) -> list[str]:
-    """Return different names in the order of legends: family by family, in the order of their colours, then by name."""
+    """Return different names in the order of legends: families in the order of their colours, numbers by value."""
     families = list(FAMILY_COLOURS)
-    return sorted(set(names), key=lambda name: (families.index(f) if (f := family(name)) in families else len(families), name))
+    rank = {name: families.index(family(name)) if family(name) in families else len(families) for name in names}
+    return sorted(rank, key=lambda name: (rank[name], _by_value(name)))
+
+
+def _by_value(name: str) -> list[tuple[float, str]]:
+    """Return a name as a key by which order=4 comes before order=10."""
+    parts = filter(None, re.split(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?)", name))
+    return [(float(part), "") if part[0].isdigit() else (math.inf, part) for part in parts]
 
 
 def colours(series: list[str]) -> dict[str, str]:

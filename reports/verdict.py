@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from .frontier import Contest
 
@@ -47,7 +47,11 @@ def _lost(scene: str, engine: str, members: list[Contest]) -> str:
 
 
 def _errors(contests: list[Contest]) -> str:
-    return ", ".join(f"{c.error:.0e}" for c in contests) + " rad"
+    """Return the errors, every decade in between left out where they are neighbours."""
+    errors = [c.error for c in contests]
+    neighbours = all(1 < a / b < 11 for a, b in pairwise(errors))
+    shown = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
+    return f"{shown} rad"
 
 
 def _range(factors: list[float]) -> str:

@@ -74,6 +74,12 @@ def test_verdict_where_ours_wins_everywhere():
     assert lines[0] == "**made_up**: no engine beats us at any error that it reaches."
 
 
+def test_verdict_joins_neighbouring_decades():
+    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS, *ENGINE))))
+    assert "reaches 1e-07, 1e-08 rad" in lines[0]
+    assert "1e-04 to 1e-06 rad" in lines[0]
+
+
 def test_verdict_without_engines_claims_nothing():
     lines = verdict.lines(frontier.contests(frontier.points(table(*OURS)), [1e-2]))
     assert lines == ["**made_up**: no engine was measured."]

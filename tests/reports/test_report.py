@@ -168,6 +168,11 @@ def test_colours_belong_to_families_whatever_else_is_drawn():
     assert list(marks.values()) == [0, 1, 0]
 
 
+def test_legends_follow_the_families_and_the_numbers_in_a_name():
+    names = ["mujoco 4.0.0 RK4", "reduced order=10", "their_own", "reduced order=4", "reduced", "heyoka 7.13.2 tol=1e-06,body"]
+    assert style.series_order(names) == [names[4], names[3], names[1], names[5], names[0], names[2]]
+
+
 def test_provenance_names_what_can_change_a_number():
     found = provenance(["report", "--out", "a b"])
     assert found.command == "conservative report --out 'a b'"
