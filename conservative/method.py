@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -124,6 +124,7 @@ class Method(ABC):
         return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
 
 
+@lru_cache(maxsize=1024)
 def settings_text(value: Any) -> str:
     """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
     settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
