@@ -1,0 +1,38 @@
+"""Samples in body axes out of what kernels store: quaternions and momenta in principal axes."""
+
+from __future__ import annotations
+
+import math
+
+from . import kernel
+
+
+@kernel
+def to_body_axes(q, L, J_inverse, R_BP, R_WB, w_WB_B):
+    """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from q (n, 4) of any length and L (n, 3); return how many leading samples are finite.
+
+    `R_BP` is None where principal and body axes are the same, which leaves out its products.
+    """
+    finite = 0
+    for i in range(len(q)):
+        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        s = 2.0 / (w * w + x * x + y * y + z * z)
+        rates = (L[i, 0] * J_inverse[0], L[i, 1] * J_inverse[1], L[i, 2] * J_inverse[2])
+        rows = (
+            (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
+            (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)),
+            (s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)),
+        )
+        size = 0.0
+        for j in range(3):
+            if R_BP is None:
+                R_WB[i, j, 0], R_WB[i, j, 1], R_WB[i, j, 2] = rows[j]
+                w_WB_B[i, j] = rates[j]
+            else:
+                for k in range(3):
+                    R_WB[i, j, k] = rows[j][0] * R_BP[k, 0] + rows[j][1] * R_BP[k, 1] + rows[j][2] * R_BP[k, 2]
+                w_WB_B[i, j] = R_BP[j, 0] * rates[0] + R_BP[j, 1] * rates[1] + R_BP[j, 2] * rates[2]
+            size += abs(R_WB[i, j, 0]) + abs(R_WB[i, j, 1]) + abs(R_WB[i, j, 2]) + abs(w_WB_B[i, j])
+        if finite == i and math.isfinite(size):
+            finite = i + 1
+    return finite
