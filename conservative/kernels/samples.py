@@ -9,7 +9,7 @@ from . import kernel
 
 @kernel
 def to_body_axes(q, L, J_inverse, R_BP, R_WB, w_WB_B):
-    """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from q (n, 4) of any length and L (n, 3); return how many leading samples are finite.
+    """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from q (n, 4) of any length and L (n, 3); return how many of the first are finite.
 
     `R_BP` is None where principal and body axes are the same, which leaves out its products.
     """
