@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from conservative.method import Grid, Method
@@ -26,9 +28,10 @@ def intervals(method: Method) -> int:
 
 
 def samples(scene: Scene, method: Method) -> Grid:
-    """Return the grid of the samples alone: that of the truth, and of a method without a step."""
+    """Return the grid of the samples with the fewest steps the method can take: of the truth, and of what has no order."""
     n = intervals(method)
-    return Grid(scene.t_end / n, n)
+    finer = math.ceil(scene.t_end / n / method.longest_step(scene)) or 1
+    return Grid(scene.t_end / (n * finer), n * finer, finer)
 
 
 def steps(scene: Scene, method: Method) -> list[Grid]:

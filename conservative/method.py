@@ -106,6 +106,10 @@ class Method(ABC):
         """Return why the scene cannot be done, None if it can."""
         return None
 
+    def longest_step(self, scene: Scene) -> float:
+        """Return the step, s, up to which it takes the scene; inf where there is no such limit or no step."""
+        return math.inf
+
     @abstractmethod
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.

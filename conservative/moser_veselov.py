@@ -66,6 +66,10 @@ class MoserVeselov(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return None if scene.free else "it is for free bodies"
 
+    def longest_step(self, scene: Scene) -> float:
+        speed = float(np.linalg.norm(scene.w_WB_B0))
+        return 0.99 * LONGEST / speed if speed > 0 else math.inf
+
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in ORDERS)
