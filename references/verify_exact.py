@@ -6,6 +6,9 @@
 Both sides get the same doubles and take them as exact. Free bodies are random in moments (over two decades), in axes (a full
 tensor for two of three), in rates and in units; every fifth starts within 1e-6 of the separatrix. Tops likewise; every tenth
 passes within 1e-5 rad of a pole, and is sampled there.
+
+Measured, largest of 1,000 each: free bodies 1.4e-15 rad (1.2e-15 near the separatrix), tops 1.2e-13 rad (2.2e-14 past a pole).
+The error of the tops is the rounding of their tensors: a body that is symmetric in random axes is not quite so in doubles.
 """
 
 from __future__ import annotations
