@@ -84,6 +84,17 @@ def four(typing, array, index):
 
 
 @intrinsic
+def spread(typing, array, index):
+    """array[index] four times; no bounds are checked."""
+
+    def build(context, builder, sig, args):
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        return _splat(builder, builder.load(builder.gep(data, [args[1]])))
+
+    return FOUR(array, types.intp), build
+
+
+@intrinsic
 def put(typing, array, index, value):
     """array[index : index + 4] = value"""
 
