@@ -29,7 +29,7 @@ _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
 class FunctionPotential:
     """A user's own potential, given by its energy and its gradient as functions of the matrix R_WB.
 
-    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs about a millisecond and not a
+    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs one or two milliseconds, not a
     fraction of a microsecond. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both
     attitudes and D their difference:
 
