@@ -17,7 +17,7 @@ from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import OK
 
-from . import drifts, figures, figures_of_paper, frontier, orders, output, paper, tables, verdict
+from . import drifts, figures, figures_of_paper, frontier, orders, output, page, paper, tables, verdict
 from .progress import Step
 from .provenance import Provenance, provenance
 
@@ -111,6 +111,7 @@ def write_files(made: Plan, measured: Measured, folder: Path, source: Provenance
     """Write pictures, tables, CSV, and last the JSON that lists them."""
     text = render(made, measured, source, lambda name, chart: draw(chart, folder / name, made.png))
     (folder / "report.md").write_text(text, encoding="utf-8")
+    (folder / "index.html").write_text(page.render(made, measured, source), encoding="utf-8")
     measured.table.to_csv(folder / "measurements.csv", index=False)
     files = sorted({path.name for path in folder.iterdir()} | {output.MANIFEST})
     (folder / output.MANIFEST).write_text(as_json(measured.table, source, files), encoding="utf-8")

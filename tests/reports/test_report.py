@@ -27,7 +27,7 @@ def test_report_has_its_files_and_lists_them(made):
     folder, done = made
     names = {path.name for path in folder.iterdir()}
     pictures = {f"{kind}_brick_flip.svg" for kind in ("work_precision", "drift", "convergence")} | {"paper_figure_1.svg"}
-    assert names == pictures | {"report.md", "measurements.csv", "measurements.json"}
+    assert names == pictures | {"report.md", "index.html", "measurements.csv", "measurements.json"}
     assert set(json.loads((folder / "measurements.json").read_text())["files"]) == names
     assert done.stdout.strip().endswith("report.md")
 

@@ -1,0 +1,152 @@
+"""Charts for the page: the pictures' own specifications, without their legends, with hovering and switches.
+
+A legend inside a chart answers to a pointer only. So the page draws its own, of buttons, which set the parameter `hidden` of
+every chart of a figure.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .style import DASHES, SHAPES, colours, series_order, within_family
+
+HIDDEN = "hidden"
+"""Name of the parameter that lists the lines not to draw."""
+DIGITS = 7
+"""Significant digits of a number in a chart; hovering shows six."""
+PATHS = {
+    "circle": "M1 0A1 1 0 1 1-1 0A1 1 0 1 1 1 0Z",
+    "square": "M-.9-.9H.9V.9H-.9Z",
+    "triangle-up": "M0-1L1 .8H-1Z",
+    "diamond": "M0-1.1L.9 0L0 1.1L-.9 0Z",
+    "cross": "M-.35-1H.35V-.35H1V.35H.35V1H-.35V.35H-1V-.35H-.35Z",
+    "triangle-down": "M0 1L1-.8H-1Z",
+    "triangle-left": "M-1 0L.8-1V1Z",
+    "triangle-right": "M1 0L-.8-1V1Z",
+}
+"""Outlines of the marks in a square of side 2, as Vega draws them."""
+
+Spec = dict[str, Any]
+Tooltip = Sequence[tuple[str, str, str]]
+"""Field, "Q" or "N", and title."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A button of a legend: the line's key in the charts, its colour, its mark as an outline or its dash."""
+
+    name: str
+    colour: str
+    path: str
+    dash: str
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One or more charts with one legend; `summary` says in words what they show."""
+
+    name: str
+    title: str
+    summary: str
+    charts: tuple[Spec, ...]
+    legend: tuple[Entry, ...]
+    view: str = ""
+    """ "sphere" where the charts have the parameters `turn` and `tilt`."""
+
+
+def legend(names: Iterable[str], marks: bool) -> tuple[Entry, ...]:
+    """Return the buttons for lines by name: with the marks of the pictures, or else with their dashes."""
+    ordered = series_order(names)
+    colour, number = colours(ordered), within_family(ordered)
+    return tuple(
+        Entry(
+            name,
+            colour[name],
+            PATHS[SHAPES[number[name] % len(SHAPES)]] if marks else "",
+            " ".join(map(str, DASHES[number[name] % len(DASHES)])),
+        )
+        for name in ordered
+    )
+
+
+def lines(charts: Iterable[Spec]) -> list[str]:
+    """Return the names of the lines of charts: what their colours are for."""
+    units = [unit for chart in charts for unit in (chart, *chart.get("layer", ()))]
+    scales = [unit["encoding"]["color"]["scale"] for unit in units if "scale" in unit.get("encoding", {}).get("color", {})]
+    return list(dict.fromkeys(name for scale in scales for name in scale["domain"]))
+
+
+def embedded(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
+    """Return a picture's specification as the page embeds it; a picture of panels becomes a chart a panel."""
+    whole: Spec = chart.to_dict()
+    panels: list[Spec] = whole.pop("vconcat", [])
+    if not panels:
+        whole.pop("title", None)  # the caption of the figure says it
+    return [_panel(panel, whole, tooltip, height) for panel in panels or [whole]]
+
+
+def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
+    units = [panel, *panel.get("layer", ())]
+    for unit in units:
+        _prepare(unit, tooltip)
+    fields = set(_fields(panel))
+    data = whole["datasets"]
+    used = {unit["data"]["name"]: as_csv(data[unit["data"]["name"]], fields) for unit in units if "data" in unit}
+    for unit in units:
+        if "data" in unit:
+            unit["data"] = {"name": unit["data"]["name"], "format": used[unit["data"]["name"]]["format"]}
+    kept = {key: value for key, value in panel.items() if key not in ("config", "$schema")}
+    values = {name: found["values"] for name, found in used.items()}
+    return kept | {"datasets": values, "width": "container", "height": height, "params": [{"name": HIDDEN, "value": []}]}
+
+
+def _prepare(unit: Spec, tooltip: Tooltip) -> None:
+    """Take the legend from a chart or a layer, and give it the filter and what hovering shows."""
+    encoding = unit.get("encoding", {})
+    for channel in ("color", "shape", "strokeDash"):
+        if channel in encoding:
+            encoding[channel] = encoding[channel] | {"legend": None}
+    if encoding.get("color", {}).get("field") == "series":
+        unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum.series) < 0"}, *unit.get("transform", ())]
+        unit["mark"] = unit["mark"] | {"tooltip": True}
+        encoding["tooltip"] = [_shown(*part) for part in tooltip]
+
+
+def _shown(field: str, kind: str, title: str) -> Spec:
+    return {"field": field, "type": "quantitative", "format": ".6g", "title": title} if kind == "Q" else _text(field, title)
+
+
+def _text(field: str, title: str) -> Spec:
+    return {"field": field, "type": "nominal", "title": title}
+
+
+def _fields(spec: Any) -> Iterator[str]:
+    """Yield every field that a specification refers to."""
+    if isinstance(spec, dict):
+        if isinstance(spec.get("field"), str):
+            yield spec["field"]
+        for value in spec.values():
+            yield from _fields(value)
+    elif isinstance(spec, list):
+        for value in spec:
+            yield from _fields(value)
+
+
+def as_csv(rows: Sequence[dict[str, Any]], fields: Iterable[str]) -> Spec:
+    """Return rows as Vega data in CSV, which is a third as long as JSON; only what is in `fields`, to `DIGITS` digits."""
+    first = rows[0] if rows else {}
+    columns = [name for name in first if name in set(fields)]
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(columns)
+    lines.writerows([_cell(row[name]) for name in columns] for row in rows)
+    numbers = [name for name in columns if isinstance(first[name], int | float)]
+    return {"values": text.getvalue(), "format": {"type": "csv", "parse": dict.fromkeys(numbers, "number")}}
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
