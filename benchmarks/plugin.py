@@ -13,16 +13,39 @@ import pytest
 SUITE = Path(__file__).resolve().parent
 TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
+MAX_TIME, SHORT = "--benchmark-max-time", 0.1
+"""The suite has many points, and times 0.1 s of each unless pytest-benchmark's option says otherwise."""
 MEASURED = pytest.StashKey[list[dict[str, Any]]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Register the option. Options that begin with the same letters, all of pytest-benchmark's, keep their meaning."""
-    parser.getgroup("conservative", "benchmarks of rotation integrators").addoption(
+    """Register the options. Options that begin with the same letters, all of pytest-benchmark's, keep their meaning."""
+    group = parser.getgroup("conservative", "benchmarks of rotation integrators")
+    group.addoption(
         "--benchmark",
         action="store_true",
         dest="conservative_benchmark",
         help="Run benchmarks: those under the paths given, by default the suite that comes with conservative.",
+    )
+    group.addoption(
+        "--gate",
+        action="store_true",
+        dest="conservative_gate",
+        help="With --benchmark: compare with the baseline at the end. Exit code 1: a violation; 2: no baseline.",
+    )
+    group.addoption(
+        "--gate-baseline",
+        default="benchmarks/baseline.json",
+        metavar="FILE",
+        dest="conservative_gate_baseline",
+        help="The baseline, relative to the root of the project (default: %(default)s).",
+    )
+    group.addoption(
+        "--gate-times",
+        choices=("required", "known"),
+        default="required",
+        dest="conservative_gate_times",
+        help="required: fail where the baseline has no times of this machine; known: then gate all but time, and say so.",
     )
 
 
@@ -37,15 +60,29 @@ def pytest_configure(config: pytest.Config) -> None:
     Raises
     ------
     pytest.UsageError
-        pytest-benchmark, which times, is not installed or switched off.
+        pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
     """
     if not wanted(config):
+        if config.getoption("conservative_gate"):
+            raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
         return
     if not config.pluginmanager.hasplugin(TIMER):
         allowed = "allowed after: pip install pytest-benchmark, and without -p no:benchmark"
         raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(SUITE)]
+        if not any(text.startswith(MAX_TIME) for text in config.invocation_params.args):
+            config.option.benchmark_max_time = SHORT
+    if config.getoption("conservative_gate"):
+        _gate(config)
+
+
+def _gate(config: pytest.Config) -> None:
+    if getattr(config.option, "dist", "no") != "no" or hasattr(config, "workerinput"):
+        raise pytest.UsageError("--gate: got -n, under which workers disturb each other's times; allowed with -n0")
+    from .gate_plugin import Gate
+
+    config.pluginmanager.register(Gate(config), "conservative_gate")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,61 +1,48 @@
 """Wall time of every method on every scene, in its own loop, with accuracy in `extra_info`; and the ratios that we claim."""
 
-from functools import cache
 from typing import Any
 
 import pytest
 
-from benchmarks import selection
+from benchmarks import points
 from benchmarks.cases import Case, Done, attempt
 from benchmarks.cost import end_only, stretched
-from benchmarks.errors import measure
-from benchmarks.studies import reference
+from benchmarks.points import Point
 from benchmarks.timing import interleaved, prepared
+from benchmarks.yardstick import time_ratio
 from conservative.method import Method, grid_for
 from conservative.registry import method as named
+from conservative.registry import scene as registered
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
 
-SHOWN = ("attitude error max", "rate error max", "energy drift max", "orthonormality max")
-SCENES = selection.scenes()
-POINTS = [
-    pytest.param(scene, method, id=selection.identifier(scene, method, scene.dt))
-    for scene in SCENES
-    for method in selection.methods(skip_missing=True)
-    if method.room != "truth"
-]
+POINTS = [pytest.param(point, id=point.id) for point in points.points()]
 GOALS = {"mujoco:Euler": 25, "mujoco:RK4": 100, "convected": 100}
 """How many times cheaper than these a step of `reduced` is meant to be on the brick."""
 
 
-@cache
-def truth(scene: Scene) -> Trajectory:
-    exact: Trajectory = reference(scene, grid_for(scene, scene.dt)).trajectory
-    return exact
-
-
-@pytest.mark.parametrize(("scene", "method"), POINTS)
-def test_speed(benchmark: Any, scene: Scene, method: Method) -> None:
+@pytest.mark.parametrize("point", POINTS)
+def test_speed(benchmark: Any, point: Point) -> None:
+    scene, method = point.scene, point.method
     reason = method.unsupported(scene)
     if reason:
         pytest.skip(reason)
     benchmark.group = scene.name
-    grid = grid_for(scene, scene.dt)
-    run, last, cost = prepared(lambda: method.prepare(scene, end_only(grid)))
+    run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
     if method.room == "engine" and not last.ok:
         pytest.xfail(f"{method.label}: {last.status}")  # a finding, which the studies report, and no time to compare
     assert last.status == "ok"
-    found = {name: value for name, value, _ in measure(method.prepare(scene, grid)(), truth(scene))}
-    benchmark.extra_info.update({name: found[name] for name in SHOWN})
-    work = {name: count for name, count in vars(last.counters).items() if count is not None}
-    benchmark.extra_info.update(label=method.label, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
-    benchmark.extra_info.update(work)
+    gated = points.gated(point)
+    benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
+    benchmark.extra_info.update({name: found.value for name, found in gated.items()})
+    benchmark.extra_info["spreads"] = {name: found.spread for name, found in gated.items()}
+    if point.timed:
+        benchmark.extra_info["time ratio"] = time_ratio(method, scene, scene.dt)
     benchmark(run)
 
 
 def test_step_ratios(benchmark: Any) -> None:
     """Times per step on the brick relative to ours, from one interleaved run, beside the goals; nothing is asserted."""
-    scene = SCENES[0]
+    scene = registered("brick_flip")
     ready = {name: long_run(scene, named(name)) for name in ("reduced", *GOALS)}
     timings = interleaved({name: done.run for name, (_, done) in ready.items()}, rounds=15)
     per_step = {name: timings[name].minimum / case.grid.n_steps for name, (case, _) in ready.items()}

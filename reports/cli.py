@@ -9,9 +9,12 @@ import click
 
 EXIT_CODES = """Exit codes:
     0  done
-    1  a run failed: it did not converge, or diverged; or the command was interrupted
-    2  the command or an input cannot be used, or an engine is missing
+    1  a run failed: it did not converge, or diverged; the gate is not passed; or the command was interrupted
+    2  the command or an input cannot be used, or an engine or a baseline is missing
 """
+
+
+_TIMES = "required: fail where the baseline has no times of this machine; known: then compare all but times, and say so."
 
 
 def _epilog(*examples: str) -> str:
@@ -120,6 +123,33 @@ def report(
     bad = document.failed(measured)
     if bad:
         raise click.ClickException("; ".join(bad))
+
+
+@main.command(
+    short_help="Compare benchmarks with a baseline.",
+    epilog=_epilog(
+        "pytest --benchmark --gate                     run and compare; leaves the results where this command finds them",
+        "conservative gate                             compare them again",
+        'conservative gate --update "Fewer corrections"   accept them, with the reason',
+    ),
+)
+@click.argument("results", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--baseline", type=click.Path(path_type=Path), help="The baseline.  [default: benchmarks/baseline.json]")
+@click.option("--times", type=click.Choice(["required", "known"]), default="required", show_default=True, help=_TIMES)
+@click.option(
+    "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."
+)
+def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: str | None) -> None:
+    """Compare RESULTS of `pytest --benchmark` with the baseline; by default those of the last run with --gate.
+
+    Exits with 1 and a line for each violation, or with 2 where there is no baseline to compare with.
+    """
+    from . import gating
+
+    text, passed = gating.gate(results, baseline, times) if update is None else gating.update(results, baseline, update)
+    click.echo(text)
+    if not passed:
+        raise click.exceptions.Exit(1)
 
 
 @main.command(
