@@ -17,6 +17,7 @@ from .errors import MissingEngine as MissingEngine
 from .errors import NotConverged as NotConverged
 from .errors import PotentialFailed as PotentialFailed
 from .errors import Unsupported as Unsupported
+from .errors import WrongBranch as WrongBranch
 from .function_potential import FunctionPotential as FunctionPotential
 from .gravity_gradient import GravityGradient as GravityGradient
 from .invariants import Invariant as Invariant
@@ -31,6 +32,7 @@ from .potential import Potential as Potential
 from .potential import UniformGravity as UniformGravity
 from .reduced import Reduced as Reduced
 from .scene import Scene as Scene
+from .substepped import Substepped as Substepped
 from .trajectory import Counters as Counters
 from .trajectory import Trajectory as Trajectory
 from .version import VERSION as VERSION

@@ -36,17 +36,26 @@ class IntegrationFailed(ArithmeticError):
 class NotConverged(IntegrationFailed):
     """The equations of a step could not be solved.
 
-    Attributes: `step` (number of the step that failed, from 1), `time` (s, at its start) and `residual` (last size of the
-    residual, or of the correction relative to the unknown).
+    Attributes: `step` (number of the step that failed, from 1), `time` (s, at its start), `residual` (last size of the
+    residual, or of the correction relative to the unknown) and `reason` (more about it; may be empty).
     """
 
-    def __init__(self, step: int, time: float, residual: float) -> None:
-        self.step, self.time, self.residual = step, time, residual
-        self.status = f"not converged in step {step} at t = {time:g} s (residual {residual:.3g})"
+    kind = "not converged"
+
+    def __init__(self, step: int, time: float, residual: float, reason: str = "") -> None:
+        self.step, self.time, self.residual, self.reason = step, time, residual, reason
+        why = f"{reason}; residual" if reason else "residual"
+        self.status = f"{self.kind} in step {step} at t = {time:g} s ({why} {residual:.3g})"
         super().__init__(
             f"dt: got a step whose equations have no solution within reach: {self.status}; "
             "allowed: a shorter step, or on_failure='return' to keep what was reached"
         )
+
+
+class WrongBranch(NotConverged):
+    """The equations of a step have solutions, none of which is the one that the state leads to continuously."""
+
+    kind = "wrong branch"
 
 
 class Diverged(IntegrationFailed):
@@ -81,7 +90,9 @@ class AccuracyNotReached(UserWarning):
 
     def __init__(self, error: float, estimate: float) -> None:
         self.error, self.estimate = error, estimate
-        super().__init__(f"error: got {error:g} rad; allowed: what round-off leaves on this scene, an estimated {estimate:.2g} rad")
+        super().__init__(
+            f"error: got {error:g} rad; allowed: what round-off leaves on this scene, an estimated {estimate:.2g} rad"
+        )
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

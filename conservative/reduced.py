@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from .attitude import Array
 from .check import choice, positive_number
 from .composition import BEST, composition_of
-from .errors import NotConverged
+from .errors import NotConverged, WrongBranch
 from .frames import FRAMES, Frame, frame_unsupported, resolved, without_spin
 from .method import Grid, Method, Run
 from .principal import principal_start
 from .scene import Scene
 from .trajectory import Counters, Trajectory
+
+NO_SOLUTION = "no continuous solution"
+"""Why a step fails: what the state leads to continuously, as the step grows from 0, ends before the whole step."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ class Reduced(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         frame = resolved(self.frame, scene)
-        label = replace(self, frame=frame).label
+        label = self.label if frame == self.frame else replace(self, frame=frame).label
         if frame == "body":
             return self._prepared(scene, grid, label)
         slow = without_spin(scene)
@@ -90,15 +95,22 @@ class Reduced(Method):
         from .kernels.march import march
 
         start = principal_start(scene)
-        stages = np.array(composition_of(self.order, self.composition).lengths(grid.dt))
+        stages = stage_lengths(self.order, self.composition, grid.dt)
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, corrections, size = march(
+            done, corrections, size, elsewhere = march(
                 stages, grid.n_steps, grid.every, start.J, start.J_inverse, start.field, self.tol, start.q, start.L, q, L
             )
-            failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, size)
+            failed = WrongBranch if elsewhere else NotConverged
+            failure = None if done == grid.n_steps else failed(done + 1, done * grid.dt, size, NO_SOLUTION)
             work = Counters(steps=done, stages=done * len(stages), iterations=corrections)
             return start.trajectory(label, grid, done, q, L, work, failure)
 
         return run
+
+
+@lru_cache(maxsize=256)
+def stage_lengths(order: int, composition: str | None, dt: float) -> Array:
+    """Return the lengths (stages,), s, of the stages of a step dt."""
+    return np.array(composition_of(order, composition).lengths(dt))

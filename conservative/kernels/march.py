@@ -8,6 +8,9 @@ Unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal ax
 
 Arithmetic is a chain of dependent operations here, so what counts is the length of that chain and not the number of operations:
 the first guess and its tangent need no L, so that a processor works on them while it still waits for the last step's L.
+
+The equation has several solutions at large steps. The step is the one on the continuous branch a(h) from a(0) = 0. Newton's
+answer is taken where its corrections are small and shrink from the first one on; where they do not, the branch is followed.
 """
 
 from __future__ import annotations
@@ -19,6 +22,12 @@ from .fields import body_torque, finite_torque
 from .vector import accumulate, add, applied, cross, dot, inverse, product, scaled, subtract, times
 
 MAX_ITERATIONS = 30
+FEW = 4
+"""Corrections within which Newton's method is near its solution from the first one on."""
+NEAR, NEAR_ZERO = 0.25, 1e-4
+"""Square of what they sum to, relative to a^2 and absolute, up to which the first guess was near the solution."""
+FIRST_PART, SHORTEST_PART = 0.25, 2.0**-14
+"""Parts of h in which the branch is followed: the first, and the one so short that the branch must have ended."""
 SMOOTH = 0.04
 """Square of the relative change of a from step to step up to which a is extrapolated."""
 
@@ -70,24 +79,76 @@ def inverse_tangent(h, J, field, q, a):
 
 
 @small
-def solved(h, J, field, q, L, a, tolerance):
-    """Return (a, corrections made, size of the last relative to a, or -1 times it where Newton gave up), from a first guess a.
+def solved(h, J, field, q, L, guess, tolerance):
+    """Return (a, corrections made, size of the last, whether to trust it), from a first guess of a.
 
-    A Newton correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER
-    that one, if s^3 <= tolerance. Stopping where a residual is small enough instead would bias the energy (method, section 9).
+    Newton's answer is trusted where it takes few corrections (`FEW`) that lead not far away from the guess (`NEAR`), and the
+    determinant of the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
+    A correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER that
+    one, if s^3 <= tolerance. Stopping where a residual is small enough instead would bias the energy (method, section 9).
     """
     bound = tolerance * tolerance
-    size = math.inf
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    a = guess
+    for iteration in range(1, FEW + 1):
         rows = inverse_tangent(h, J, field, q, a)
         correction = applied(rows, residual(h, J, field, q, L, a))
         a = subtract(a, correction)
         square = dot(correction, correction)
         scale = dot(a, a)
         if square * square * square <= bound * (scale * scale * scale):
-            return subtract(a, applied(rows, residual(h, J, field, q, L, a))), iteration + 1, math.sqrt(square)
-        size = math.sqrt(square / scale)
-    return a, MAX_ITERATIONS, -size
+            away = subtract(a, guess)
+            trusted = dot(away, away) <= NEAR * scale + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
+            return subtract(a, applied(rows, residual(h, J, field, q, L, a))), iteration + 1, math.sqrt(square), trusted
+    return a, FEW, math.inf, False
+
+
+@kernel
+def followed(h, J, J_inverse, field, q, L, tolerance):
+    """Return what `solved` does by way of shorter steps: a(h) along the branch from a(0) = 0, in parts as long as can be.
+
+    Each guess is on the tangent of the branch. Where the branch ends before h, the size is not of a correction but the residual
+    at that end, relative to the right side.
+    """
+    a, slope = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    reached, part, corrections = 0.0, FIRST_PART, 0
+    while part >= SHORTEST_PART:
+        aim = min(reached + part, 1.0)
+        hs = aim * h
+        guess = add(a, scaled((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, q, L)
+        found, iterations, size, trusted = solved(hs, J, field, q, L, guess, tolerance)
+        corrections += iterations
+        if not trusted:
+            part *= 0.5
+            continue
+        if aim == 1.0:
+            return found, corrections, size, True
+        a, reached, part = found, aim, 2.0 * part
+        rows = inverse_tangent(hs, J, field, q, a)
+        slope = scaled(0.5, applied(rows, forcing(hs, field, q, L, a)))
+    r = residual(h, J, field, q, L, a)
+    f = forcing(0.5 * h, field, q, L, a)
+    return a, corrections, math.sqrt(dot(r, r) / dot(f, f)) / abs(0.5 * h), False
+
+
+@small
+def forcing(h, field, q, L, a):
+    """Twice the derivative by h of the right side of the equation for a, L0 + h (T - a x T)."""
+    if field is None:
+        return L
+    T = finite_torque(field, q, a)[0]
+    return add(L, scaled(h, subtract(T, cross(a, T))))
+
+
+@kernel
+def any_solution(h, J, J_inverse, field, q, L):
+    """Whether Newton's method from the explicit guess, trusted or not, ends at a solution of the equation."""
+    a = explicit_guess(h, J_inverse, field, q, L)
+    for _ in range(MAX_ITERATIONS):
+        correction = applied(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
+        a = subtract(a, correction)
+        if dot(correction, correction) <= 1e-24 * dot(a, a):
+            return True
+    return False
 
 
 @kernel
@@ -95,41 +156,71 @@ def march(h_stages, n_steps, every, J, J_inverse, field, tolerance, q0, L0, q_ou
     """Take n_steps steps, each of the stages h_stages (s), and store every `every`-th state and the last.
 
     Attitude and momentum are summed with compensation. Returns (steps done, corrections made, relative size of the last
-    correction); steps done < n_steps means that the next one did not converge.
+    correction, False). Steps done < n_steps means that the next one has no solution on the continuous branch; then the third
+    is the residual where the branch ends, and the fourth whether Newton's method finds a solution elsewhere.
     """
-    q, q_carry = q0, (0.0, 0.0, 0.0, 0.0)
-    L, L_carry = L0, (0.0, 0.0, 0.0)
-    q_out[0, :] = q
-    L_out[0, :] = L
-    row, corrections, size = 0, 0, 0.0
-    until_sample = every
+    q_out[0, :] = q0
+    L_out[0, :] = L0
+    state = (q0, (0.0, 0.0, 0.0, 0.0), L0, (0.0, 0.0, 0.0))
+    at, row, corrections = (1, 0), 0, 0
+    while True:
+        at, row, more, size, state = direct(
+            h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out
+        )
+        corrections += more
+        step, stage = at
+        if step > n_steps:
+            return n_steps, corrections, size, False
+        q, q_carry, L, L_carry = state
+        h = h_stages[stage]
+        a, more, size, found = followed(h, J, J_inverse, field, q, L, tolerance)
+        corrections += more
+        if not found:
+            return step - 1, corrections, size, any_solution(h, J, J_inverse, field, q, L)
+        L, L_carry = turned_momentum(h, J, field, q, a, L, L_carry)
+        q, q_carry = turned_attitude(a, q, q_carry)
+        at, state = (step, stage + 1), (q, q_carry, L, L_carry)
+
+
+@kernel
+def direct(h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out):
+    """Go on at a step and stage up to the end, or to a stage whose solution is not to be trusted; return what `march` needs.
+
+    What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
+    """
+    first_step, first = at
+    q, q_carry, L, L_carry = state
+    corrections, size = 0, 0.0
+    until_sample = every - (first_step - 1) % every
     # One stage a step: the last six solutions are equally spaced in time, and their extrapolation beats the explicit guess.
     unknown = (math.nan, math.nan, math.nan)
     past = (unknown, unknown, unknown, unknown, unknown, unknown)
     known = 0
-    for step in range(1, n_steps + 1):
-        for h in h_stages:
+    for step in range(first_step, n_steps + 1):
+        for stage in range(first, len(h_stages)):
+            h = h_stages[stage]
             if known >= 6:
                 a = (extrapolated(0, past), extrapolated(1, past), extrapolated(2, past))
             else:
                 a = explicit_guess(h, J_inverse, field, q, L)
-            a, iterations, size = solved(h, J, field, q, L, a, tolerance)
+            a, iterations, size, trusted = solved(h, J, field, q, L, a, tolerance)
             corrections += iterations
-            if not size >= 0.0:
-                return step - 1, corrections, -size
+            if not trusted:
+                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry)
             if len(h_stages) == 1:
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
             L, L_carry = turned_momentum(h, J, field, q, a, L, L_carry)
             q, q_carry = turned_attitude(a, q, q_carry)
+        first = 0
         until_sample -= 1
         if until_sample == 0 or step == n_steps:
             until_sample = every
             row += 1
             q_out[row, :] = q
             L_out[row, :] = L
-    return n_steps, corrections, size
+    return (n_steps + 1, 0), row, corrections, size, (q, q_carry, L, L_carry)
 
 
 @small

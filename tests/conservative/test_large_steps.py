@@ -1,0 +1,139 @@
+"""Steps of a radian and more: the solution is that of the continuous branch, or there is none and it is said so."""
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import rotation_about
+from conservative.registry import method
+
+TURN = rotation_about((3, -1, 2), 1.3)
+
+
+def free_body(seed: int, rate: float = 1.0) -> cv.Scene:
+    """A random body with a random spin of `rate` rad/s, both in axes of no meaning."""
+    draw = np.random.default_rng(seed)
+    a, b, c = draw.exponential(size=3)
+    body = cv.RigidBody(TURN @ np.diag([b + c, a + c, a + b]) @ TURN.T)
+    w = draw.normal(size=3)
+    return cv.Scene("generic", body, rotation_about(w, 0.8), rate * w / np.linalg.norm(w), 100.0)
+
+
+def on_axis(disturbance: float) -> cv.Scene:
+    """The brick spun about its middle axis at 1 rad/s, with a disturbance."""
+    return cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, disturbance, 1.0), 100.0)
+
+
+def homotopy(scene: cv.Scene, h: float, parts: int = 300) -> np.ndarray:
+    """Momentum after one step of h, followed from a step of 0 by tiny parts: plain NumPy, free bodies, body axes."""
+    J, L = scene.body.inertia, scene.body.momentum(scene.w_WB_B0)
+    a = np.zeros(3)
+    for part in np.linspace(0, h, parts + 1)[1:]:
+        for _ in range(3):
+            tangent = J + np.cross(a, J.T).T - np.cross(J @ a, np.eye(3)).T
+            assert np.linalg.det(tangent) > 0
+            a = a - np.linalg.solve(tangent, J @ a + np.cross(a, J @ a) - part / 2 * L)
+    return L + 4 / h * np.cross(J @ a, a)
+
+
+@pytest.mark.parametrize("turn", [0.5, 2.0, 4.0, 8.0])
+def test_large_steps_stay_on_the_continuous_branch(turn: float) -> None:
+    off = []
+    for seed in range(6):
+        scene = free_body(seed)
+        run = cv.Reduced().run(scene, turn, turn)
+        assert run.ok
+        size = np.linalg.norm(scene.body.momentum(scene.w_WB_B0))
+        off.append(np.linalg.norm(scene.body.momentum(run.w_WB_B[-1]) - homotopy(scene, turn)) / size)
+    assert max(off) < 1e-12  # measured 1.2e-15
+
+
+def test_newton_alone_would_have_taken_another_branch() -> None:
+    # Spun about the middle axis the steady spin solves the equation at any step, but from |w| dt = 4.16 on it is not what a
+    # disturbed spin leads to continuously.
+    scene, h = on_axis(1e-3), 6.0
+    L0 = scene.body.momentum(scene.w_WB_B0)
+    L1 = scene.body.momentum(cv.Reduced().run(scene, h, h).w_WB_B[-1])
+    assert np.linalg.norm(L1 - homotopy(scene, h)) < 1e-11  # measured 8e-15
+    assert np.linalg.norm(L1 - L0) > 0.3 * np.linalg.norm(L0)  # measured 1.1; the steady spin has 1e-3
+
+
+def test_a_branch_that_ends_is_said_so() -> None:
+    scene = on_axis(0.0)  # without a disturbance the branch ends where the two that a disturbance leads to begin
+    assert cv.Reduced().run(scene, 4.0, 4.0).ok
+    run = cv.Reduced().run(scene, 6.0, 18.0)
+    assert isinstance(run.failure, cv.WrongBranch)
+    assert isinstance(run.failure, cv.NotConverged)
+    assert run.status.startswith("wrong branch in step 1 at t = 0 s (no continuous solution; residual ")
+    assert 0.1 < run.failure.residual < 1  # measured 0.31: the right side is that much longer than the branch reaches
+    with pytest.raises(cv.WrongBranch, match="allowed: a shorter step"):
+        cv.integrate(scene, 6.0, t_end=18.0)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_what_few_corrections_do_not_solve_changes_nothing_else(order: int) -> None:
+    # Samples, counters and invariants where nearly every stage has to follow the branch.
+    scene = free_body(3, 1.0)
+    run = cv.Reduced(order).run(scene, 5.0, 150.0, sample_every=4)
+    assert run.ok
+    assert np.array_equal(run.t, np.append(np.arange(0, 30, 4), 30) * 5.0)
+    assert run.counters.steps == 30
+    assert run.counters.iterations > 5 * run.counters.stages
+    assert np.ptp(run.energy) / scene.energy_scale < 1e-13  # measured 1.2e-15
+    drift = np.linalg.norm(run.momentum_W - run.momentum_W[0], axis=1).max()
+    assert drift / np.linalg.norm(run.momentum_W[0]) < 1e-13  # measured 2e-15
+    every = cv.Reduced(order).run(scene, 5.0, 150.0)
+    assert np.array_equal(every.R_WB[[0, 4, 8, 30]], run.R_WB[[0, 1, 2, -1]])
+
+
+def test_large_steps_are_reversible() -> None:
+    # A step that jumps to another branch is not found again backwards.
+    scene = free_body(5, 1.0)
+    there = cv.Reduced().run(scene, 2.5, 100.0)
+    back = cv.Reduced().run(scene.renamed("back", R_WB0=there.R_WB[-1], w_WB_B0=-there.w_WB_B[-1]), 2.5, 100.0)
+    assert np.abs(back.R_WB[-1] - scene.R_WB0).max() < 1e-12  # measured 9e-15
+    assert np.abs(back.w_WB_B[-1] + scene.w_WB_B0).max() < 1e-12  # measured 5e-15
+
+
+def test_substepping_is_offered_by_name_and_never_silent() -> None:
+    scene = on_axis(0.0)
+    run = method("substepped:reduced,most=8").run(scene, 6.0, 18.0, sample_every=2)
+    assert run.ok
+    assert run.label.endswith("substepped:most=8, 2 parts a step")
+    assert np.array_equal(run.t, [0, 12, 18])
+    assert run.counters.steps == 6
+    plain = cv.Reduced().run(scene, 3.0, 18.0, sample_every=4)
+    assert np.array_equal(run.R_WB, plain.R_WB)
+    short = method("substepped:most=8").run(scene, 1.0, 9.0)
+    assert short.label.endswith("substepped:most=8")
+    assert np.array_equal(short.R_WB, cv.Reduced().run(scene, 1.0, 9.0).R_WB)
+    failed = cv.Substepped(most=1).run(scene, 6.0, 18.0)
+    assert isinstance(failed.failure, cv.WrongBranch)
+
+
+def test_substepping_passes_on_what_its_method_is() -> None:
+    found = method("substepped:method=reduced:order=4/frame=auto,most=16")
+    assert found.inner == cv.Reduced(4, frame="auto")
+    assert method(found.name) == found
+    assert found.order == 4
+    assert found.conserves == found.inner.conserves
+    top = cv.Substepped("reduced:order=2/frame=non_spinning")
+    assert top.unsupported(cv.scenes.brick_flip()) == top.inner.unsupported(cv.scenes.brick_flip())
+
+
+@pytest.mark.parametrize(
+    ("settings", "argument"),
+    [
+        ({"most": 0}, "most"),
+        ({"most": 2.0}, "most"),
+        ({"method": "reducd"}, "method"),
+        ({"method": "lame"}, "method"),
+        ({"method": "substepped"}, "method"),
+        ({"method": 3}, "method"),
+        ({"method": "reduced:order=3"}, "order"),
+    ],
+)
+def test_bad_substepping(settings, argument) -> None:
+    with pytest.raises(cv.BadInput) as caught:
+        cv.Substepped(**settings)
+    assert caught.value.argument == argument
