@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from .attitude import Array
 from .check import positive_number
 from .errors import NotConverged
 from .method import Grid, Method, Run
 from .scene import Scene
 from .trajectory import Counters, Trajectory
+
+MAX_ITERATIONS = 20
+Linearised = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -46,21 +52,60 @@ class Convected(Method):
         return frozenset({"energy", "momentum", "vertical momentum"})
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from .kernels.convected import G, conjugate_momentum, march
+        from .kernels.convected import G, conjugate_momentum
 
         q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
-        p0 = conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))
+        u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
         J_inverse = np.ascontiguousarray(scene.body.inverse)
-        field = None if scene.potential is None else scene.potential.kernel_field(np.eye(3))
+        linearised = _linearised(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
-            q, p = np.empty((grid.n_samples, 9)), np.empty((grid.n_samples, 9))
-            done, corrections, norm = march(grid.dt, grid.n_steps, grid.every, J_inverse, field, self.tol, q0, p0, q, p)
-            kept = grid.kept(done)
-            L = np.array([-G(q[i]) @ p[i] for i in range(kept)])
-            R_WB = np.swapaxes(q[:kept].reshape(-1, 3, 3), 1, 2)
-            failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, norm)
+            u, corrections, failure = _march(linearised, u0, grid, self.tol)
+            q, p = u[:, :9].copy(), u[:, 9:].copy()
+            L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
+            R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
+            done = grid.n_steps if failure is None else failure.step - 1
             work = Counters(steps=done, stages=done, iterations=corrections)
-            return Trajectory(scene, grid.t[:kept], R_WB, L @ J_inverse, self.label, work, failure)
+            return Trajectory(scene, grid.t[: len(u)], R_WB, L @ J_inverse, self.label, work, failure)
 
         return run
+
+
+def _linearised(scene: Scene, dt: float, J_inverse: Array) -> Linearised:
+    """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
+    from .kernels.convected import finite_gradient, residual_and_tangent
+
+    if scene.potential is None:
+        return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
+    field = scene.potential.kernel_field(np.eye(3))
+
+    def linearised(u0: Array, u1: Array) -> tuple[Array, Array]:
+        V_star, dV_star = finite_gradient(field, u0[:9], u1[:9])
+        return residual_and_tangent(dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
+
+    return linearised
+
+
+def _march(linearised: Linearised, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
+    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did."""
+    samples, total = [u], 0
+    for step in range(1, grid.n_steps + 1):
+        u, corrections, norm = _stepped(linearised, u, tol)
+        total += corrections
+        if not norm <= tol:
+            return np.array(samples), total, NotConverged(step, (step - 1) * grid.dt, norm)
+        if step % grid.every == 0 or step == grid.n_steps:
+            samples.append(u)
+    return np.array(samples), total, None
+
+
+def _stepped(linearised: Linearised, u0: Array, tol: float) -> tuple[Array, int, float]:
+    """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
+    u = u0  # 2) prediction: the state itself
+    for corrections in range(MAX_ITERATIONS + 1):
+        r, K = linearised(u0, u)  # 3)
+        norm = math.sqrt(r @ r)
+        if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
+            break
+        u = u - np.linalg.solve(K, r)  # 4), (28)
+    return u, corrections, norm

@@ -17,8 +17,6 @@ import numpy as np
 from . import kernel
 from .fields import finite_derivative
 
-MAX_ITERATIONS = 20
-
 
 @kernel
 def skew(a):
@@ -81,8 +79,10 @@ def conjugate_momentum(q, L):
 
 
 @kernel
-def residual_and_tangent(dt, J_inverse, field, q0, p0, q1, p1):
+def residual_and_tangent(dt, J_inverse, V_star, dV_star, q0, p0, q1, p1):
     """Return r (18,) of (27a, b) with (23), (25), (26) and K = dr/du (18, 18) of (29), analytic.
+
+    `V_star` (9,) is the finite derivative of the potential, dV_star (9, 9) its derivative by q1; both None for a free body.
 
     The projection of V_star in (25) and the multipliers (26) enter as one vector of six, kappa = lam + (C C')^-1 C V_star.
     """
@@ -93,8 +93,7 @@ def residual_and_tangent(dt, J_inverse, field, q0, p0, q1, p1):
     CC = Cq @ Cq.T
     # (26), with the sign that follows from mu = -mean(G(p) q)
     rhs = -(Cq @ Hp + Cp @ Hq)
-    if field is not None:
-        V_star, dV_star = finite_derivative(field, q0, q1)
+    if V_star is not None:
         rhs += Cq @ V_star
     kappa = np.linalg.solve(CC, rhs)
     # (27a), (27b)
@@ -110,7 +109,7 @@ def residual_and_tangent(dt, J_inverse, field, q0, p0, q1, p1):
     rhs_p = -0.5 * (Cq @ Hn + C(Hq)) - by_nu @ nu_p
     # from d(C C') kappa + C C' d(kappa) = d(rhs)
     rhs_q -= 0.5 * (C(Cq.T @ kappa) + Cq @ Sk)
-    if field is not None:
+    if V_star is not None:
         rhs_q += 0.5 * C(V_star) + Cq @ dV_star
     kappa_u = np.linalg.solve(CC, np.hstack((rhs_q, rhs_p)))
     one = np.eye(9)
@@ -120,33 +119,13 @@ def residual_and_tangent(dt, J_inverse, field, q0, p0, q1, p1):
     K[9:, :9] = -dt * (Gp @ nu_q + 0.5 * Sk)
     K[9:, 9:] = one - dt * (0.5 * Hn + Gp @ nu_p)
     K[9:, :] -= dt * (Cq.T @ kappa_u)
-    if field is not None:
+    if V_star is not None:
         r[9:] += dt * V_star
         K[9:, :9] += dt * dV_star
     return r, K
 
 
 @kernel
-def march(dt, n_steps, every, J_inverse, field, tol, q, p, q_out, p_out):
-    """Table 1: n_steps steps, storing every `every`-th state and the last.
-
-    Returns (steps done, corrections made, last norm of the residual); steps done < n_steps where one did not converge.
-    """
-    q_out[0], p_out[0] = q, p
-    row, corrections, norm = 0, 0, 0.0
-    for step in range(1, n_steps + 1):
-        u = np.concatenate((q, p))  # 2) predictor: the state itself
-        for iteration in range(MAX_ITERATIONS + 1):
-            r, K = residual_and_tangent(dt, J_inverse, field, q, p, u[:9], u[9:])  # 3)
-            norm = np.linalg.norm(r)
-            if norm <= tol:
-                break
-            if iteration == MAX_ITERATIONS or not np.isfinite(norm):
-                return step - 1, corrections, norm
-            u -= np.linalg.solve(K, r)  # 4), (28)
-            corrections += 1
-        q, p = u[:9].copy(), u[9:].copy()
-        if step % every == 0 or step == n_steps:
-            row += 1
-            q_out[row], p_out[row] = q, p
-    return n_steps, corrections, norm
+def finite_gradient(field, q0, q1):
+    """V* (9,) between base vectors q0 and q1, and its derivative by q1 (9, 9)."""
+    return finite_derivative(field, q0, q1)
