@@ -239,7 +239,8 @@ def top_motion(start: Top) -> TopMotion:
     w_scale = mp.sqrt(2 * start.k * (u_E - roots.u1))
     values = (start.alpha, start.beta, start.w / w_scale)
     slopes = (*start.slopes[:2], start.slopes[2] / w_scale)
-    factors = [factor(a, omega, v0, v, *rest) for a, *rest in zip(shapes, rates, values, slopes, strict=True)]
+    parts = zip(shapes, rates, values, slopes, strict=True)
+    alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
     R_BP = as_array(start.R_BP)
     argument = Clock(v0, omega, 2 * lattice.K)
-    return TopMotion(argument, lattice, *factors, float(w_scale), float(start.spin), R_BP, rounded_halves(start.R_BP.T))
+    return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, rounded_halves(start.R_BP.T))
