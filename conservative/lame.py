@@ -24,7 +24,7 @@ ordinary states.
 The constants belong to one energy and one momentum, so round-off alone would let both wander, linearly, and near a steady
 precession exponentially. Each step therefore ends with the smallest change of the state that restores them.
 
-Why not something else on tops: `Gauss` needs some thirty times the work for 1e-12 and stays for bodies without symmetry; a Taylor
+Why not something else on tops: `Gauss` needs some thirty times the work and stays for bodies without symmetry; a Taylor
 series of (axis, momentum) evaluates six products to order 20, where this takes one division and no series; compositions of free
 rotations and kicks have a truncation error and bound the energy only.
 """
