@@ -18,6 +18,7 @@ import numpy as np
 from .attitude import angle_between
 from .collocation import Gauss
 from .errors import AccuracyNotReached, IntegrationFailed, Unsupported
+from .lame import Lame
 from .method import Grid, Method
 from .moser_veselov import MoserVeselov
 from .reduced import Reduced
@@ -65,8 +66,9 @@ class Choice:
 
 def candidates(scene: Scene) -> tuple[Method, ...]:
     """Return the methods worth probing on a scene: those on the frontier of time against error for its kind."""
-    if scene.free:
-        return (MoserVeselov(),)
+    for method in (MoserVeselov(), Lame()):  # no truncation error
+        if method.unsupported(scene) is None:
+            return (method,)
     collocations = tuple(Gauss(stages) for stages in (2, 3, 4, 6, 8))
     if collocations[0].unsupported(scene) is None:
         return collocations
@@ -164,7 +166,7 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
     rate = _rate(scene)
     duration = min(t_end, PROBE_RADIANS / rate)
     share = SAFETY * error * min(1.0, 4 * duration / t_end)
-    dt = duration / 2 if method.order else 0.7 / rate
+    dt = duration / 2 if method.order else min(method.longest_step(scene) / 2, t_end / 16)
     attempts: list[tuple[float, float]] = []
     for _ in range(2 * ATTEMPTS):
         grid = _grid(dt, duration, None, 1)

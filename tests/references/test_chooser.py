@@ -12,8 +12,7 @@ from references.exact import Exact
 from references.precise import Precise
 
 SCENES = 200
-KINDS = ("free", "top", "free", "top", "free", "top", "heavy body", "heavy body, tilted axes")
-"""Three in four have a closed form, which is quick; the others wait for multi-precision."""
+KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
 
 
 def random_rotation(rng):
@@ -64,12 +63,12 @@ def test_a_chooser_that_trusts_too_much_is_caught(monkeypatch):
 
     monkeypatch.setattr(chooser, "_trusted", lambda method: 1e9)
     rng = np.random.default_rng(3)
-    errors = [true_error(cv.integrate(random_scene(rng, "top"), error=1e-8)) for _ in range(5)]
+    errors = [true_error(cv.integrate(random_scene(rng, "heavy body"), error=1e-8)) for _ in range(3)]
     assert max(errors) > 1e-7  # measured 2e-4
 
 
 def test_the_choice_is_told():
-    trajectory = cv.integrate(cv.scenes.lagrange_top(), error=1e-6)
+    trajectory = cv.integrate(cv.scenes.asymmetric_top(t_end=5.0), error=1e-6)
     choice = trajectory.choice
     assert choice.reached
     assert choice.estimate <= choice.error == 1e-6
