@@ -83,10 +83,12 @@ def lines(charts: Iterable[Spec]) -> list[str]:
 def embedded(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
     """Return a picture's specification as the page embeds it; a picture of panels becomes a chart a panel."""
     whole: Spec = chart.to_dict()
-    panels: list[Spec] = whole.pop("vconcat", [])
-    if not panels:
+    panels: list[Spec] | None = whole.pop("vconcat", None)
+    if panels is None:
         whole.pop("title", None)  # the caption of the figure says it
-    return [_panel(panel, whole, tooltip, height) for panel in panels or [whole]]
+        panels = [whole]
+    shared = {"data": whole["data"]} if "data" in whole else {}  # Altair lifts what all panels have in common
+    return [_panel(shared | panel, whole, tooltip, height) for panel in panels]
 
 
 def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:

@@ -1,0 +1,19 @@
+"""Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip."""
+
+import pytest
+
+
+def pytest_addoption(parser):
+    parser.addoption("--browser", action="store_true", help="Also run the tests that need chromium and its driver.")
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "browser: needs chromium; runs with --browser")
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--browser"):
+        return
+    for item in items:
+        if item.get_closest_marker("browser"):
+            item.add_marker(pytest.mark.skip(reason="needs chromium and its driver: runs with --browser"))

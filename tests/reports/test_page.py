@@ -1,0 +1,264 @@
+import copy
+import json
+import math
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+import vl_convert
+
+from benchmarks.measurement import Measurement, frame
+from conservative import Reduced, RigidBody, Scene, registry, scenes
+from conservative.attitude import rotation_about
+from reports import audit, choosing, document, embedding, figures, importing, page, spheres
+from reports.frontier import points
+from reports.provenance import provenance
+
+from .rows import point
+
+
+def row(study, method, measure, value, dt=0.1, scene="brick_flip", status="ok", room="ours"):
+    return Measurement(study, scene, method, method, room, dt, measure, value, "1", status)
+
+
+def ladder(method, order, scene="brick_flip"):
+    """Errors over steps of a method that has just this order."""
+    return [
+        row("convergence", method, "attitude error max", dt**order, dt, scene) for dt in (0.1, 0.05, 0.025, 0.0125, 0.00625)
+    ]
+
+
+def made_up():
+    lines = [
+        *point("reduced", "ours", 1e-2, 1e-6, scene="brick_flip"),
+        *point("reduced", "ours", 1e-4, 1e-5, 0.01, "brick_flip"),
+    ]
+    lines += [*point("scipy:DOP853", "engine", 1e-3, 1e-4, scene="brick_flip")]
+    drift = [
+        row("drift", "reduced", "energy drift max", 2e-15),
+        row("drift", "mujoco", "energy drift max", 3e-2, room="engine"),
+    ]
+    return frame([*lines, *drift, *ladder("reduced", 2), row("speed", "reduced", "first call time", 0.25)])
+
+
+def measured():
+    samples = pd.DataFrame(
+        [("brick_flip", name, t, "energy", 1e-15 * t) for name in ("reduced", "mujoco") for t in np.linspace(0.5, 60, 120)],
+        columns=["scene", "series", "t", "invariant", "drift"],
+    )
+    return document.Measured(made_up(), samples)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def libraries():
+    """Libraries that are imported in no time, one of which is not there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importing, "MODULES", {"json": "ours", "no_such_library": "engine"})
+        yield
+
+
+@pytest.fixture(scope="module")
+def text(libraries):
+    return page.render(document.plan(["brick_flip"], ["reduced"], quick=True), measured(), provenance(["report"]))
+
+
+class Outward(HTMLParser):
+    """Collects every reference of a tag, and the ids and links within the page."""
+
+    def __init__(self):
+        super().__init__()
+        self.references, self.ids, self.anchors = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.ids += filter(None, [found.get("id")])
+        if tag == "a":
+            self.anchors.append(found["href"])
+        else:
+            self.references += [found[name] for name in ("src", "href", "data", "action") if name in found]
+
+
+def test_page_refers_to_nothing_outside_itself(text):
+    parser = Outward()
+    parser.feed(text)
+    assert parser.references == ["data:,"]
+    assert "url(" not in text.partition("</style>")[0]
+    assert all(anchor.startswith("#") and anchor[1:] in parser.ids for anchor in parser.anchors)
+    assert len(parser.ids) == len(set(parser.ids))
+
+
+def test_page_without_data_leaves_room_for_it(text):
+    assert len(text.encode()) < 1.2e6  # measured 0.95e6; the page of every method on both scenes is 1.9e6 of 3e6
+
+
+def test_sections_come_in_the_order_of_a_reader_who_chooses(text):
+    titles = [re.sub(r"\s+", " ", title) for title in re.findall(r"<h[23][^>]*>(.*?)</h[23]>", text.partition("<script")[0])]
+    wanted = ["Verdict", "brick_flip", "Work against precision", "Drift over time", "Convergence", "The motion itself"]
+    assert titles[:6] == wanted
+    assert titles[6:9] == ["Hard cases", "What is paid once: compile and import", "Audit of claims"]
+    assert titles[-1] == "How this was made"
+    for part in ("conservative report", "commit", "processor", "mujoco"):
+        assert part in text[text.index("<footer") :]
+
+
+def test_hard_cases_that_were_not_studied_are_said_so(text):
+    assert "made without the study of hard cases" in text
+
+
+def test_a_library_that_is_not_there_has_no_import_time(text):
+    assert re.search(r"no_such_library</th><td>engine</td><td>–</td>", text)
+
+
+def test_text_cannot_become_markup():
+    assert "</script" not in page._in_script({"name": "</script><b>"})
+    assert json.loads(page._in_script({"name": "</script>"})) == {"name": "</script>"}
+    scene = Scene("<b>", scenes.brick_flip().body, np.eye(3), (0.1, 0.2, 3.0), 1.0, dt=0.1, source="<i>")
+    shown = page.render(document.Plan((scene,), (Reduced(),), quick=True), measured(), provenance([]))
+    assert "<i>" not in shown
+    assert "&lt;i&gt;" in shown
+    assert "Nothing was measured that could be drawn" in shown
+
+
+def drawn(spec, hidden=()):
+    """Return the picture of a chart with some lines hidden, as the browser would draw it."""
+    spec = copy.deepcopy(spec) | {"width": 300}
+    for parameter in spec["params"]:
+        parameter["value"] = list(hidden)
+    return vl_convert.vegalite_to_svg(json.dumps(spec))
+
+
+def test_chart_draws_its_lines_and_the_switch_takes_one_away():
+    (spec,) = embedding.embedded(figures.work_precision(points(made_up()), "brick_flip"), page._hovering("error"))
+    colour = embedding.legend(["reduced"], True)[0].colour
+    assert drawn(spec).count(colour) > 1
+    assert colour not in drawn(spec, ["reduced"])
+    assert embedding.legend(["scipy DOP853"], True)[0].colour in drawn(spec, ["reduced"])
+    assert "legend" not in json.dumps(spec).replace('"legend": null', "")
+
+
+def test_legend_has_the_lines_of_the_charts():
+    figure = page._work_precision(points(made_up()), "brick_flip")
+    assert [entry.name for entry in figure.legend] == ["reduced", "scipy DOP853"]
+    panels = page._drift(measured().drifts, "brick_flip").charts
+    assert len(panels) == 1
+    assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * page.DRIFT_SAMPLES + 1
+
+
+def test_data_are_short_and_exact_to_their_digits():
+    data = embedding.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
+    assert data["values"].splitlines() == ["name,x", '"a, b",0.3333333', "c,1e-17"]
+    assert data["format"]["parse"] == {"x": "number"}
+
+
+def test_verdict_names_the_cheapest_and_what_it_keeps():
+    header, body = choosing.verdict(made_up(), points(made_up()))
+    rows = [dict(zip(header, line, strict=True)) for line in body]
+    assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
+    assert rows[0]["cheapest"] == "reduced"
+    assert "energy ✓" in rows[0]["conserves"]
+    assert rows[0]["fails"] == "nowhere here"
+
+
+def test_verdict_tells_where_the_cheapest_fails():
+    failed = row("drift", "reduced", "energy drift max", math.nan, scene="other", status="diverged after t = 0.36 s (why)")
+    found = choosing.verdict(frame([failed]), points(made_up()))
+    assert found[1][0][-1] == "other: diverged"
+
+
+def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
+    rows = [row("convergence", "a", "x", math.nan, status="unsupported"), row("drift", "a", "energy drift max", 1e-15)]
+    assert choosing._troubles(frame(rows)).empty
+    assert len(choosing._troubles(frame(rows[:1]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "text", "status"),
+    [
+        (3e-15, "✓ 3.0e-15", "good"),
+        (2e-6, "≈ 2.0e-06", "fair"),
+        (0.3, "✗ 0.3", "bad"),
+        (math.inf, "✗ inf", "bad"),
+        (math.nan, "–", "none"),
+    ],
+)
+def test_drift_is_graded_by_symbol_and_colour(value, text, status):
+    assert choosing.graded(value) == choosing.Cell(text, status)
+
+
+def test_hard_cases_are_a_matrix():
+    rows = [
+        row("hard_cases", "reduced", "energy drift max", 1e-15, scene="needle"),
+        row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", status="not converged in step 3"),
+        row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", room="engine"),
+    ]
+    header, body = choosing.hard_cases(frame(rows))
+    assert header == ["method", "needle", "falling_top"]
+    assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
+    assert choosing.hard_cases(made_up()) is None
+
+
+def verdicts(rows, scene="brick_flip"):
+    return {found.claim: found.verdict for found in audit.findings(frame(rows), [registry.scene(scene)])}
+
+
+@pytest.mark.parametrize(("order", "verdict"), [(4, audit.HOLDS), (2, audit.FAILS)])
+def test_audit_of_an_order(order, verdict):
+    assert verdicts(ladder("reduced:order=4", order)) == {"reduced:order=4 is of order 4 (brick_flip)": verdict}
+
+
+@pytest.mark.parametrize(("drift", "verdict"), [(4e-16, audit.HOLDS), (1e-9, audit.FAILS), (math.nan, audit.FAILS)])
+def test_audit_of_a_conserved_quantity(drift, verdict):
+    rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
+    assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.1, audit.HOLDS), (0.2, audit.FAILS), (math.nan, audit.FAILS)])
+def test_audit_of_one_map_in_two_programs(error, verdict):
+    rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
+    found = verdicts(rows)
+    assert found.get("reduced is the paper's map (brick_flip)", audit.FAILS) == verdict
+
+
+@pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, audit.HOLDS), (0.5, audit.FAILS), (math.nan, audit.FAILS)])
+def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
+    rows = [
+        row("paper", "mujoco", "energy drift max", coarse, 0.01, room="engine"),
+        row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, room="engine"),
+        row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, room="engine"),
+        row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, room="engine"),
+    ]
+    found = verdicts(rows)
+    assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
+    assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == audit.HOLDS
+
+
+@pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
+def test_curves_lie_on_the_unit_sphere(name):
+    found = spheres.curves([registry.scene(name)], [registry.method("reduced")])
+    assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
+    assert 200 < len(found) <= spheres.KEPT
+
+
+def test_polhode_is_the_same_whatever_the_body_axes():
+    base = scenes.brick_flip()
+    S = rotation_about((1.0, 2.0, -0.5), 0.7)
+    turned = Scene("turned", RigidBody(S.T @ base.body.inertia @ S), base.R_WB0 @ S, S.T @ base.w_WB_B0, base.t_end, dt=base.dt)
+    one, other = (np.abs(spheres.curves([scene], [Reduced()])[["x", "y", "z"]].to_numpy()) for scene in (base, turned))
+    assert np.abs(one - other)[:50].max() < 1e-9  # measured 3e-13
+
+
+def test_methods_without_a_curve_are_named():
+    found = spheres.curves([scenes.brick_flip()], [Reduced()])
+    assert spheres.absent(found, "brick_flip", [Reduced(), registry.method("lame")]) == ["lame"]
+
+
+def test_picks_one_method_of_each_family_that_has_no_preferred_one():
+    names = [
+        m.name
+        for m in spheres.chosen(
+            [registry.method(n) for n in ("gauss:stages=2", "gauss", "reduced:order=4", "reduced", "exact")]
+        )
+    ]
+    assert names == ["reduced", "gauss:stages=2"]
