@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from .method import Grid, Method, Run
 from .potential import UniformGravity
 from .principal import PrincipalStart, Quadruple, Triple, principal_start
 from .scene import Scene
-from .tableau import MOST_STAGES, Tableau, tableau
+from .tableau import MOST_STAGES, tableau
 from .trajectory import Counters, Trajectory
 
 
@@ -73,7 +74,7 @@ class Gauss(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         frame = resolved(self.frame, scene)
-        label = replace(self, frame=frame).label
+        label = self.label if frame == self.frame else replace(self, frame=frame).label
         if frame == "body":
             return _prepared(self.stages, scene, grid, label)
         slow = without_spin(scene)
@@ -86,7 +87,7 @@ def _prepared(stages: int, scene: Scene, grid: Grid, label: str) -> Run:
     from .kernels.simd import LANES
 
     start = principal_start(scene)
-    coefficients = padded(tableau(stages), LANES)
+    coefficients = padded(stages, LANES)
     model = closed_system(start)
 
     def run() -> Trajectory:
@@ -99,8 +100,10 @@ def _prepared(stages: int, scene: Scene, grid: Grid, label: str) -> Run:
     return run
 
 
-def padded(table: Tableau, lanes: int) -> tuple[Array, ...]:
+@lru_cache(maxsize=2 * MOST_STAGES)
+def padded(stages: int, lanes: int) -> tuple[Array, ...]:
     """Return A, E by columns and b, b_low, each in one dimension, stages filled up with zeros to a multiple of `lanes`."""
+    table = tableau(stages)
     extra = (0, -len(table.b) % lanes)
     rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
     return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
@@ -122,6 +125,7 @@ class ClosedSystem:
         return self.J_inverse, self.torque, self.L, self.gamma
 
 
+@lru_cache(maxsize=256)
 def closed_system(start: PrincipalStart) -> ClosedSystem:
     """Return the closed system of a start; the vertical of a free body is the direction of its momentum."""
     size = math.hypot(*start.L)

@@ -46,7 +46,7 @@ class Composition:
             raise BadInput("order", self.order, "an even number of 2 or more")
         for power in range(1, self.order, 2):
             wanted = 1 if power == 1 else 0
-            off = abs(sum(w**power for w in self.weights) - wanted)
+            off: Fraction = abs(sum((w**power for w in self.weights), start=Fraction(-wanted)))
             if off > DIGITS:
                 got = f"{self.name} with sum w^{power} off by {float(off):.3g}"
                 raise BadInput("half", got, f"lengths whose sum of powers {power} is {wanted}")

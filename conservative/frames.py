@@ -12,6 +12,7 @@ limited by nutation and no longer by spin.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ Frame = Literal["auto", "body", "non_spinning"]
 FRAMES: tuple[Frame, ...] = ("auto", "body", "non_spinning")
 
 
+@lru_cache(maxsize=256)
 def resolved(frame: Frame, scene: Scene) -> Literal["body", "non_spinning"]:
     """Return the frame that "auto" stands for: "non_spinning" where body and field share an axis of symmetry and it saves work.
 
@@ -40,6 +42,7 @@ def resolved(frame: Frame, scene: Scene) -> Literal["body", "non_spinning"]:
     return "body" if spherical or axial_direction(scene.body, scene.potential) is None else "non_spinning"
 
 
+@lru_cache(maxsize=256)
 def frame_unsupported(frame: Frame, scene: Scene) -> str | None:
     """Return why the scene cannot be integrated in `frame`, None if it can."""
     if frame == "non_spinning" and axial_direction(scene.body, scene.potential) is None:
@@ -92,6 +95,7 @@ class SpinFreeScene:
         return replace(slow, scene=self.spinning, R_WB=R_WB, w_WB_B=w_WB_B, label=label)
 
 
+@lru_cache(maxsize=256)
 def without_spin(scene: Scene) -> SpinFreeScene:
     """Return the slow motion of a symmetric body, free or in a field along its axis.
 

@@ -32,6 +32,7 @@ rotations and kicks have a truncation error and bound the energy only.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -122,6 +123,7 @@ class Upright:
         return replace(done, t=done.t[:finite], R_WB=R_WB[:finite], w_WB_B=w_WB_B[:finite], failure=failure)
 
 
+@lru_cache(maxsize=256)
 def upright(scene: Scene) -> Upright:
     """Return a symmetric scene as the kernel takes it."""
     slow = without_spin(scene)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from .attitude import Array, to_quaternion
 from .errors import BadInput
 from .method import Grid, Method, Run
-from .principal import principal_start
+from .principal import PrincipalStart, principal_start
 from .scene import Scene
 from .trajectory import Counters, Trajectory
 
@@ -79,10 +80,9 @@ class MoserVeselov(Method):
 
         require_short(scene, grid.dt)
         start = principal_start(scene)
-        R_PS = polhode_axes(np.array(start.J), np.array(start.L))
-        p = polhode(*(floats(np.array(start.J) @ np.abs(R_PS))), *floats(np.array(start.L) @ R_PS))
+        R_PS, q_axes, moments, momenta = polhode_start(start)
+        p = polhode(*moments, *momenta)
         step = self._step(p, grid.dt)
-        q_axes = floats(to_quaternion(R_PS))
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
@@ -109,6 +109,14 @@ def require_short(scene: Scene, dt: float) -> None:
         raise BadInput(
             "dt", f"{dt:g}, |w| dt = {speed * dt:.3g} rad", f"a step with |w| dt < {LONGEST:g}: below {LONGEST / speed:.6g} s"
         )
+
+
+@lru_cache(maxsize=256)
+def polhode_start(start: PrincipalStart) -> tuple[Array, Any, Any, Any]:
+    """Return `polhode_axes` as a matrix (3, 3) and as a quaternion, and moments and momenta along them."""
+    J, L = np.array(start.J), np.array(start.L)
+    R_PS = polhode_axes(J, L)
+    return R_PS, floats(to_quaternion(R_PS)), floats(J @ np.abs(R_PS)), floats(L @ R_PS)
 
 
 def polhode_axes(J: Array, L: Array) -> Array:
