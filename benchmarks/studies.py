@@ -1,4 +1,4 @@
-"""Which rows to make: scenes x methods x steps, four kinds of study.
+"""Which rows to make: scenes x methods x steps, six kinds of study.
 
 for study in studies.studies(selection.scenes(), selection.methods()):
     for row in studies.rows(study): ...
@@ -25,7 +25,11 @@ Progress = Callable[[int, int, str], None]
 """Called before each piece of work: pieces done, pieces in all, and what comes next."""
 FindTruth = Callable[[Scene, Grid], "Truth"]
 
-NAMES = ("paper", "convergence", "speed", "work_precision")
+CROSSED = ("paper", "convergence", "speed", "work_precision")
+"""Studies of chosen scenes."""
+HARD = ("stability", "hard_cases")
+"""Studies of the hard cases; the last takes every registered scene."""
+NAMES = CROSSED + HARD
 
 
 @lru_cache(maxsize=32)
@@ -45,6 +49,7 @@ class Study:
     name
         paper: drifts and errors at the paper's steps. convergence: errors over a ladder of steps, and the observed order.
         speed: wall time at the scene's step, all methods interleaved. work_precision: error and time of each step or tolerance.
+        stability: the largest step that works. hard_cases: errors, drifts and status over the first part of each motion.
     scenes, methods
         What is crossed; methods that cannot do a scene get rows that say so.
     quick
@@ -92,8 +97,18 @@ class Study:
 def studies(
     scenes: tuple[Scene, ...], methods: tuple[Method, ...], quick: bool = False, skip_missing: bool = False
 ) -> tuple[Study, ...]:
-    """Return all four studies of the same scenes and methods, in the order of `NAMES`."""
-    return tuple(Study(name, scenes, methods, quick, skip_missing) for name in NAMES)
+    """Return the four studies of the same scenes and methods, in the order of `CROSSED`."""
+    return tuple(Study(name, scenes, methods, quick, skip_missing) for name in CROSSED)
+
+
+def hard(methods: tuple[Method, ...], skip_missing: bool = False) -> tuple[Study, ...]:
+    """Return the studies of the hard cases: stability, and every registered scene with one or two settings of each family."""
+    from . import hard_cases, selection, stability
+
+    return (
+        Study("stability", selection.scenes(stability.SCENES), methods, skip_missing=skip_missing),
+        Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), skip_missing=skip_missing),
+    )
 
 
 def _silent(done: int, total: int, what: str) -> None:
@@ -108,12 +123,14 @@ def rows(study: Study, progress: Progress = _silent) -> Iterator[Measurement]:
     MissingEngine
         An engine is not installed, and the study does not skip what is missing.
     """
-    from . import accuracy, cost
+    from . import accuracy, cost, hard_cases, stability
 
     makers = {
         "paper": accuracy.paper,
         "convergence": accuracy.convergence,
         "speed": cost.speed,
         "work_precision": cost.work_precision,
+        "stability": stability.stability,
+        "hard_cases": hard_cases.hard_cases,
     }
     return makers[study.name](study, progress)

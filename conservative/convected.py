@@ -107,5 +107,8 @@ def _stepped(linearised: Linearised, u0: Array, tol: float) -> tuple[Array, int,
         norm = math.sqrt(r @ r)
         if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
             break
-        u = u - np.linalg.solve(K, r)  # 4), (28)
+        try:
+            u = u - np.linalg.solve(K, r)  # 4), (28)
+        except np.linalg.LinAlgError:  # steps of a radian and more can end up where the tangent is singular
+            break
     return u, corrections, norm

@@ -24,8 +24,11 @@ from .vector import accumulate, add, applied, cross, dot, inverse, product, scal
 MAX_ITERATIONS = 30
 FEW = 4
 """Corrections within which Newton's method is near its solution from the first one on."""
-NEAR, NEAR_ZERO = 0.25, 1e-4
-"""Square of what they sum to, relative to a^2 and absolute, up to which the first guess was near the solution."""
+NEAR, NEAR_TANGENT, NEAR_ZERO = 0.25, 0.01, 1e-4
+"""Square of what they sum to up to which the first guess was near the solution: relative to a^2, if the guess is from the state
+or from earlier steps or if it is on the tangent of the branch; and absolute."""
+REST = 1e-20
+"""a^2 below which corrections need not get smaller in proportion: of a body at rest a is nothing but round-off."""
 FIRST_PART, SHORTEST_PART = 0.25, 2.0**-14
 """Parts of h in which the branch is followed: the first, and the one so short that the branch must have ended."""
 SMOOTH = 0.04
@@ -79,10 +82,10 @@ def inverse_tangent(h, J, field, q, a):
 
 
 @small
-def solved(h, J, field, q, L, guess, tolerance):
+def solved(h, J, field, q, L, guess, near, tolerance):
     """Return (a, corrections made, size of the last, whether to trust it), from a first guess of a.
 
-    Newton's answer is trusted where it takes few corrections (`FEW`) that lead not far away from the guess (`NEAR`), and the
+    Newton's answer is trusted where it takes few corrections (`FEW`) that lead not far away from the guess (`near`), and the
     determinant of the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
     A correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER that
     one, if s^3 <= tolerance. Stopping where a residual is small enough instead would bias the energy (method, section 9).
@@ -94,10 +97,10 @@ def solved(h, J, field, q, L, guess, tolerance):
         correction = applied(rows, residual(h, J, field, q, L, a))
         a = subtract(a, correction)
         square = dot(correction, correction)
-        scale = dot(a, a)
+        scale = dot(a, a) + REST
         if square * square * square <= bound * (scale * scale * scale):
             away = subtract(a, guess)
-            trusted = dot(away, away) <= NEAR * scale + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
+            trusted = dot(away, away) <= near * scale + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
             return subtract(a, applied(rows, residual(h, J, field, q, L, a))), iteration + 1, math.sqrt(square), trusted
     return a, FEW, math.inf, False
 
@@ -115,7 +118,7 @@ def followed(h, J, J_inverse, field, q, L, tolerance):
         aim = min(reached + part, 1.0)
         hs = aim * h
         guess = add(a, scaled((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, q, L)
-        found, iterations, size, trusted = solved(hs, J, field, q, L, guess, tolerance)
+        found, iterations, size, trusted = solved(hs, J, field, q, L, guess, NEAR_TANGENT, tolerance)
         corrections += iterations
         if not trusted:
             part *= 0.5
@@ -146,7 +149,7 @@ def any_solution(h, J, J_inverse, field, q, L):
     for _ in range(MAX_ITERATIONS):
         correction = applied(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
         a = subtract(a, correction)
-        if dot(correction, correction) <= 1e-24 * dot(a, a):
+        if dot(correction, correction) <= 1e-24 * (dot(a, a) + REST):
             return True
     return False
 
@@ -203,7 +206,7 @@ def direct(h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, st
                 a = (extrapolated(0, past), extrapolated(1, past), extrapolated(2, past))
             else:
                 a = explicit_guess(h, J_inverse, field, q, L)
-            a, iterations, size, trusted = solved(h, J, field, q, L, a, tolerance)
+            a, iterations, size, trusted = solved(h, J, field, q, L, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry)

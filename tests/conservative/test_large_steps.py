@@ -86,6 +86,16 @@ def test_what_few_corrections_do_not_solve_changes_nothing_else(order: int) -> N
     assert np.array_equal(every.R_WB[[0, 4, 8, 30]], run.R_WB[[0, 1, 2, -1]])
 
 
+def test_a_body_at_rest_to_round_off_stays_there() -> None:
+    # Its Cayley vector is nothing but round-off, which no iteration makes converge relative to itself.
+    field = cv.UniformGravity(3.0, TURN.T @ (0, 0, -0.2))
+    scene = cv.Scene("hanging", cv.RigidBody((2, 3, 2.5)), TURN, (0, 0, 0), 1.0, field)
+    for dt in (0.01, 0.1, 0.5, 1.0):
+        run = cv.Reduced().run(scene, dt, 100 * dt)
+        assert run.ok
+        assert np.abs(run.R_WB - TURN).max() < 1e-14  # measured 3e-16
+
+
 def test_large_steps_are_reversible() -> None:
     # A step that jumps to another branch is not found again backwards.
     scene = free_body(5, 1.0)

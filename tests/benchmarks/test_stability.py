@@ -1,0 +1,120 @@
+import math
+import time
+from functools import cache
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from benchmarks import stability, studies
+from benchmarks.patience import TooLong, within
+from conservative.attitude import rotation_about
+from references.exact import Exact
+
+TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
+AXIS = cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, 0, 2.0), 2.0)
+"""A spin about the middle axis, whose branch of solutions ends at |w| dt = 4.16."""
+
+
+@cache
+def truth(scene, grid):
+    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+
+
+def rows(*methods, scene=AXIS):
+    study = studies.Study("stability", (scene,), methods, truth=truth)
+    return {(row.method, row.measure): row for row in studies.rows(study)}
+
+
+class Staged(cv.Method):
+    """A method that goes wrong in the way `how` from a step of |w| dt = 1 on."""
+
+    how: ClassVar[str]
+    family: ClassVar[str] = "staged"
+    room: ClassVar[str] = "engine"
+
+    @property
+    def name(self):
+        return self.how
+
+    @property
+    def order(self):
+        return 2
+
+    def prepare(self, scene, grid):
+        if grid.dt * 2.0 < 0.99:
+            return cv.Reduced().prepare(scene, grid)
+        if self.how == "unsupported":
+            raise cv.BadInput("dt", grid.dt, "a shorter step")
+        good = Exact().prepare(scene, grid)()
+        R, w = good.R_WB.copy(), good.w_WB_B.copy()
+        failure = None
+        if self.how == "wrong branch":
+            R[1] = rotation_about((0, 0, 1), -1.5) @ R[0]
+        elif self.how == "diverged at t":
+            w[3:] *= 1.5
+        elif self.how == "not converged":
+            failure = cv.NotConverged(3, 1.0, 0.5)
+
+        def run():
+            if self.how == "engine error":
+                raise RuntimeError("planted")
+            if self.how == "timeout":
+                time.sleep(stability.LIMIT + 0.3)
+            return cv.Trajectory(scene, grid.t, R, w, self.label, failure=failure)
+
+        return run
+
+
+def staged(how):
+    return type("Planted", (Staged,), {"how": how})()
+
+
+@pytest.mark.parametrize("how", stability.KINDS[1:])
+def test_every_kind_of_failure_is_named(how, monkeypatch):
+    monkeypatch.setattr(stability, "LIMIT", 0.3)
+    found = rows(staged(how))
+    assert found[how, stability.LARGEST].value == pytest.approx(0.7)
+    assert found[how, stability.LARGEST].status == "ok"
+    assert found[how, stability.FIRST].value == pytest.approx(1.0)
+    assert found[how, stability.FIRST].status == how
+    assert how in found[how, stability.FIRST].detail
+
+
+def test_our_own_verdict_is_taken():
+    found = rows(cv.Reduced(), cv.Substepped())
+    assert found["reduced", stability.LARGEST].value == pytest.approx(4.0)  # the branch ends at 4.16
+    assert found["reduced", stability.FIRST].status == "wrong branch"
+    assert "no continuous solution" in found["reduced", stability.FIRST].detail
+    assert found["substepped", stability.LARGEST].value == pytest.approx(10.0)
+    assert found["substepped", stability.FIRST].status == "ok"
+    assert math.isnan(found["substepped", stability.FIRST].value)
+
+
+def test_methods_without_a_step_have_no_row():
+    assert rows(cv.MoserVeselov()) == {}
+
+
+def test_a_body_at_rest_is_measured_in_its_own_steps():
+    field = cv.UniformGravity(3.0, TURN.T @ (0, 0, -0.2))  # hanging straight down, to round-off
+    rest = cv.Scene("rest", cv.RigidBody((2, 2, 2)), TURN, (0, 0, 0), 1.0, field, dt=0.01)
+    assert rows(cv.Reduced(), scene=rest)["reduced", stability.LARGEST].value == pytest.approx(10.0)
+
+
+def test_waiting_has_an_end():
+    start = time.perf_counter()
+    with pytest.raises(TooLong, match="abandoned after"):
+        within(0.05, lambda: time.sleep(2))
+    assert time.perf_counter() - start < 1.5
+    assert within(5.0, lambda: 3) == 3
+    with pytest.raises(ZeroDivisionError):
+        within(5.0, lambda: 1 // 0)
+
+
+def test_the_scenes_of_the_study_are_registered():
+    study = studies.hard((cv.Reduced(),))[0]
+    assert tuple(scene.name for scene in study.scenes) == stability.SCENES
+    assert np.all(np.diff(stability.RUNGS) > 0)
+    assert (stability.UNIT * stability.RUNGS[0], stability.UNIT * stability.RUNGS[-1]) == pytest.approx((0.1, 10.0))
