@@ -85,8 +85,9 @@ def embedded(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
     whole: Spec = chart.to_dict()
     panels: list[Spec] | None = whole.pop("vconcat", None)
     if panels is None:
-        whole.pop("title", None)  # the caption of the figure says it
         panels = [whole]
+        for unit in (whole, *whole.get("layer", ())):
+            unit.pop("title", None)  # the caption of the figure says it
     shared = {"data": whole["data"]} if "data" in whole else {}  # Altair lifts what all panels have in common
     return [_panel(shared | panel, whole, tooltip, height) for panel in panels]
 

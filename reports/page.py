@@ -172,9 +172,10 @@ def _spheres(curves: pd.DataFrame, scene: Scene, absent: list[str]) -> Figure:
     what = (
         "The angular momentum in body axes. The exact one is closed: a drift makes it a band, or leaves the sphere."
         if scene.free
-        else "The direction of the body's axis in space. The exact one stays between two circles; one that drifts does not."
+        else "The direction of the body's axis in space. Beside the exact one a wider band tells of a long step, a wandering one of drift."
     )
+    run = f"At the scene's own step, over {drifts.DURATIONS:g} durations."
     kind = "polhode on the momentum sphere" if scene.free else "trace of the axis on the unit sphere"
     missing = f" Not drawn, as they fail or cannot do the scene: {', '.join(absent)}." if absent else ""
     charts = tuple(spheres.chart(curves, scene.name, str(name)) for name in names)
-    return replace(Figure(f"sphere_{scene.name}", f"{scene.name}: {kind}", what + missing, charts, ()), view="sphere")
+    return replace(Figure(f"sphere_{scene.name}", f"{scene.name}: {kind}", f"{run} {what}{missing}", charts, ()), view="sphere")

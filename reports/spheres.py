@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from benchmarks.cases import Failed, attempt, label_of
+from benchmarks.cases import Failed, attempt
 from conservative.attitude import Array
 from conservative.method import Method
 from conservative.potential import UniformGravity
@@ -30,7 +30,7 @@ PREFERRED = (
     "pinocchio:scheme=Euler",
 )
 """What is drawn where a report has it: a curve that stays, beside ones that may not."""
-COLUMNS = ("scene", "series", "x", "y", "z")
+COLUMNS = ("scene", "method", "series", "x", "y", "z")
 
 TURN, TILT = 35, 25
 """Where the spheres are looked at from at first, degrees."""
@@ -45,12 +45,12 @@ def chosen(methods: Sequence[Method]) -> list[Method]:
 
 def absent(found: pd.DataFrame, scene: str, methods: Sequence[Method]) -> list[str]:
     """Return the names of the methods that should be drawn on a scene and could not."""
-    drawn = set(found[found["scene"] == scene]["series"])
-    return [method.name for method in chosen(methods) if shown(method.name, label_of(method)) not in drawn]
+    drawn = set(found[found["scene"] == scene]["method"])
+    return [method.name for method in chosen(methods) if method.name not in drawn]
 
 
 def curves(scenes: Sequence[Scene], methods: Sequence[Method]) -> pd.DataFrame:
-    """Return curves: columns scene, series, and the point x, y, z, in units of the sphere's radius at the start.
+    """Return curves: columns scene, method, series, and the point x, y, z, in units of the sphere's radius at the start.
 
     The run is that of the drift over time. Of a free body the point is the momentum, in principal axes; of a body in a field
     the direction of its axis, in world axes. Methods that cannot do the scene, or fail, have no curve. The first truth among
@@ -68,14 +68,15 @@ def _found(scene: Scene, methods: Sequence[Method]) -> Iterator[pd.DataFrame]:
     for method in methods:
         outcome = attempt(case_for(scene, method), skip_missing=True)
         if not isinstance(outcome, Failed):
-            yield curve(outcome.trajectory, shown(method.name, outcome.trajectory.label))
+            yield curve(outcome.trajectory, method.name)
 
 
-def curve(trajectory: Trajectory, series: str) -> pd.DataFrame:
+def curve(trajectory: Trajectory, method: str) -> pd.DataFrame:
     """Return the curve of one run, at most `KEPT` evenly spaced samples of it."""
     kept = np.unique(np.linspace(0, len(trajectory.t) - 1, KEPT).round().astype(int))
     x, y, z = _points(trajectory)[kept].T
-    values = {"scene": trajectory.scene.name, "series": series, "x": x, "y": y, "z": z}
+    names = {"scene": trajectory.scene.name, "method": method, "series": shown(method, trajectory.label)}
+    values = {**names, "x": x, "y": y, "z": z}
     return pd.DataFrame(values, columns=list(COLUMNS))
 
 
@@ -101,7 +102,7 @@ def chart(found: pd.DataFrame, scene: str, series: str) -> Spec:
         {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(rows[["x", "y", "z"]].round(4).to_numpy().tolist())
     ]
     return {
-        "title": {"text": series, "fontSize": 12, "anchor": "middle"},
+        "usermeta": {"name": series},
         "width": 190,
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
