@@ -172,7 +172,7 @@ def _spheres(curves: pd.DataFrame, scene: Scene, absent: list[str]) -> Figure:
     what = (
         "The angular momentum in body axes. The exact one is closed: a drift makes it a band, or leaves the sphere."
         if scene.free
-        else "The direction of the body's axis in space. Beside the exact one a wider band tells of a long step, a wandering one of drift."
+        else "The axis in space. A band wider than the exact one tells of a long step, a wandering one of drift."
     )
     run = f"At the scene's own step, over {drifts.DURATIONS:g} durations."
     kind = "polhode on the momentum sphere" if scene.free else "trace of the axis on the unit sphere"
