@@ -80,19 +80,22 @@ def limit(measure: str, value: float, spread: float) -> float:
 def time_limit(ratios: Sequence[float], rows: int) -> Allowed:
     """Return the largest time ratio that passes, from repeats of the same commit on the same machine.
 
-    The next logarithm exceeds their mean by t s sqrt(1 + 1/n) with a probability that a quantile t of Student's distribution
-    gives: `FALSE_ALARMS` for all rows together, divided among them. The result is kept between `NARROWEST` and `WIDEST`.
+    The next logarithm exceeds their middle by t s sqrt(1 + 1/n) with a probability that a quantile t of Student's distribution
+    gives: `FALSE_ALARMS` for all rows together, divided among them. Middle and spread s are the median and the median distance
+    from it, scaled to a standard deviation, as a repeat in a slow spell of the machine says nothing about the others. The
+    result is kept between `NARROWEST` and `WIDEST`.
     """
     from scipy.stats import t
 
     logarithms = [math.log(ratio) for ratio in ratios]
     n = len(logarithms)
-    spread = statistics.stdev(logarithms) if n > 1 else 0.0
+    middle = statistics.median(logarithms)
+    spread = 1.4826 * statistics.median(abs(logarithm - middle) for logarithm in logarithms)
     margin = WIDEST
     if n >= REPEATS:
         quantile = float(t.ppf(1 - FALSE_ALARMS / rows, n - 1))
         margin = min(max(quantile * spread * math.sqrt(1 + 1 / n), NARROWEST), WIDEST)
-    value = math.exp(statistics.mean(logarithms))
+    value = math.exp(middle)
     return Allowed(value, spread * value, n, value * (1 + margin))
 
 

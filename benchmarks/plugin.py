@@ -5,6 +5,7 @@ It is an entry point, so every pytest run of the environment imports this file: 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
 MAX_TIME, SHORT = "--benchmark-max-time", 0.1
 """The suite has many points, and times 0.1 s of each unless pytest-benchmark's option says otherwise."""
+REPEAT = pytest.StashKey[Callable[[], float]]()
+"""Where a test leaves a function that measures its time ratio again, should the gate ask for it."""
 MEASURED = pytest.StashKey[list[dict[str, Any]]]()
 
 

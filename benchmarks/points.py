@@ -116,7 +116,7 @@ def gated(point: Point) -> dict[str, Gated]:
     runs = [point.scene, *(nudged(point.scene, nudge) for nudge in NUDGES)]
     found = [_measured(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
     values = {name: Gated(found[0][name], _range([each[name] for each in found])) for name in found[0]}
-    return values | (_order(point) if point.scene.name in PAPER else {})
+    return values | (observed(point) if point.scene.name in PAPER else {})
 
 
 def nudged(scene: Scene, nudge: int) -> Scene:
@@ -131,7 +131,7 @@ def _measured(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
     return {name: value for name, value, _ in errors.measure(trajectory, exact) if name.endswith(" max")} | counters
 
 
-def _order(point: Point) -> dict[str, Gated]:
+def observed(point: Point) -> dict[str, Gated]:
     """Return the observed order of the attitude; nothing where a method has or shows none."""
     scene, method = point.scene, point.method
     if method.order is None:
