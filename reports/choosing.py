@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
 from benchmarks.cases import MISSING, NO_ORDER, SKIPPED, UNSUPPORTED
+from benchmarks.stability import LARGEST
 from conservative.trajectory import OK
 
 from . import drifts, frontier
@@ -20,8 +21,8 @@ ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad, that the verdict is given for."""
 KEPT, SMALL = 1e-10, 1e-4
 """Relative drift up to which a quantity counts as kept, and as drifting little."""
-HARD_STUDIES = ("hard_cases", "stability")
-"""Studies, where a report has them, whose rows are the matrix of hard cases."""
+HARD, STABILITY = "hard_cases", "stability"
+"""Studies, where a report has them, whose rows are the matrices of hard cases."""
 DASH = "–"
 
 
@@ -96,11 +97,15 @@ def graded(value: float) -> Cell:
 
 def _troubles(table: pd.DataFrame) -> pd.DataFrame:
     """Return the runs that failed, and the scenes that a method has no run of: columns scene, method, status."""
-    rows = table[~table["status"].isin([NO_ORDER, SKIPPED, MISSING])]
+    rows = table[~table["status"].isin([NO_ORDER, SKIPPED, MISSING]) & (table["study"] != STABILITY)]
     can = set(rows[rows["status"] == OK][["scene", "method"]].itertuples(index=False, name=None))
     pairs = zip(rows["scene"], rows["method"], rows["status"], strict=True)
-    real = [status != OK and (status != UNSUPPORTED or (scene, method) not in can) for scene, method, status in pairs]
-    return rows[real][["scene", "method", "status"]].drop_duplicates()
+    real = pd.Series(
+        [status != OK and (status != UNSUPPORTED or (scene, method) not in can) for scene, method, status in pairs],
+        index=rows.index,
+        dtype=bool,
+    )
+    return rows.loc[real, ["scene", "method", "status"]].drop_duplicates()
 
 
 def _where(trouble: pd.DataFrame, methods: set[str]) -> str:
@@ -142,16 +147,34 @@ def ended(status: str) -> Cell:
 
 def hard_cases(table: pd.DataFrame) -> Cells | None:
     """Return the matrix of hard cases, a row a method and a column a case; None where the report has no such study."""
-    rows = table[table["study"].isin(HARD_STUDIES) & (table["room"] != "truth")]
+    return _matrix(table[(table["study"] == HARD) & (table["room"] != "truth")], _case)
+
+
+def stability(table: pd.DataFrame) -> Cells | None:
+    """Return the matrix of the longest steps, as angles, and what ends them; None where the report has no such study."""
+    return _matrix(table[(table["study"] == STABILITY) & (table["room"] != "truth")], _longest)
+
+
+def _matrix(rows: pd.DataFrame, cell: Callable[[pd.DataFrame], Cell]) -> Cells | None:
     if rows.empty:
         return None
     cases = list(rows["scene"].unique())
     body: list[list[str | Cell]] = []
     for _, members in rows.groupby("method", sort=False):
         first = members.iloc[0]
-        cells = [_case(members[members["scene"] == case]) for case in cases]
+        cells = [cell(members[members["scene"] == case]) for case in cases]
         body.append([shown(first["method"], first["label"]), *cells])
     return ["method", *cases], body
+
+
+def _longest(rows: pd.DataFrame) -> Cell:
+    """Return the longest step that works, rad, and how the next one fails."""
+    works = rows[rows["measure"] == LARGEST]
+    ends = [status for status in rows["status"] if status != OK]
+    if works.empty or works["value"].isna().all():
+        return ended(ends[0]) if ends else Cell(f"{DASH} not run", "none")
+    text = f"{number(float(works['value'].max()))} rad"
+    return Cell(f"≈ {text}, then {ends[0]}", "fair") if ends else Cell(f"✓ {text} and more", "good")
 
 
 def _case(rows: pd.DataFrame) -> Cell:

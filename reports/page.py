@@ -78,6 +78,7 @@ def render(made: Plan, measured: Measured, source: Provenance) -> str:
         sentences=verdict.lines(frontier.contests(points)),
         scenes=parts,
         hard_cases=choosing.hard_cases(table),
+        stability=choosing.stability(table),
         once=list(choosing.costs_paid_once(table)),
         imports=choosing.imports(costs),
         audit=audit.as_cells(audit.findings(table, made.scenes)),

@@ -262,3 +262,16 @@ def test_picks_one_method_of_each_family_that_has_no_preferred_one():
         )
     ]
     assert names == ["reduced", "gauss:stages=2"]
+
+
+def test_longest_steps_are_a_matrix():
+    largest, first = choosing.LARGEST, "first"
+    rows = [
+        row("stability", "a", largest, 1.0, scene="needle"),
+        row("stability", "a", first, 3.2, scene="needle", status="not converged"),
+        row("stability", "b", largest, 10.0, scene="needle"),
+        row("stability", "c", largest, math.nan, scene="needle", status="unsupported"),
+    ]
+    _, body = choosing.stability(frame(rows))
+    assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
+    assert choosing._troubles(frame(rows)).empty
