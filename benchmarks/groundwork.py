@@ -18,8 +18,8 @@ from references.exact import Exact
 from references.truth import Truth, reference
 
 from . import ladder
+from .bench import STEPS, Bench
 from .growth import Amplification
-from .probing import STEPS, Bench
 from .timing import elapsed
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0

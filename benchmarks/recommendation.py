@@ -3,7 +3,8 @@
 1. A trial run tells how fast the body turns; from that follow the spacing of samples and the length of probes.
 2. The truth: two independent ones that agree. A closed form is known over the whole duration, anything else over the probes.
 3. A disturbed start tells how the motion itself amplifies errors (all three: `groundwork`).
-4. Each method is probed from coarse to fine (`probing`); errors are carried to the duration by a law that is told (`growth`).
+4. Each method is probed from coarse to fine (`bench`, `probing`). Errors are carried to the duration by a law that is told
+   (`growth`).
 5. The settings found are timed against each other, interleaved.
 """
 
@@ -20,11 +21,12 @@ from conservative.scene import Scene
 from conservative.trajectory import OK
 from references.truth import Truth
 
-from . import selection
+from . import ladder, selection
+from .bench import STEPS, Bench, Probe
 from .cases import Case, Done, attempt
 from .groundwork import our_choice, prepared
 from .order import Order, observed_order
-from .probing import STEPS, Bench, Climb, Probe, climbed, hopeless
+from .probing import Climb, climbed, hopeless
 from .timing import interleaved
 
 Progress = Callable[[float, str], None]
@@ -121,15 +123,26 @@ def engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     return tuple(reversed(lines.values()))
 
 
-def recommend(
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked, checked: see `question`. `missing` are engines that are not installed."""
+
+    scene: Scene
+    error: float
+    duration: float
+    methods: tuple[Method, ...]
+    missing: tuple[str, ...]
+    cost_limit: float
+
+
+def question(
     scene: Scene,
     error: float = 1e-6,
     duration: float | None = None,
     engine_names: Iterable[str] | None = None,
     cost_limit: float = COST_LIMIT,
-    progress: Progress = lambda share, what: None,
-) -> Recommendation:
-    """Return what to integrate a scene with.
+) -> Question:
+    """Return what is asked, or say what is wrong with it.
 
     Parameters
     ----------
@@ -143,48 +156,64 @@ def recommend(
         Engines, such as `("mujoco",)`; default all that are installed.
     cost_limit
         Wall time per simulated second, s/s, that a setting may cost.
-    progress
-        Called with the share of all work that is done and what comes next.
 
     Raises
     ------
     BadInput
-        An argument cannot be used; found before any work.
+        An argument cannot be used.
     MissingEngine
         An engine that is named is not installed.
-    Disagreement
-        No truth is known.
     """
     positive_number("error", error, "a finite attitude error above 0, rad")
     end = scene.t_end if duration is None else positive_number("duration", duration, "a finite duration above 0, s")
     positive_number("cost_limit", cost_limit, "a finite wall time per simulated second above 0, s/s")
     found = engines(engine_names)
-    missing = tuple(str(m.name) for m in found if isinstance(m, selection.Missing))
-    methods = [method for method in found if not isinstance(method, selection.Missing)]
+    missing = tuple(method.name for method in found if isinstance(method, selection.Missing))
+    methods = tuple(method for method in found if not isinstance(method, selection.Missing))
+    return Question(scene, error, end, methods, missing, cost_limit)
+
+
+def recommend(asked: Question, progress: Progress = lambda share, what: None) -> Recommendation:
+    """Return what to integrate a scene with.
+
+    Parameters
+    ----------
+    asked
+        From `question`.
+    progress
+        Called with the share of all work that is done and what comes next.
+
+    Raises
+    ------
+    Disagreement
+        No truth is known.
+    """
     progress(0.0, "the motion and its truth")
-    bench, truth = prepared(scene, error, end, cost_limit)
-    own, step = our_choice(bench, bench.target * min(1.0, bench.short / end))
+    bench, truth = prepared(asked.scene, asked.error, asked.duration, asked.cost_limit)
+    own, step = our_choice(bench, bench.target * min(1.0, bench.short / bench.duration))
+    rooms: dict[str, str] = {}
     climbs: dict[str, Climb | str] = {}
-    for i, method in enumerate((own, *methods)):
+    for i, method in enumerate((own, *asked.methods)):
         line = selection.series(method)
-        progress(0.2 + 0.7 * i / (1 + len(methods)), f"probing {line}")
-        climbs[line] = method.unsupported(scene) or climbed(bench, *start(bench, method, step))
+        progress(0.2 + 0.7 * i / (1 + len(asked.methods)), f"probing {line}")
+        rooms[line] = method.room
+        climbs[line] = method.unsupported(asked.scene) or climbed(bench, *start(bench, method, step))
     progress(0.9, "timing what was found")
     costs = timed(bench, climbs)
-    rooms = (own.room, *(method.room for method in methods))
-    advised = tuple(advice(bench, line, room, climbs[line], costs.get(line)) for line, room in zip(climbs, rooms, strict=True))
-    return Recommendation(bench, truth, advised, missing)
+    advised = tuple(advice(bench, line, rooms[line], climb, costs.get(line)) for line, climb in climbs.items())
+    return Recommendation(bench, truth, advised, asked.missing)
 
 
 def start(bench: Bench, method: Method, step: float) -> tuple[Method, float]:
-    """Return the method and the step to begin with: ours where the chooser ends, others as loose as can be."""
+    """Return the method and the step to begin with: ours near where the chooser ends, others far off."""
     setting = selection.tolerance_setting(method)
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, bench.error)))
         return selection.at_tolerance(method, setting, float(f"{loosest:.0e}")), bench.spacing
+    longest = bench.step_at_most(bench.short / STEPS)
     if method.room != "ours":
-        return method, bench.spacing
-    return method, step if method.order is None else min(COARSER_START * step, bench.step_at_most(bench.short / STEPS))
+        return method, min(longest, bench.step_at_most(ladder.RADIANS / bench.rate))
+    return method, step if method.order is None else min(COARSER_START * step, longest)
 
 
 def timed(bench: Bench, climbs: dict[str, Climb | str]) -> dict[str, float]:
@@ -210,7 +239,7 @@ def advice(bench: Bench, line: str, room: str, climb: Climb | str, cost: float |
     if isinstance(climb, str):
         return Advice(line, room, None, False, math.nan, None, (), climb)
     probe = climb.best(bench.target)
-    reached = probe.expected <= bench.target
+    reached = probe.expected <= bench.error
     order = None if probe.method.order is None else observed_order(*climb.converging())
     reason = "" if reached else shortfall(bench, climb, probe)
     return Advice(line, room, probe, reached, math.nan if cost is None else cost, order, climb.probes, reason)

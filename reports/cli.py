@@ -153,6 +153,47 @@ def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: s
 
 
 @main.command(
+    short_help="Say which method, step or tolerance a body needs.",
+    epilog=_epilog(
+        "conservative recommend my_body.toml --error 1e-6 --duration 3600",
+        "conservative recommend brick_flip --error 1e-4 --engine mujoco",
+        "conservative recommend lagrange_top --json --out recommended | jq .cheapest",
+    ),
+)
+@click.argument("scene", shell_complete=_names("scenes"))
+@click.option("--error", type=float, default=1e-6, show_default=True, help="Largest attitude error over the duration, rad.")
+@click.option("--duration", type=float, help="s.  [default: the scene's]")
+@click.option("--engine", multiple=True, metavar="A,B", shell_complete=_names("methods"), help="[default: all installed]")
+@click.option(
+    "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for recommendation.json and recommendation.svg.")
+def recommend(
+    scene: str,
+    error: float,
+    duration: float | None,
+    engine: tuple[str, ...],
+    cost_limit: float,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Probe our methods and every engine on SCENE, a name or a file, and say what reaches the error, at what cost and drift.
+
+    What a probe cannot cover of the duration is extrapolated by a law that is told with it.
+    """
+    from . import recommend as recommending
+    from .progress import progress
+
+    with progress() as step:
+        found = recommending.run(scene, error, duration, _listed(engine), cost_limit, out, step)
+    if as_json:
+        click.echo(recommending.as_json(found))
+    else:
+        recommending.show(found)
+
+
+@main.command(
     "list",
     short_help="Show scenes and methods.",
     epilog=_epilog(

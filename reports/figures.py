@@ -15,7 +15,7 @@ FLOOR = 1e-17
 """What a logarithmic axis shows for an error of zero: below any round-off of a relative error in double precision."""
 
 
-def _log(column: str, title: str, values: pd.Series[float]) -> dict[str, Any]:
+def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, Any]:
     """Return field, scale and axis of a logarithmic channel."""
     positive = values[values > 0]
     low, high = (float(positive.min()) / 1.3, float(positive.max()) * 1.3) if len(positive) else (1e-1, 1.0)
@@ -39,8 +39,8 @@ def work_precision(points: pd.DataFrame, scene: str) -> Any:
     """Return time against error for one scene, from `frontier.points`; the Pareto front is the bold line."""
     data = points[points["scene"] == scene].assign(microseconds=lambda found: found["time"] * 1e6)
     names = series_order(data["series"])
-    x = alt.X(**_log("error", "largest attitude error over the run, rad", data["error"]))
-    y = alt.Y(**_log("microseconds", "wall time per simulated second, µs", data["microseconds"]))
+    x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
+    y = alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
     title = alt.Title(
         f"{scene}: time against error", subtitle="lower left is better; bold grey: the Pareto front of everything measured"
     )
@@ -76,7 +76,7 @@ def _extremes(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drift_panel(data: pd.DataFrame, kind: str, names: list[str]) -> Any:
-    y = alt.Y(**_log("shown", "largest so far, relative", data["shown"]))
+    y = alt.Y(**log_channel("shown", "largest so far, relative", data["shown"]))
     legend = alt.Legend(title="method", columns=1, symbolSize=300)
     return (
         alt.Chart(data, width=2 * WIDTH - 180, height=HEIGHT - 40, title=f"{data['scene'].iloc[0]}: drift of {kind}")
@@ -95,8 +95,8 @@ def convergence(errors: pd.DataFrame, fits: pd.DataFrame, scene: str) -> Any:
     slopes = fits[fits["scene"] == scene].set_index("series")["text"]
     data, lines = (_with_slopes(table[table["scene"] == scene], slopes) for table in (errors, fits))
     names = series_order(data["series"])
-    x = alt.X(**_log("dt", "step, s", data["dt"]))
-    y = alt.Y(**_log("error", "largest attitude error over the run, rad", data["error"]))
+    x = alt.X(**log_channel("dt", "step, s", data["dt"]))
+    y = alt.Y(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
     look = _series_look(names, "method (observed order)")
     title = alt.Title(f"{scene}: convergence", subtitle="bold: the stretch that the order is fitted to, and the fit")
     base = alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=title).encode(x=x, y=y, color=look["color"])

@@ -1,0 +1,171 @@
+"""The recommendation: its honesty against independent runs, and the laws by which it extrapolates."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from benchmarks import growth as growth_module
+from benchmarks.growth import Amplification, Growth, growth
+from benchmarks.recommendation import engines, question, recommend
+from conservative import registry
+from conservative.attitude import angle_between, from_quaternion
+from conservative.method import Grid
+from references.exact import Exact
+from references.heyoka import Heyoka
+
+R_BP = from_quaternion(np.array([0.8, 0.1, -0.5, 0.3]) / np.linalg.norm([0.8, 0.1, -0.5, 0.3]))
+R_WB = from_quaternion(np.array([0.2, 0.7, 0.4, -0.3]) / np.linalg.norm([0.2, 0.7, 0.4, -0.3]))
+
+
+def free_body(t_end=20.0):
+    return cv.Scene("generic", cv.RigidBody(R_BP @ np.diag([1.3, 2.1, 2.9]) @ R_BP.T), R_WB, (0.9, -1.7, 1.1), t_end)
+
+
+def true_error(scene, probe, duration, truth):
+    """Largest attitude error of a run over the whole duration, sampled about twice a second."""
+    each = max(1, round(0.5 / probe.dt))
+    grid = Grid(probe.dt, each * math.ceil(duration / probe.dt / each), each)
+    found = probe.method.prepare(scene, grid)()
+    return float(angle_between(truth.prepare(scene, grid)().R_WB, found.R_WB).max())
+
+
+def largest_excess(scene, error, duration, names, truth=None):
+    """How far the worst of the settings that are said to reach an error is above it, as a factor."""
+    found = recommend(question(scene, error, duration, names))
+    reached = [advice for advice in found.advice if advice.reached]
+    assert found.ours in reached
+    return max(true_error(scene, advice.best, duration, truth or Exact()) for advice in reached) / error
+
+
+@pytest.mark.parametrize("error", [1e-4, 1e-8])
+def test_settings_for_a_free_body_reach_the_error(error):
+    scene = free_body()
+    assert largest_excess(scene, error, 20.0, ("mujoco:RK4", "heyoka:1e-6", "scipy:DOP853")) < 3  # measured 0.3
+
+
+def test_settings_extrapolated_from_short_probes_reach_the_error():
+    # No closed form: probes cover 10 s of the 40. heyoka at 1e-16 is the check, with an error of some 1e-12.
+    scene = registry.scene("asymmetric_top")
+    assert largest_excess(scene, 1e-6, 40.0, ("mujoco:RK4", "pinocchio:RK4", "heyoka:1e-6"), Heyoka(1e-16)) < 3  # measured 0.06
+
+
+def test_a_law_that_promises_too_much_is_caught(monkeypatch):
+    """The negative control of the tests above."""
+    monkeypatch.setattr(Growth, "at", lambda self, duration: self.error / 1e4)
+    assert largest_excess(free_body(), 1e-6, 20.0, ("mujoco:RK4",)) > 3  # measured 650
+
+
+@pytest.fixture(scope="module")
+def of_mujoco():
+    return recommend(question(free_body(), 1e-6, 20.0, ("mujoco",)))
+
+
+def test_all_integrators_of_an_engine_are_listed(of_mujoco):
+    named = {advice.line for advice in of_mujoco.advice[1:]}
+    assert named == {"mujoco", *(f"mujoco:integrator={name}" for name in ("Euler", "implicit", "implicitfast", "discrete"))}
+    by_name = {advice.line: advice for advice in of_mujoco.advice}
+    assert by_name["mujoco"].reached
+    assert by_name["mujoco"].order.slope == pytest.approx(4, abs=0.2)  # measured 4.03
+    euler = by_name["mujoco:integrator=Euler"]
+    assert not euler.reached
+    assert "costs more than 1 s per simulated second" in euler.reason
+    assert euler.best.holds < 20
+
+
+def test_ours_is_cheaper_and_keeps_what_it_should(of_mujoco):
+    ours = of_mujoco.ours
+    assert of_mujoco.cheapest is ours
+    assert max(drift.expected for drift in ours.best.drifts) < 1e-13  # measured 1e-15
+    assert not any(drift.secular for drift in ours.best.drifts)
+
+
+def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
+    lines = [method.name.partition(":")[0] for method in engines()]
+    assert {name: lines.count(name) for name in set(lines)} == {"mujoco": 5, "pinocchio": 2, "heyoka": 3, "scipy": 1}
+
+
+def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
+    from references.mujoco import MuJoCo
+
+    def missing(self):
+        raise cv.MissingEngine("MuJoCo", "mujoco")
+
+    monkeypatch.setattr(MuJoCo, "__post_init__", missing)
+    assert question(free_body()).missing == ("mujoco",)
+    with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
+        question(free_body(), engine_names=("mujoco",))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "argument", "allowed"),
+    [
+        ({"error": 0.0}, "error", "above 0"),
+        ({"error": math.nan}, "error", "finite"),
+        ({"duration": -1.0}, "duration", "above 0"),
+        ({"cost_limit": 0.0}, "cost_limit", "above 0"),
+        ({"engine_names": ("mujocco",)}, "engine", "'mujoco' (nearest)"),
+        ({"engine_names": ("reduced",)}, "engine", "one of heyoka, mujoco, pinocchio, scipy"),
+        ({"engine_names": ("mujoco:RK5",)}, "integrator", "'RK4'"),
+    ],
+)
+def test_bad_questions(arguments, argument, allowed):
+    with pytest.raises(cv.BadInput) as caught:
+        question(free_body(), **arguments)
+    assert caught.value.argument == argument
+    assert allowed in caught.value.allowed
+
+
+T = np.linspace(0, 10, 101)
+
+
+@pytest.mark.parametrize(("a", "b"), [(3e-9, 0.0), (0.0, 2e-9), (1e-9, 4e-10)])
+def test_polynomial_growth_is_found(a, b):
+    law = growth(T, a * T + b * T**2, 0.0, 1.0)
+    assert law.at(1000.0) == pytest.approx(a * 1e3 + b * 1e6, rel=1e-9)  # measured 1e-15
+    assert law.at(law.holds(1e-5)) == pytest.approx(1e-5, rel=1e-9)  # measured 1e-15
+
+
+def test_bounded_error_is_taken_as_linear_and_steady_drift_as_quadratic():
+    error = 1e-8 * np.abs(np.sin(T))
+    assert growth(T, error, 0.0, 1.0).at(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
+    drifting = growth(T, error, 2e-6, 1.0)
+    assert drifting.at(100.0) > 1e-2
+    assert "extrapolated quadratically to 100 s" in drifting.law(100.0)
+
+
+def test_what_is_measured_is_not_extrapolated():
+    law = growth(T, 1e-8 * T, 0.0, math.inf)
+    assert law.at(10.0) == pytest.approx(1e-7)
+    assert law.law(10.0) == "measured over all 10 s"
+    assert math.isinf(law.at(11.0))
+    assert "without bound" in law.law(11.0)
+    assert math.isinf(replace(law, error=1.0).at(10.0))
+
+
+def test_amplification_tells_exponential_growth_from_linear():
+    linear = Amplification(T, T, 1e-9, "")
+    assert not linear.unstable
+    assert linear.excess(1.0, 10.0) == pytest.approx(1.0)
+    steep = Amplification(T, np.exp(3 * T), 1e-9, "")
+    assert steep.unstable
+    assert steep.until == pytest.approx(6.3)  # e^(3 t) 1e-9 = 0.2 rad at t = 6.37 s
+    assert math.isinf(steep.excess(1.0, 10.0))
+    assert steep.excess(1.0, 2.0) == pytest.approx(math.exp(3) / 2)
+
+
+def test_an_unstable_motion_is_called_so():
+    found = recommend(question(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
+    assert found.bench.amplification.unstable
+    assert found.bench.amplification.steepness > growth_module.FASTER_THAN_LINEAR
+
+
+def test_steps_are_round_numbers(of_mujoco):
+    bench = of_mujoco.bench
+    for wanted in (0.37, 0.0123, 3.3e-5):
+        below, above = bench.step_at_most(wanted), bench.step_at_least(wanted)
+        assert below <= wanted <= above <= 2 * below * (1 + 1e-12)
+        assert float(f"{below:.8g}") == pytest.approx(below, rel=1e-12)
+    assert bench.step_at_most(bench.spacing) == bench.step_at_least(bench.spacing) == bench.spacing

@@ -1,0 +1,100 @@
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from reports.cli import main
+
+COMMON = ("--error", "1e-4", "--duration", "0.4")
+
+
+def conservative(*arguments):
+    return CliRunner().invoke(main, ["recommend", *(str(argument) for argument in arguments)])
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scene") / "answer"
+    scene = folder.parent / "my_body.toml"
+    scene.write_text("[body]\ninertia = [[2, 0.3, 0], [0.3, 1.5, 0.1], [0, 0.1, 1.1]]\n[start]\nw_WB_B = [1, -2, 9]\n")
+    text = scene.read_text()
+    scene.write_text("t_end = 1.0\n" + text)
+    return conservative(scene, *COMMON, "--engine", "mujoco,heyoka:1e-6", "--json", "--out", folder), folder
+
+
+def test_json_says_what_to_use_and_why(answered):
+    done, _ = answered
+    assert done.exit_code == 0, done.output
+    content = json.loads(done.stdout)
+    assert content["scene"] == "my_body"
+    assert content["error"] == 1e-4
+    named = {entry["name"]: entry for entry in content["recommendations"]}
+    assert len(named) == 7  # ours, five integrators of MuJoCo, one line of heyoka
+    best = named["mujoco"]["best"]
+    assert best["expected"] < 1e-4
+    assert best["dt"] > 0
+    assert best["law"] == "measured over all 0.4 s"
+    assert set(best["drift"]) == {"energy", "momentum"}
+    assert named["mujoco"]["cost"] > 0
+    assert len(named["mujoco:integrator=Euler"]["probes"]) > 1
+    assert "tol" in named["heyoka"]["best"]
+    assert content["truth"]["agreement"] < 1e-12  # measured 1e-15
+
+
+def test_folder_has_the_answer_and_the_picture(answered):
+    done, folder = answered
+    assert sorted(path.name for path in folder.iterdir()) == ["recommendation.json", "recommendation.svg"]
+    assert json.loads((folder / "recommendation.json").read_text()) == json.loads(done.stdout)
+    picture = (folder / "recommendation.svg").read_text()
+    for part in ("<svg", "error to expect, rad", "wall time per simulated second", "mujoco", "RK4"):
+        assert part in picture
+
+
+def test_text_lists_all_integrators_and_what_stands_behind_it():
+    done = conservative("brick_flip", *COMMON, "--engine", "mujoco")
+    assert done.exit_code == 0, done.output
+    for part in (
+        "What reaches it",
+        "RK4",
+        "Euler",
+        "implicit",
+        "implicitf",
+        "discrete",
+        "probe runs",
+        "Truth:",
+        "rates off by",
+    ):
+        assert part in done.stdout
+    assert "timing what was found" in done.stderr
+    assert "timing" not in done.stdout
+
+
+def test_what_cannot_reach_an_error_says_how_far_it_gets():
+    done = conservative("brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01")
+    assert done.exit_code == 0, done.output
+    assert "What does not, at up to 0.01 s of computing per simulated second" in done.stdout
+    assert "anything finer costs more than 0.01 s" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["brick_flipp"], ["scene: got 'brick_flipp'", "'brick_flip' (nearest)"]),
+        (["brick_flip", "--error", "0"], ["error: got 0.0", "above 0"]),
+        (["brick_flip", "--duration", "-1"], ["duration: got -1.0", "above 0"]),
+        (["brick_flip", "--cost-limit", "0"], ["cost_limit: got 0.0", "above 0"]),
+        (["brick_flip", "--engine", "mujocco"], ["engine: got 'mujocco'", "'mujoco' (nearest)"]),
+        (["brick_flip", "--out", "kept.txt"], ["out: got 'kept.txt'", "folder"]),
+        (["no_such_file.toml"], ["no_such_file.toml"]),
+    ],
+)
+def test_mistakes_end_in_one_clear_line_before_any_work(arguments, parts, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kept.txt").write_text("mine")
+    done = conservative(*arguments)
+    assert done.exit_code == 2, done.output
+    assert done.stdout == ""
+    assert "probing" not in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert all(part in done.stderr for part in parts)
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
