@@ -14,8 +14,8 @@ import pytest
 SUITE = Path(__file__).resolve().parent
 TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
-MAX_TIME, SHORT = "--benchmark-max-time", 0.1
-"""The suite has many points, and times 0.1 s of each unless pytest-benchmark's option says otherwise."""
+MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
+"""The suite has many points, and times 0.1 s or two calls of each unless pytest-benchmark's option says otherwise."""
 REPEAT = pytest.StashKey[Callable[[], float]]()
 """Where a test leaves a function that measures its time ratio again, should the gate ask for it."""
 MEASURED = pytest.StashKey[list[dict[str, Any]]]()
@@ -75,7 +75,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(SUITE)]
         if not any(text.startswith(MAX_TIME) for text in config.invocation_params.args):
-            config.option.benchmark_max_time = SHORT
+            config.option.benchmark_max_time, config.option.benchmark_min_rounds = SHORT, FEW
     if config.getoption("conservative_gate"):
         _gate(config)
 
@@ -116,5 +116,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         from .columns import lines
 
         terminalreporter.section("accuracy beside time")
-        for line in lines(measured):
-            terminalreporter.write_line(line)
+        for group in dict.fromkeys(row["group"] for row in measured):
+            for line in (*lines([row for row in measured if row["group"] == group]), ""):
+                terminalreporter.write_line(line)
