@@ -178,9 +178,19 @@ class Amplification:
         return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
 
     @property
+    def lost(self) -> bool:
+        """Whether the two motions have nothing in common in the end."""
+        return self._known < len(self.t)
+
+    @property
     def until(self) -> float:
         """End of what is known, s."""
         return float(self.t[self._known - 1])
+
+    @property
+    def becomes(self) -> float:
+        """Largest difference up to there, rad."""
+        return float(self.factor[self._known - 1]) * self.disturbance
 
     @property
     def steepness(self) -> float:
@@ -198,7 +208,7 @@ class Amplification:
 
     def excess(self, start: float, end: float) -> float:
         """Return how much more than in proportion to time a disturbance grows between two times; infinite where lost."""
-        if self._known < len(self.t) and self.unstable and self.until < end:
+        if self.lost and self.unstable and self.until < end:
             return math.inf
         known, last = slice(self._known), min(end, self.until)
         if last <= start:

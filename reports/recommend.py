@@ -108,7 +108,8 @@ def as_json(found: Recommendation) -> str:
         "motion": {
             "unstable": amplified.unstable,
             "disturbance": amplified.disturbance,
-            "becomes": float(amplified.factor.max()) * amplified.disturbance,
+            "becomes": amplified.becomes,
+            "lost": amplified.lost,
             "measured_until": amplified.until,
             "by": amplified.label,
         },
@@ -174,11 +175,11 @@ def notes(found: Recommendation) -> list[str]:
         f"Truth: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the first "
         f"{truth.checked_until:.3g} s; errors are measured over up to {bench.truth_until:.4g} s."
     )
-    becomes = float(amplified.factor.max()) * amplified.disturbance
     stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
+    after = ", and by anything after that" if amplified.lost else ""
     lines.append(
-        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {becomes:.2g} rad within "
-        f"{amplified.until:.4g} s ({amplified.label}): {stable}."
+        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.becomes:.2g} rad within "
+        f"{amplified.until:.4g} s{after} ({amplified.label}): {stable}."
     )
     lines.append("Cost: the fastest of interleaved runs in this machine's own time; ratios are what lasts.")
     lines += [f"{called(a)}: {a.reason}." for a in found.advice if not a.reached]

@@ -76,6 +76,12 @@ def test_what_cannot_reach_an_error_says_how_far_it_gets():
     assert "anything finer costs more than 0.01 s" in " ".join(done.stdout.split())
 
 
+def test_an_unstable_motion_is_said_to_be_one():
+    text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20").stdout.split())
+    assert "and by anything after that" in text
+    assert "the motion is unstable and amplifies errors" in text
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
