@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
@@ -178,14 +178,18 @@ def _longest(rows: pd.DataFrame) -> Cell:
 
 
 def _case(rows: pd.DataFrame) -> Cell:
-    """Return how a method did on a case: its worst status, else its graded drift of energy, else its first value."""
+    """Return how a method did on a case: its worst status, else its graded drift of energy and its attitude error."""
     if rows.empty:
         return Cell(f"{DASH} not run", "none")
     bad = [status for status in rows["status"].unique() if status != OK]
     if bad:
         return ended(bad[0])
     energy = rows[rows["measure"] == "energy drift max"]["value"]
-    return graded(float(energy.max())) if len(energy) else Cell(f"✓ {_first(rows)}", "good")
+    if not len(energy):
+        return Cell(f"✓ {_first(rows)}", "good")
+    drift = graded(float(energy.max()))
+    error = rows[rows["measure"] == "attitude error max"]["value"]
+    return replace(drift, text=f"{drift.text}; {number(float(error.max()))} rad") if len(error) else drift
 
 
 def _first(rows: pd.DataFrame) -> str:

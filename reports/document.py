@@ -17,15 +17,24 @@ from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import OK
 
-from . import drifts, figures, figures_of_paper, frontier, orders, output, page, paper, tables, verdict
+from . import choosing, drifts, figures, figures_of_paper, frontier, orders, output, page, paper, tables, verdict
 from .progress import Step
 from .provenance import Provenance, provenance
 
 SCHEMA = 1
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
-SHARES = {"paper": 0.20, "convergence": 0.15, "speed": 0.15, "work_precision": 0.35, drifts.STUDY: 0.10, "pictures": 0.05}
-"""What part of the time each piece of work takes, for the time left."""
+COSTS = {
+    "paper": 20.0,
+    "convergence": 15.0,
+    "speed": 15.0,
+    "work_precision": 35.0,
+    "stability": 15.0,
+    "hard_cases": 30.0,
+    drifts.STUDY: 10.0,
+    "pictures": 5.0,
+}
+"""How long each piece of work takes against the others, for the time left."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +54,22 @@ class Plan:
     quick: bool = False
     skip_missing: bool = False
     png: bool = False
+    hard: bool = False
 
     def __post_init__(self) -> None:
         if not self.skip_missing:
             for method in self.methods:
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
+
+    @property
+    def studies(self) -> tuple[studies.Study, ...]:
+        """What is measured, in this order; the hard cases only where nobody asked for less."""
+        crossed = studies.studies(self.scenes, self.methods, self.quick, self.skip_missing)
+        return (*crossed, *studies.hard(self.methods, self.skip_missing)) if self.hard else crossed
+
+    def share(self, name: str) -> float:
+        """Return which part of the time a piece of work takes."""
+        return COSTS[name] / sum(COSTS[piece] for piece in (*(s.name for s in self.studies), drifts.STUDY, "pictures"))
 
 
 @dataclass(frozen=True)
@@ -63,7 +83,7 @@ class Measured:
 def plan(scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False) -> Plan:
     """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
     chosen = selection.scenes(scenes) if scenes else selection.scenes()
-    return Plan(chosen, selection.methods(methods or None), quick, skip_missing, png)
+    return Plan(chosen, selection.methods(methods or None), quick, skip_missing, png, hard=not (scenes or quick))
 
 
 def write(made: Plan, out: Path, step: Step) -> Measured:
@@ -76,28 +96,29 @@ def write(made: Plan, out: Path, step: Step) -> Measured:
     """
     with output.report_folder(out) as folder:
         measured = measure(made, step)
-        step(1 - SHARES["pictures"], "pictures")
+        step(1 - made.share("pictures"), "pictures")
         write_files(made, measured, folder, provenance())
     return measured
 
 
 def measure(made: Plan, step: Step) -> Measured:
-    """Return all rows: the four studies, then long runs for the drift over time."""
+    """Return all rows: the studies, then long runs for the drift over time."""
     rows: list[Measurement] = []
     start = 0.0
-    for study in studies.studies(made.scenes, made.methods, made.quick, made.skip_missing):
-        rows += studies.rows(study, _within(step, study.name, start))
-        start += SHARES[study.name]
+    for study in made.studies:
+        rows += studies.rows(study, _within(made, step, study.name, start))
+        start += made.share(study.name)
     pictures = []
-    for found, picture in _long_runs(made, _within(step, drifts.STUDY, start)):
+    for found, picture in _long_runs(made, _within(made, step, drifts.STUDY, start)):
         rows += found
         pictures.append(picture)
     return Measured(measurement.frame(rows), pd.concat(pictures, ignore_index=True))
 
 
-def _within(step: Step, name: str, start: float) -> Callable[[int, int, str], None]:
+def _within(made: Plan, step: Step, name: str, start: float) -> Callable[[int, int, str], None]:
     """Return a study's progress as a share of the whole."""
-    return lambda done, total, what: step(start + SHARES[name] * done / total, f"{name.replace('_', ' ')}: {what}")
+    share = made.share(name)
+    return lambda done, total, what: step(start + share * done / total, f"{name.replace('_', ' ')}: {what}")
 
 
 def _long_runs(made: Plan, progress: Callable[[int, int, str], None]) -> Iterator[tuple[list[Measurement], pd.DataFrame]]:
@@ -154,12 +175,21 @@ def render(made: Plan, measured: Measured, source: Provenance, draw: Draw) -> st
         by_scene={scene.name: _scene_parts(scene, measured, found, draw) for scene in made.scenes},
         durations=f"{drifts.DURATIONS:g}",
         paper=list(_paper_parts(made, draw)),
+        hard_cases=_matrix(choosing.hard_cases(measured.table)),
+        stability=_matrix(choosing.stability(measured.table)),
         truths=tables.markdown(tables.truths(measured.table)),
         failures=tables.markdown(tables.failures(measured.table)),
         unsupported=tables.markdown(tables.unsupported(measured.table)),
         made=source,
         others=", ".join(others),
     )
+
+
+def _matrix(cells: choosing.Cells | None) -> str:
+    if cells is None:
+        return "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
+    header, body = cells
+    return tables.markdown((list(header), [[str(cell) for cell in row] for row in body]))
 
 
 def _scene_parts(scene: Scene, measured: Measured, contests: list[frontier.Contest], draw: Draw) -> dict[str, str]:
