@@ -63,11 +63,11 @@ def test_the_default_method_has_a_bias_far_below_a_rounding_unit():
 
 
 @pytest.mark.xfail(
-    strict=True, reason="extrapolated first guesses leave about -7e-21 of the energy a step, always the same way"
+    strict=True, reason="extrapolated first guesses leave -7e-21 of the energy a step, always the same way"
 )
 def test_the_default_method_walks():
     found = round_off.measure(cv.Reduced(), cv.scenes.brick_flip(), 0.01, 64 * 40_000, 8)
-    assert not found["energy"].linear  # measured: chance 2e-25; with the explicit guess in every step 0.1
+    assert not found["energy"].linear  # measured: chance 5e-17
 
 
 def test_compositions_walk():
