@@ -128,9 +128,11 @@ def test_work_precision_pairs_error_and_time():
     assert len({point for point in points if point[0].startswith("scipy")}) >= 4
     for point in points:
         pair = [found[*point, measure] for measure in ("attitude error final", "time per simulated second")]
-        assert all(row.status == "ok" and row.value > 0 for row in pair)
+        # "skipped" where this machine, today, would take too long for a fine step
+        assert all(row.status == "skipped" or (row.status == "ok" and row.value > 0) for row in pair)
+        assert {row.status for row in pair} == {pair[0].status}
         assert len({row.detail for row in pair}) == 1
-    assert {row.detail for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
+    assert {row.detail.partition(";")[0] for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
 
 
 @pytest.mark.parametrize("name", studies.NAMES)
