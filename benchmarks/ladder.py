@@ -9,6 +9,8 @@ import numpy as np
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
+from .selection import tolerance_setting
+
 SAMPLES = 12
 """Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
 RADIANS = 1.0
@@ -24,7 +26,8 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 def intervals(method: Method) -> int:
     """Return the number of intervals between a method's samples: with fewer, a step can be longer."""
-    return SAMPLES if (method.order or 0) < HIGH_ORDER else HIGH_SAMPLES
+    without_truncation = method.order is None and tolerance_setting(method) is None
+    return HIGH_SAMPLES if without_truncation or (method.order or 0) >= HIGH_ORDER else SAMPLES
 
 
 def samples(scene: Scene, method: Method) -> Grid:

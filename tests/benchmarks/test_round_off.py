@@ -62,9 +62,7 @@ def test_the_default_method_has_a_bias_far_below_a_rounding_unit():
     assert found["energy"].rms < 2e-14  # measured 3e-15
 
 
-@pytest.mark.xfail(
-    strict=True, reason="extrapolated first guesses leave -7e-21 of the energy a step, always the same way"
-)
+@pytest.mark.xfail(strict=True, reason="extrapolated first guesses leave -7e-21 of the energy a step, always the same way")
 def test_the_default_method_walks():
     found = round_off.measure(cv.Reduced(), cv.scenes.brick_flip(), 0.01, 64 * 40_000, 8)
     assert not found["energy"].linear  # measured: chance 5e-17
