@@ -33,7 +33,7 @@ WORK_PRECISION = (("attitude error final", "rad"), ("attitude error max", "rad")
 TIME = "time per simulated second"
 CALL = 0.004
 """Duration, s, that one timed call is stretched to, so that what a call costs beside its steps stays a few per cent."""
-STRETCH = 256
+STRETCH = 2**16
 """Limit of the stretching."""
 POINT_ROUNDS = 5
 """Rounds at most for each of the hundreds of points of a picture over many decades."""
@@ -45,13 +45,19 @@ def end_only(grid: Grid, times: int = 1) -> Grid:
 
 
 def stretched(case: Case, done: Done) -> tuple[Case, Done]:
-    """Return the case over so long a time that a call lasts `CALL` s; as it was where the method fails on the way there."""
-    times = min(STRETCH, math.ceil(CALL / elapsed(done.run)))
-    if times == 1:
-        return case, done
-    longer = replace(case, grid=end_only(case.grid, times))
-    found = attempt(longer)
-    return (longer, found) if isinstance(found, Done) else (case, done)
+    """Return the case over so long a time that a call lasts about `CALL` s; as long as it gets there where the method fails.
+
+    In several goes: the first, short runs are mostly what a call costs beside its steps, and say little of the steps.
+    """
+    bare, times = case, 1
+    while times < STRETCH and (spent := elapsed(done.run)) < CALL / 2:
+        times = min(STRETCH, times * max(2, math.ceil(CALL / spent)))
+        longer = replace(bare, grid=end_only(bare.grid, times))
+        found = attempt(longer)
+        if not isinstance(found, Done):
+            break
+        case, done = longer, found
+    return case, done
 
 
 @dataclass(frozen=True)
