@@ -12,7 +12,7 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Literal
@@ -53,13 +53,11 @@ class Slower(Method):
         return self.inner.prepare(scene, Grid(grid.dt, n, n))
 
 
-def ratios(limits: Mapping[str, float]) -> dict[str, float]:
-    """Return the time ratio of every timed point of the suite, and of the slowed one, measured as a run of the gate does."""
+def measures() -> dict[str, Callable[[], float]]:
+    """Return what measures the time ratio of every timed point of the suite, and of the slowed one, by name."""
     slowed = points.Point(scene(SLOWED[0]), Slower(named(SLOWED[1]), 1.2))
     found = {point.id: point for point in timed()} | {SLOW: slowed}
-    measures = {name: partial(yardstick.time_ratio, point.method, point.scene, point.scene.dt) for name, point in found.items()}
-    first = {name: measure() for name, measure in measures.items()}
-    return {name: yardstick.confirmed(first[name], limits.get(name, math.inf), measures[name]) for name in first}
+    return {name: partial(yardstick.time_ratio, point.method, point.scene, point.scene.dt) for name, point in found.items()}
 
 
 def timed() -> list[points.Point]:
@@ -86,24 +84,39 @@ def summary(runs: Sequence[Mapping[str, float]], limits: Mapping[str, float]) ->
     }
 
 
+def one_run(limits: Mapping[str, float]) -> dict[str, float]:
+    """Return the ratios of one run of the gate: all in one process, and those above their limits again in others."""
+    first = _process(list(measures()))
+    return {name: yardstick.confirmed(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
+
+
+def _alone(name: str) -> float:
+    return _process([name])[name]
+
+
+def _process(names: Sequence[str]) -> dict[str, float]:
+    command = [sys.executable, "-m", "benchmarks.false_alarms", "--once", *names]
+    found: dict[str, float] = json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
+    return found
+
+
 def main() -> None:
-    """Run, and print one JSON object."""
+    """Run, and print one JSON object for each run and one with the summary."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.false_alarms", description=__doc__)
     parser.add_argument("--runs", type=int, default=100, help="runs that are judged")
     parser.add_argument("--learning", type=int, default=10, help="runs before those, from which the thresholds come")
-    parser.add_argument("--once", metavar="LIMITS", help="print the ratios of one run, in this process; limits as JSON")
+    parser.add_argument("--once", nargs="+", metavar="NAME", help="print the ratios of these rows, from this process")
     options = parser.parse_args()
     if options.once:
-        print(json.dumps(ratios(json.loads(options.once))))
+        known = measures()
+        print(json.dumps({name: known[name]() for name in options.once}))
         return
-    limits = limits_from([_process({}) for _ in range(options.learning)])
-    print(json.dumps(summary([_process(limits) for _ in range(options.runs)], limits), indent=1))
-
-
-def _process(limits: Mapping[str, float]) -> dict[str, float]:
-    command = [sys.executable, "-m", "benchmarks.false_alarms", "--once", json.dumps(limits)]
-    found: dict[str, float] = json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
-    return found
+    limits = limits_from([one_run({}) for _ in range(options.learning)])
+    runs = []
+    for _ in range(options.runs):
+        runs.append(one_run(limits))
+        print(json.dumps(runs[-1]), flush=True)
+    print(json.dumps({"limits": limits, **summary(runs, limits)}, indent=1))
 
 
 if __name__ == "__main__":

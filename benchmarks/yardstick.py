@@ -6,18 +6,22 @@ multiplications, one division and one root in registers. It shares no code with 
 What is compared is the fastest of many short samples of each, both taken until more of them change nothing. Short means that
 most fit between two interruptions, and the fastest is what the machine can do: on a machine with three times as many busy
 processes as cores the ratio of minimums repeats to 1 % where that of medians scatters by 5 %. Now and then a machine is slow
-for some seconds; what is too slow for a baseline is therefore measured again, and only what stays too slow is slow.
+for some seconds, and where its machine code happens to lie makes a kernel up to 7 % slower for as long as a process lives. What
+is too slow for a baseline is therefore measured again in new processes, and only what stays too slow is slow.
 """
 
 from __future__ import annotations
 
 import inspect
 import math
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from time import sleep
 from typing import Any
 
+from conservative import registry
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
@@ -37,7 +41,7 @@ PLACES = 4
 
 
 AGAIN, PAUSE = 3, 0.5
-"""How often what looks too slow is measured again, and the time, s, before each."""
+"""How often what looks too slow is measured again, each time in a new process, and the time, s, before each."""
 
 
 def turn(n_steps: int, h: float) -> float:
@@ -54,6 +58,12 @@ def turn(n_steps: int, h: float) -> float:
         s = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
         a, b, c, d = a * s, b * s, c * s, d * s
     return a + x
+
+
+def elsewhere(scene: str, method: str) -> float:
+    """Return the time ratio of a registered method at the step of a registered scene, measured in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.yardstick", scene, method]
+    return float(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
 
 
 def confirmed(ratio: float, limit: float, measure: Callable[[], float]) -> float:
@@ -115,3 +125,8 @@ def settled_minimums(*runs: Callable[[], Any]) -> tuple[float, ...]:
             calm = all(best > (1 - SETTLED) * old for best, old in zip(shortest, before, strict=True))
             quiet = quiet + 1 if calm else 0
     return tuple(shortest)
+
+
+if __name__ == "__main__":
+    _scene = registry.scene(sys.argv[1])
+    print(time_ratio(registry.method(sys.argv[2]), _scene, _scene.dt))
