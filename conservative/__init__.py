@@ -1,8 +1,8 @@
 """Conservative integration of rigid-body rotation, and the words that every method here shares.
 
-import conservative as cv
+    import conservative as cv
 
-trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
+    trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 """
 
 from . import scenes, shapes
@@ -10,6 +10,7 @@ from .body import RigidBody
 from .collocation import Gauss
 from .convected import Convected
 from .errors import (
+    AccuracyNotReached,
     BadInput,
     Diverged,
     IntegrationFailed,
@@ -27,6 +28,7 @@ from .method import Grid, Method, integrate
 from .moser_veselov import MoserVeselov
 from .point_potentials import LinearSpring, PointAttraction
 from .potential import Potential, UniformGravity
+from .projected import Projected
 from .reduced import Reduced
 from .scene import Scene
 from .substepped import Substepped
@@ -35,6 +37,7 @@ from .version import VERSION
 
 __all__ = [
     "VERSION",
+    "AccuracyNotReached",
     "BadInput",
     "Convected",
     "Counters",
@@ -54,6 +57,7 @@ __all__ = [
     "PointAttraction",
     "Potential",
     "PotentialFailed",
+    "Projected",
     "Reduced",
     "RigidBody",
     "Scene",

@@ -1,0 +1,68 @@
+"""The pages of the API reference: one command makes them, without a warning, and every public name is there."""
+
+import re
+import subprocess
+import sys
+from types import ModuleType
+
+import pytest
+
+import conservative
+from references import exact
+
+LOADED = re.compile(r'<(?:script|img|iframe|source)[^>]*\ssrc="([^"]*)"|<link[^>]*\shref="([^"]*)"|url\((http[^)]*)\)')
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """Pages by their path; made in another process, as pdoc runs what stands under `if TYPE_CHECKING`."""
+    folder = tmp_path_factory.mktemp("api")
+    command = [sys.executable, "-W", "error", "-m", "reports.api", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout.strip() == str(folder / "conservative.html")
+    return {path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8") for path in folder.rglob("*.html")}
+
+
+def described(page):
+    return set(re.findall(r'<(?:section|div) id="([^"]+)"', page))
+
+
+def test_every_public_name_is_described(pages):
+    modules = {name for name in conservative.__all__ if isinstance(getattr(conservative, name), ModuleType)}
+    assert modules == {"scenes", "shapes"}
+    assert set(conservative.__all__) - described(pages["conservative.html"]) <= modules
+    assert {f"conservative/{name}.html" for name in modules} <= pages.keys()
+    for builder in (getattr(conservative.scenes, name) for name in vars(conservative.scenes) if not name.startswith("_")):
+        if callable(builder):
+            assert builder.__name__ in described(pages[f"{builder.__module__.replace('.', '/')}.html"])
+
+
+def test_exact_solutions_and_engines_are_described(pages):
+    public = {name for name, found in vars(exact).items() if getattr(found, "__module__", "") == exact.__name__}
+    assert {"free_body", "lagrange_top", "Exact"} <= {name for name in public if not name.startswith("_")}
+    assert {name for name in public if not name.startswith("_")} <= described(pages["references/exact.html"])
+    for engine, family in (("mujoco", "MuJoCo"), ("pinocchio", "Pinocchio"), ("heyoka", "Heyoka"), ("scipy", "SciPy")):
+        assert {family, f"{family}.prepare"} <= described(pages[f"references/{engine}.html"])
+
+
+def test_public_names_are_those_that_the_package_imports():
+    imported = {name for name, found in vars(conservative).items() if not name.startswith("_") and found_here(name, found)}
+    assert set(conservative.__all__) == imported
+
+
+def found_here(name, found):
+    """Submodules become attributes when anybody imports them; of those only the two that hold names for users are public."""
+    return name in ("scenes", "shapes") if isinstance(found, ModuleType) else True
+
+
+def test_pages_load_nothing_from_elsewhere(pages):
+    loaded = {"".join(found) for page in pages.values() for found in LOADED.findall(page)}
+    assert not [address for address in loaded if re.match(r"https?:|//", address)]
+
+
+def test_signatures_name_arrays_briefly(pages):
+    text = re.sub(r"<[^>]+>", "", pages["references/exact.html"])
+    assert "w_WB_B0: ArrayLike" in text
+    assert "tuple[Array, Array]" in text
