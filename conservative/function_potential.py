@@ -162,7 +162,7 @@ class _Answers:
         if question == self.answered:  # residual and tangent of one iteration ask the same
             return 0
         try:
-            (self._body_torque, self._finite_torque, self._finite_derivative)[what]()
+            (self._body_torque, self._finite_torque, self._finite_derivative, self._energy)[what]()
         except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
             PotentialFailed.pending.cause = error
             return 1
@@ -176,6 +176,9 @@ class _Answers:
     def _body_torque(self) -> None:
         R = self._attitude()
         self.answer[:3] = self._moment(R, R, self.potential._gradient_at(R))
+
+    def _energy(self) -> None:
+        self.answer[0] = self.potential._energy_at(self._attitude())
 
     def _finite_torque(self) -> None:
         R_0, a = self._attitude(), self.given[4:7].copy()

@@ -23,7 +23,7 @@ class Potential(Protocol):
     There are two ways to a potential of one's own. The short one is `FunctionPotential(energy, gradient)`, two plain Python
     functions, called from the compiled loop and differentiated by differences: a thousand times slower than a compiled field.
     The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own with numba
-    overloads of `finite_torque`, `body_torque` and `finite_derivative`: `conservative/point_potentials.py` and
+    overloads of `energy`, `body_torque`, `finite_torque` and `finite_derivative`: `conservative/point_potentials.py` and
     `conservative/kernels/point_fields.py` are an example to follow. Whatever it is, `finite_derivative` must satisfy its
     identity to round-off, since energy is conserved to no better than that.
     """

@@ -1,7 +1,7 @@
 """Fields as the kernels see them: a named tuple of parameters in principal axes, and its torque, compiled per type.
 
 A kernel is compiled once for each type of field; `None` is the free body, for which the torque code is not compiled at all.
-A new field is a named tuple in a module of its own with overloads of the three functions below. Newton's method relies on the
+A new field is a named tuple in a module of its own with overloads of the four functions below. Newton's method relies on the
 derivatives that they return: it expects quadratic convergence.
 """
 
@@ -30,6 +30,11 @@ def finite_torque(field, q, a):
     tau* = sum_j qbar_j x (-V*_j) is the torque of the finite derivative over the step from the attitude Q0 of the quaternion q
     to Q0 Cay(2 a) (method of the paper, 23 and 27b, in three unknowns).
     """
+    raise TypeError("compiled only")  # pragma: no cover
+
+
+def energy(field, q):
+    """Return V in J at the attitude of the quaternion q, whose length does not matter."""
     raise TypeError("compiled only")  # pragma: no cover
 
 
@@ -90,6 +95,17 @@ def in_body(q, v):
     ut = cross(u, t)
     f = 2.0 * n
     return (v[0] + f * (q[0] * t[0] + ut[0]), v[1] + f * (q[0] * t[1] + ut[1]), v[2] + f * (q[0] * t[2] + ut[2]))
+
+
+@overload(energy, jit_options=SMALL)
+def _energy_uniform(field, q):
+    if not is_field(field, Uniform):
+        return None
+
+    def of_uniform(field, q):
+        return dot(vertical(q), (field.x, field.y, field.z))
+
+    return of_uniform
 
 
 @overload(body_torque, jit_options=SMALL)

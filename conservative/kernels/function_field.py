@@ -14,9 +14,9 @@ from numba.extending import intrinsic, overload
 
 from ..errors import PotentialFailed
 from . import kernel
-from .fields import body_torque, finite_derivative, finite_torque, is_field
+from .fields import body_torque, energy, finite_derivative, finite_torque, is_field
 
-BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE = 0, 1, 2
+BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
 FAILED = 1
 
 
@@ -24,7 +24,7 @@ class Function(NamedTuple):
     """Address of a C function int64(int64) that reads `given` (18,) and writes `answer` (90,); it returns FAILED or 0.
 
     BODY_TORQUE: q to T. FINITE_TORQUE: q, a to T and its derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and
-    its derivative by q1, row by row.
+    its derivative by q1, row by row. ENERGY: q to V.
     """
 
     address: int
@@ -52,6 +52,19 @@ def _ask(field, what):
 @kernel
 def _triple(v, i):
     return (v[i], v[i + 1], v[i + 2])
+
+
+@overload(energy)
+def _energy_function(field, q):
+    if not is_field(field, Function):
+        return None
+
+    def of_function(field, q):
+        field.given[0], field.given[1], field.given[2], field.given[3] = q
+        _ask(field, ENERGY)
+        return field.answer[0]
+
+    return of_function
 
 
 @overload(body_torque)

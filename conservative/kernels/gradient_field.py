@@ -11,7 +11,7 @@ import numpy as np
 from numba.extending import overload
 
 from . import kernel
-from .fields import body_torque, finite_derivative, finite_torque, halfway, in_body, is_field
+from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, in_body, is_field
 from .vector import add, cross, dot, scaled
 
 Triple = tuple[float, float, float]
@@ -53,6 +53,18 @@ def _finite_torque_gradient(field, q, a):
 def _column(field, a, e, dm, du):
     """Derivative of e x (M I u): M changes the product by dm, u changes by -du since it is taken at -a."""
     return cross(e, add(dm, halfway(a, _times(field, scaled(-1.0, du)))[0]))
+
+
+@overload(energy)
+def _energy_gradient(field, q):
+    if not is_field(field, Gradient):
+        return None
+
+    def of_gradient(field, q):
+        e = in_body(q, field.e)
+        return 0.5 * dot(e, _times(field, e))
+
+    return of_gradient
 
 
 @overload(body_torque)

@@ -18,7 +18,7 @@ from numba import types
 from numba.extending import overload
 
 from . import kernel
-from .fields import body_torque, finite_derivative, finite_torque, halfway, in_body
+from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, in_body, is_field
 from .vector import cross, dot, scaled, subtract
 
 Triple = tuple[float, float, float]
@@ -111,6 +111,24 @@ def _column(f, g, A, Am, end, dm):
     d = cross(A, dm)
     e = g * dot(end, dm)
     return (f * d[0] + e * Am[0], f * d[1] + e * Am[1], f * d[2] + e * Am[2])
+
+
+@overload(energy)
+def _energy_point(field, q):
+    if not _is_point_field(field):
+        return None
+    if is_field(field, Spring):
+
+        def of_spring(field, q):
+            stretch = math.sqrt(_square(subtract(field.b, in_body(q, field.A)))) - field.rest
+            return 0.5 * field.stiffness * stretch * stretch
+
+        return of_spring
+
+    def of_attraction(field, q):
+        return -field.strength / math.sqrt(_square(subtract(field.b, in_body(q, field.A))))
+
+    return of_attraction
 
 
 @overload(body_torque)

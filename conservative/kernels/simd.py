@@ -131,3 +131,16 @@ def larger_size(typing, a, b):
 def place(typing, a, index):
     """One of the four floats."""
     return types.float64(FOUR, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)
+
+
+@intrinsic
+def together(typing, a, b, c, d):
+    """Four floats as one value."""
+
+    def build(context, builder, sig, args):
+        value = ir.Constant(_VECTOR, ir.Undefined)
+        for index, each in enumerate(args):
+            value = builder.insert_element(value, each, ir.Constant(ir.IntType(32), index))
+        return value
+
+    return FOUR(types.float64, types.float64, types.float64, types.float64), build

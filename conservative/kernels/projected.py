@@ -1,0 +1,152 @@
+"""Explicit Runge-Kutta steps, each projected back onto the invariants.
+
+The state is the attitude as a quaternion q and the momentum L, principal axes: with w = J^-1 L and the body's torque T(q),
+
+    q' = q (0, w) / 2        L' = L x w + T
+
+Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is restored, and
+then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
+Wanner, IV.4): by Newton's method along their gradients with respect to L and to a turn of the body, so that the state moves
+least. An invariant that is met to round-off is left alone; nothing can accumulate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import kernel, small
+from .fields import body_torque, energy, in_body
+from .simd import LANES, four, fused, place, put, splat, spread, together
+from .vector import add, cross, dot, product, scaled, times
+
+MOST_CORRECTIONS = 8
+ROUND_OFF = 2.0**-51
+"""Defect, relative to its scale, that counts as none."""
+HOPELESS = 1e-6
+"""Defect that a projection may leave; above it the step was so long that its end is not near the invariants."""
+DEPENDENT = 1e-8
+"""Regularisation, relative: in a steady precession the gradients of energy and momentum are parallel."""
+
+
+@small
+def rates(J_inverse, field, q, L, slopes, at):
+    """Write (q', L', 0) to slopes[at : at + 8]."""
+    w = times(J_inverse, L)
+    x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
+    n = cross(L, w)
+    T = body_torque(field, q)
+    put(slopes, at + LANES, together(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
+    put(
+        slopes,
+        at,
+        together(
+            -(q[1] * x + q[2] * y + q[3] * z),
+            q[0] * x + q[2] * z - q[3] * y,
+            q[0] * y + q[3] * x - q[1] * z,
+            q[0] * z + q[1] * y - q[2] * x,
+        ),
+    )
+
+
+@small
+def combined(q, L, weights, columns, first, last, slopes):
+    """(q, L) + sum of weights[i] times the slopes of stage columns[i], i from first to last - 1; the newest slopes come last."""
+    for i in range(first, last):
+        weight, at = spread(weights, i), 2 * LANES * columns[i]
+        q = fused(weight, four(slopes, at), q)
+        L = fused(weight, four(slopes, at + LANES), L)
+    return q, L
+
+
+@small
+def stepped(h, J_inverse, field, weights, columns, starts, q, L, slopes):
+    """The state after one step. Of stage i, weights and columns begin at starts[i]; those of the step itself come last."""
+    q0, L0 = together(q[0], q[1], q[2], q[3]), together(L[0], L[1], L[2], 0.0)
+    stages = len(starts) - 2
+    for stage in range(stages):
+        qs, Ls = combined(q0, L0, weights, columns, starts[stage], starts[stage + 1], slopes)
+        q, L = (place(qs, 0), place(qs, 1), place(qs, 2), place(qs, 3)), (place(Ls, 0), place(Ls, 1), place(Ls, 2))
+        rates(J_inverse, field, q, L, slopes, 2 * LANES * stage)
+    # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
+    dq, dL = combined(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
+    q1, L1 = fused(splat(h), dq, q0), fused(splat(h), dL, L0)
+    return (place(q1, 0), place(q1, 1), place(q1, 2), place(q1, 3)), (place(L1, 0), place(L1, 1), place(L1, 2))
+
+
+@small
+def near_unit(q):
+    """q times 3/2 - |q|^2/2, all but 1/|q| where |q| is near 1. Its length carries no information, but must not wander off."""
+    n = 1.5 - 0.5 * ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
+    return (n * q[0], n * q[1], n * q[2], n * q[3])
+
+
+@small
+def values(J_inverse, field, axis, q, L):
+    """Energy, J, and momentum about the world vector `axis`, kg m^2/s; without an axis, `None`, the latter is 0."""
+    momentum = 0.0 if axis is None else dot(L, in_body(q, axis))
+    return 0.5 * dot(L, times(J_inverse, L)) + energy(field, q), momentum
+
+
+@small
+def projected(J_inverse, field, axis, kept, scales, q, L):
+    """Return (q, L, corrections, defect) of a state brought back to the energy and momentum `kept`.
+
+    Gradients are with respect to (L / `scales[1]`, turn of the body): (size w, -T) and (size axis, L x axis).
+    """
+    q = near_unit(q)
+    size = scales[1]
+    for correction in range(MOST_CORRECTIONS):
+        now = values(J_inverse, field, axis, q, L)
+        e, m = kept[0] - now[0], kept[1] - now[1]
+        defect = max(abs(e) / scales[0], abs(m) / size)
+        if not defect > ROUND_OFF:
+            break
+        w, T = times(J_inverse, L), body_torque(field, q)
+        by_energy = 1.0 / (size * size * dot(w, w) + dot(T, T))
+        if axis is None:
+            a, b, v, turn = e * by_energy, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        else:
+            v = in_body(q, axis)
+            turn = cross(L, v)
+            # Both gradients scaled to size one, and c their cosine.
+            by_momentum = 1.0 / (size * size + dot(turn, turn))
+            product_ = size * size * dot(w, v) - dot(T, turn)
+            c2 = product_ * product_ * by_energy * by_momentum
+            over = 1.0 / ((1.0 + DEPENDENT) * (1.0 + DEPENDENT) - c2)
+            a = over * by_energy * ((1.0 + DEPENDENT) * e - product_ * by_momentum * m)
+            b = over * by_momentum * ((1.0 + DEPENDENT) * m - product_ * by_energy * e)
+        L = add(L, scaled(size * size, add(scaled(a, w), scaled(b, v))))
+        half = scaled(0.5, add(scaled(-a, T), scaled(b, turn)))
+        q = near_unit(product(q, (1.0, half[0], half[1], half[2])))
+    return q, L, correction, defect
+
+
+@kernel
+def march(coefficients, h, n_steps, every, J_inverse, field, axis, scales, q, L, q_out, L_out):
+    """Take n_steps steps of h s from (q, L) and store every `every`-th state and the last.
+
+    `coefficients` are (weights, columns, starts) of the non-zero coefficients of all stages and of the step; `axis` is the
+    field's axis of symmetry, a world vector of length one, or None; `scales` what errors of energy, J, and momentum, kg m^2/s,
+    are relative to. Returns (steps done, corrections of the projections, relative defect left); steps done < n_steps means
+    that the next one could not be projected.
+    """
+    weights, columns, starts = coefficients[0].copy(), coefficients[1], coefficients[2]
+    weights[: starts[-2]] *= h
+    slopes = np.empty(2 * LANES * (len(starts) - 2))
+    q_out[0, :], L_out[0, :] = q, L
+    kept = values(J_inverse, field, axis, q, L)
+    row, corrections, until_sample, defect = 0, 0, every, 0.0
+    for step in range(1, n_steps + 1):
+        q, L = stepped(h, J_inverse, field, weights, columns, starts, q, L, slopes)
+        q, L, more, defect = projected(J_inverse, field, axis, kept, scales, q, L)
+        corrections += more
+        if not defect < HOPELESS:
+            return step - 1, corrections, defect
+        until_sample -= 1
+        if until_sample == 0 or step == n_steps:
+            until_sample = every
+            row += 1
+            q_out[row, :], L_out[row, :] = q, L
+    return n_steps, corrections, defect
