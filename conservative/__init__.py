@@ -1,7 +1,5 @@
 """Conservative integration of rigid-body rotation, and the words that every method here shares.
 
-The shortest use of it:
-
     import conservative as cv
 
     trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
@@ -30,6 +28,7 @@ from .method import Grid, Method, integrate
 from .moser_veselov import MoserVeselov
 from .point_potentials import LinearSpring, PointAttraction
 from .potential import Potential, UniformGravity
+from .projected import Projected
 from .reduced import Reduced
 from .scene import Scene
 from .substepped import Substepped
@@ -58,6 +57,7 @@ __all__ = [
     "PointAttraction",
     "Potential",
     "PotentialFailed",
+    "Projected",
     "Reduced",
     "RigidBody",
     "Scene",
