@@ -1,5 +1,7 @@
 """Conservative integration of rigid-body rotation, and the words that every method here shares.
 
+The shortest use of it:
+
     import conservative as cv
 
     trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)

@@ -1,6 +1,7 @@
 """Rotations: the hat map, the Cayley map, quaternions (scalar first), angles and the check that a matrix is a rotation.
 
-Every function is vectorised over leading axes. `R_WB` takes body components to world components.
+Every function is vectorised over leading axes. `R_WB` takes body components to world components. Source: textbook formulas, as
+in M. D. Shuster, A survey of attitude representations (1993), written for small errors.
 """
 
 from __future__ import annotations
@@ -84,14 +85,14 @@ def angle_between(R_ref: ArrayLike, R: ArrayLike) -> Array:
 
 
 def orthonormality(R: ArrayLike) -> Array:
-    """Return the largest component of |R'R - 1|, (...), for matrices (..., 3, 3)."""
+    """Return the largest component of |R'R - 1|, (...), dimensionless, for matrices (..., 3, 3)."""
     R = np.asarray(R, dtype=float)
     gram = np.swapaxes(R, -1, -2) @ R - np.eye(3)
     return np.abs(gram).max(axis=(-2, -1))
 
 
 def rotation_about(axis: ArrayLike, angle: float) -> Array:
-    """Return the matrix (3, 3) that turns by `angle` rad about `axis` (3,), which need not be of unit length."""
+    """Return the rotation (3, 3) by `angle`, rad, about `axis` (3,), which need not be of unit length."""
     axis = np.asarray(axis, dtype=float)
     n = axis / np.linalg.norm(axis)
     half = angle / 2
@@ -99,11 +100,11 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
 
 
 def polished(R: Array) -> Array:
-    """Return the rotation next to a matrix (3, 3) that already is one to `ROTATION_TOLERANCE`, orthonormal to round-off."""
+    """Return the rotation (3, 3), orthonormal to round-off, next to a matrix (3, 3) that is one to `ROTATION_TOLERANCE`."""
     return from_quaternion(to_quaternion(R))
 
 
 def triple(values: Array) -> Triple:
-    """Return three components (3,) as the tuple of floats that kernels take."""
+    """Return three components (3,), of any unit, as the tuple of floats that kernels take."""
     x, y, z = values.tolist()
     return x, y, z

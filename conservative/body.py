@@ -1,4 +1,4 @@
-"""The rigid body: its inertia about the fixed point and what follows from it."""
+"""The rigid body: its inertia about the fixed point and what follows from it. Source: definitions of any mechanics textbook."""
 
 from __future__ import annotations
 

@@ -5,6 +5,8 @@
 3. The whole run, once more with twice the step. Their difference, not the probe, is the estimate that is reported: a probe
    cannot see how much a scene amplifies errors later on. Where it is above what was asked for, the step is cut and the run
    repeated.
+
+Source: step doubling as in Richardson's extrapolation; the rest is our own.
 """
 
 from __future__ import annotations

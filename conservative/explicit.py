@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta coefficients as data that checks itself."""
+"""Explicit Runge-Kutta coefficients as data that checks itself. Source: each carries its own."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class ExplicitTableau:
 
     @cached_property
     def packed(self) -> tuple[Array, Array, Array]:
-        """What is not zero of A and, last, of b: values (n,), their columns (n,), and where in those each row starts."""
+        """What is not zero of A and, last, of b: factors (n,), their columns (n,), and where in those each row starts."""
         rows = [[(value, column) for column, value in enumerate(row) if value] for row in (*self.A, self.b)]
         values, columns = zip(*itertools.chain(*rows), strict=True)
         return np.array(values), np.array(columns), np.cumsum([0, *map(len, rows)])

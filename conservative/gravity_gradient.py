@@ -1,4 +1,4 @@
-"""The gradient of gravity, as a satellite feels it."""
+"""The gradient of gravity, as a satellite feels it. Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .errors import BadInput
 class GravityGradient:
     """The gradient of a far centre's gravity on a body turning about its centre of mass: V = rate^2/2 u'J u, u = R' e.
 
-    The part of the potential that depends on attitude to second order in size over distance (Hughes, Spacecraft Attitude
-    Dynamics, 9.3); the torque is rate^2 u x J u, body axes. e points to the centre and stays where it is in the world. V is
-    quadratic in the base vectors, so its finite derivative is its gradient at their mean.
+    The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is rate^2
+    u x J u, body axes. e points to the centre and stays where it is in the world. V is quadratic in the base vectors, so its
+    finite derivative is its gradient at their mean.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the exact motion conserves, as functions of attitude and rates."""
+"""What the exact motion conserves, as functions of attitude and rates. Source: definitions of any mechanics textbook."""
 
 from __future__ import annotations
 
@@ -32,13 +32,16 @@ class Invariant:
 
 
 def energy(body: RigidBody, potential: Potential | None, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return kinetic plus potential energy (...), J."""
+    """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3) and rates (..., 3), rad/s, body axes."""
     kinetic = np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2
     return kinetic if potential is None else kinetic + potential.energy(R_WB)
 
 
 def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return the angular momentum (..., 3) about the fixed point, kg m^2/s, world axes."""
+    """Return the angular momentum (..., 3) about the fixed point, kg m^2/s, world axes.
+
+    Attitudes are (..., 3, 3), body to world, and rates (..., 3), rad/s, body axes.
+    """
     return (R_WB @ body.momentum(w_WB_B)[..., None])[..., 0]
 
 

@@ -4,7 +4,8 @@ V = F(s) with s = |R b - A|^2, b in body and A in world axes. s is quadratic in 
 
     V* = (F(s1) - F(s0)) / (s1 - s0) 2 (Rbar b - A) b'        Rbar the mean of both attitudes
 
-is an exact finite derivative once the divided difference is written without cancellation.
+is an exact finite derivative once the divided difference is written without cancellation. Source: our own, in the sense of the
+paper's (21).
 """
 
 from __future__ import annotations
@@ -25,7 +26,20 @@ _POINT = "three finite numbers (3,), m"
 
 @dataclass(frozen=True, eq=False, init=False)
 class PointPotential(ABC):
-    """What both kinds share: the points, and everything that follows from `energy_of` and `slope`."""
+    """What both kinds share: the points, and everything that follows from `energy_of` and `slope`.
+
+    Parameters
+    ----------
+    point_B
+        Point of the body (3,), m, body axes, from the fixed point.
+    anchor_W
+        Point of the world (3,), m, world axes, from the fixed point.
+
+    Raises
+    ------
+    BadInput
+        A point is not finite or of another shape.
+    """
 
     point_B: Array
     anchor_W: Array
@@ -42,25 +56,25 @@ class PointPotential(ABC):
 
     @abstractmethod
     def slope(self, distance_0: Array, distance_1: Array) -> Array:
-        """Return the divided difference of V by the squared distance, (...), N/m."""
+        """Return the divided difference of V by the squared distance, (...), N/m, between distances (...), m."""
 
     def _from_anchor(self, R_WB: Array) -> Array:
         return R_WB @ self.point_B - self.anchor_W
 
     def distance(self, R_WB: Array) -> Array:
-        """Return how far apart the points are, (...), m."""
+        """Return how far apart the points are, (...), m, at attitudes (..., 3, 3)."""
         return np.linalg.norm(self._from_anchor(R_WB), axis=-1)
 
     def energy(self, R_WB: Array) -> Array:
-        """Return V, (...), in J."""
+        """Return V, (...), in J, at attitudes (..., 3, 3)."""
         return self.energy_of(self.distance(R_WB))
 
     def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J."""
+        """Return dV/dR, (..., 3, 3), in J, at matrices (..., 3, 3)."""
         return self.finite_derivative(R_WB, R_WB)
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (..., 3, 3), in J: exact for any distance between the attitudes."""
+        """Return V*, (..., 3, 3), in J: exact for attitudes (..., 3, 3) at any distance."""
         slope = self.slope(self.distance(R_0), self.distance(R_1))
         mean = self._from_anchor((R_0 + R_1) / 2)
         return 2 * slope[..., None, None] * mean[..., :, None] * self.point_B

@@ -1,7 +1,7 @@
 """Potentials: energy of a body as a function of its attitude, and the finite derivative that conserves it.
 
 The base vectors q_j are the columns of `R_WB`, so a potential is a function of a matrix, and its gradient has the same
-shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j), world axes.
+shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j), world axes (the paper's (7) and (21)).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Potential(Protocol):
 
 
 def torque_W(potential: Potential, R_WB: Array) -> Array:
-    """Return the torque (..., 3) about the fixed point, N m, world axes."""
+    """Return the torque (..., 3) about the fixed point, N m, world axes, at attitudes (..., 3, 3), body to world."""
     gradient = potential.gradient(R_WB)
     return -np.sum(np.cross(R_WB, gradient, axisa=-2, axisb=-2, axisc=-2), axis=-1)
 

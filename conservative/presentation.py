@@ -36,7 +36,7 @@ _WIDTH, _HEIGHT = 480, 160
 
 
 def samples(trajectory: Trajectory) -> Array:
-    """Return the samples (n, 17) under `COLUMNS`."""
+    """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
     return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
 

@@ -3,7 +3,8 @@
     top = shapes.cone(radius=0.05, height=0.1, density=2700).about(com_B=(0, 0, 0.075))     # standing on its tip
     scene = Scene("top", top.body, R_WB0, w_WB_B0, t_end, top.gravity(9.81))
 
-A shape comes with its centre of mass as the fixed point, in its own axes S; `turned` says how they lie in the body.
+A shape comes with its centre of mass as the fixed point, in its own axes S; `turned` says how they lie in the body. Source of
+the moments: textbook integrals, each beside its shape.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def box(size: ArrayLike, *, mass: float | None = None, density: float | None = N
     size
         Edges (3,), m.
     mass, density
-        One of them: kg, or kg/m^3.
+        One of them: mass in kg, or density in kg/m^3.
 
     Raises
     ------
@@ -133,7 +134,7 @@ def ellipsoid(semi_axes: ArrayLike, *, mass: float | None = None, density: float
     semi_axes
         Semi-axes (3,), m.
     mass, density
-        One of them: kg, or kg/m^3.
+        One of them: mass in kg, or density in kg/m^3.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def cylinder(radius: float, height: float, *, mass: float | None = None, density
     radius, height
         Lengths, m.
     mass, density
-        One of them: kg, or kg/m^3.
+        One of them: mass in kg, or density in kg/m^3.
 
     Raises
     ------
@@ -176,7 +177,7 @@ def cone(radius: float, height: float, *, mass: float | None = None, density: fl
     radius, height
         Of the base, and from tip to base, m.
     mass, density
-        One of them: kg, or kg/m^3.
+        One of them: mass in kg, or density in kg/m^3.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Substepping by name: another method with every step in as many equal parts as its equations need."""
+"""Substepping by name: another method with every step in as many equal parts as its equations need. Source: our own."""
 
 from __future__ import annotations
 

@@ -128,6 +128,6 @@ class Trajectory:
 
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
-    """Return how many leading samples are finite."""
+    """Return how many leading samples of attitudes (n, 3, 3) and rates (n, 3), rad/s, are finite."""
     finite = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
     return len(R_WB) if np.all(finite) else int(np.argmin(finite))

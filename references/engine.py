@@ -2,7 +2,10 @@
 
 Engines see the body in axes F in which its inertia is diagonal. Going there and back happens here, once in each direction:
 
-    R_WF = R_WB R_BF      w_F = R_BF' w_B      and back      R_WB = R_WF R_BF'      w_B = R_BF w_F
+    there       R_WF = R_WB R_BF      w_F = R_BF' w_B
+    and back    R_WB = R_WF R_BF'     w_B = R_BF w_F
+
+Source of the mass model: our own, see `mass_model`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 Each time costs the same, however late. What belongs to the motion as a whole is prepared in 500 bits, and the samples are sums
 of a few exponentials in double precision; see `references._theta` for why neither a separatrix nor a pole harms them. The
-inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded.
+inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded. Sources:
+Jacobi for the free body, Klein & Sommerfeld for the top; see the functions.
 """
 
 from __future__ import annotations
@@ -49,7 +50,10 @@ def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLik
 
     Returns
     -------
-    `R_WB` (n, 3, 3), body to world, and `w_WB_B` (n, 3), rad/s, body axes.
+    R_WB
+        Attitudes (n, 3, 3), body to world.
+    w_WB_B
+        Rates (n, 3), rad/s, body axes.
 
     Raises
     ------
@@ -80,11 +84,14 @@ def lagrange_top(
     potential
         The field; weight and lever of either sign.
     R_WB0, w_WB_B0, t
-        As in `free_body`.
+        Attitude (3, 3) and rates (3,), rad/s, at t = 0, and times (n,), s, as in `free_body`.
 
     Returns
     -------
-    `R_WB` (n, 3, 3), body to world, and `w_WB_B` (n, 3), rad/s, body axes.
+    R_WB
+        Attitudes (n, 3, 3), body to world.
+    w_WB_B
+        Rates (n, 3), rad/s, body axes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Potentials as heyoka expressions: one entry in `FIELDS` adds one to multi-precision truth."""
+"""Potentials as heyoka expressions: one entry in `FIELDS` adds one to multi-precision truth. Source: the potentials' own."""
 
 from __future__ import annotations
 

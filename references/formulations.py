@@ -1,4 +1,7 @@
-"""A scene in the forms of `references.taylor`: which axes, which numbers, and how states become attitudes and rates."""
+"""A scene in the forms of `references.taylor`: which axes, which numbers, and how states become attitudes and rates.
+
+Source: our own, measured against each other.
+"""
 
 from __future__ import annotations
 

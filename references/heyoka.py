@@ -1,4 +1,4 @@
-"""heyoka: Taylor integration at any tolerance, on the formulation that suits it."""
+"""heyoka: Taylor integration at any tolerance, on the formulation that suits it. Source: Biscani & Izzo (2021)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Bodies out of model files, read by the engines' own parsers: MJCF by MuJoCo, URDF by Pinocchio.
 
 A body turns about its joint. What is welded to it moves with it and counts; what hangs on further joints does not. A body that
-is free turns about its centre of mass. Body axes are the file's own: those of the MJCF body or of the URDF link.
+is free turns about its centre of mass. Body axes are the file's own: those of the MJCF body or of the URDF link. Source: the
+two formats' documentation.
 """
 
 from __future__ import annotations

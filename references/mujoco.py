@@ -1,4 +1,4 @@
-"""MuJoCo: its five integrators on one body."""
+"""MuJoCo: its five integrators on one body. Source: its documentation, Computation, Numerical integration."""
 
 from __future__ import annotations
 

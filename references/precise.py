@@ -1,4 +1,7 @@
-"""Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers."""
+"""Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers.
+
+Source: heyoka's documentation and Biscani & Izzo (2021); the equations are those of `references.taylor`.
+"""
 
 from __future__ import annotations
 
@@ -114,7 +117,10 @@ def states(
 
     Returns
     -------
-    Quaternions (n, 4), scalar first, and rates (n, 3).
+    q
+        Quaternions (n, 4), scalar first, body to world.
+    w
+        Rates (n, 3), rad/s, body axes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""SciPy's `solve_ivp` on quaternion and body rates: what one writes without an engine."""
+"""SciPy's `solve_ivp` on quaternion and body rates: what one writes without an engine. Source: Euler's equations."""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ What belongs to a body or a field is a runtime parameter, so that one compiled i
 (measured: a parameter costs 2 % more than a constant). Terms that vanish for a scene, as those of equal moments or of a
 centre of mass on an axis, are left out of its form.
 
+Source: Euler's and Poisson's equations; the slow frame is that of `conservative.frames`.
+
 Symbols: q quaternion, scalar first, body to world; w rates in body axes; u rates of the slow frame, world axes; n the body's
 axis of symmetry, world axes.
 
@@ -53,7 +55,7 @@ def form_of(equations: Callable[[Sequence[Expression]], Equations], parameters: 
 
 @cache
 def compiled(form: Form, tol: float) -> Any:
-    """Return the compiled integrator of a form; whoever runs it sets its state, time and parameters before."""
+    """Return the integrator of a form, compiled for a relative tolerance; whoever runs it sets state, time and parameters."""
     equations = form.build()
     return heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol)
 

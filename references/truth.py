@@ -6,7 +6,7 @@
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
 
 The checker's own error is in the agreement: a few rounding units in the first line, some 1e-11 rad in the others, more where a
-motion amplifies errors.
+motion amplifies errors. Source: our own.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ TIGHTEST = 2.3e-14
 
 
 class Disagreement(ArithmeticError):
-    """Two truths differ by more than they may. Attributes: `scene`, `names`, `agreement_rad`, `allowed_rad`."""
+    """Two truths differ by more than they may. Attributes: `scene`, `names`, `agreement_rad` and `allowed_rad`, in rad."""
 
     def __init__(self, scene: str, names: tuple[str, str], agreement_rad: float, allowed_rad: float) -> None:
         self.scene, self.names, self.agreement_rad, self.allowed_rad = scene, names, agreement_rad, allowed_rad

@@ -25,7 +25,7 @@ def asymmetric_top(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return Scene(
         "asymmetric_top",

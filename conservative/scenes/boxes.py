@@ -30,7 +30,7 @@ def gazebo_box(t_end: float = GAZEBO_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _box("gazebo_box", GAZEBO_SIDES, GAZEBO_MASS, GAZEBO_RATES, t_end, "Peters & Hsu, boxes benchmark of Gazebo")
 
@@ -41,7 +41,7 @@ def tumbling_box(t_end: float = TUMBLING_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _box("tumbling_box", MUJOCO_SIDES, MUJOCO_MASS, TUMBLING_RATES, t_end, "MuJoCo's tests of free bodies")
 
@@ -52,7 +52,7 @@ def near_intermediate_box(t_end: float = NEAR_INTERMEDIATE_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _box(
         "near_intermediate_box",

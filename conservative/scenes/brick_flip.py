@@ -27,7 +27,7 @@ def brick_flip(disturbance: float = DEFAULT_DISTURBANCE, spin: float = DEFAULT_S
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     rates = (
         0.0,

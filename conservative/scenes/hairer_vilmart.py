@@ -22,7 +22,7 @@ def hairer_vilmart(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return Scene(
         "hairer_vilmart",

@@ -31,7 +31,7 @@ def kovalevskaya_top(axial: float = DEFAULT_AXIAL, moment: float = DEFAULT_MOMEN
     Raises
     ------
     BadInput
-        An argument is not a finite number above 0.
+        An argument, such as t_end, s, is not a finite number above 0.
     """
     J3 = positive_number("axial", axial)
     k = positive_number("moment", moment) / J3
@@ -50,7 +50,7 @@ def kovalevskaya_top(axial: float = DEFAULT_AXIAL, moment: float = DEFAULT_MOMEN
 
 
 def kovalevskaya_integral(k: float, w0: tuple[float, float, float]) -> Invariant:
-    """Return K, 1/s^4, of a top with k = weight com / J3, 1/s^2, along its 1-axis; `w0` gives the scale."""
+    """Return K, 1/s^4, of a top with k = weight com / J3, 1/s^2, along its 1-axis; `w0`, rad/s, gives the scale."""
 
     def evaluate(R_WB: Array, w_WB_B: Array) -> Array:
         gamma, w = R_WB[..., 2, :], w_WB_B

@@ -42,7 +42,7 @@ def lagrange_top(
 
             m g l / (J3 phidot^2) = psidot / phidot + ((J3 - J1) / J3) cos(tilt)
     height, density, gravity
-        m, kg/m^3, m/s^2.
+        Of the cone, in m, its material, in kg/m^3, and the field, in m/s^2.
     t_end
         Duration, s; default one period of precession.
 
@@ -76,7 +76,10 @@ def lagrange_top(
 
 
 def cone(height: float, density: float) -> tuple[float, float, float, float]:
-    """Return mass, kg, distance of the centre of mass from the tip, m, and moments J1 = J2 and J3 about the tip, kg m^2."""
+    """Return mass, kg, distance of the centre of mass from the tip, m, and moments J1 = J2 and J3 about the tip, kg m^2.
+
+    The cone has a height, m, and a density, kg/m^3; its radius is half the height.
+    """
     radius = height / 2
     mass = density * math.pi * radius**2 * height / 3
     lever = 3 * height / 4

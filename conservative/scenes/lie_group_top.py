@@ -29,7 +29,7 @@ def lie_group_top(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> S
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     com = np.array(DEFAULT_COM)
     offset = DEFAULT_MASS * (com @ com * np.eye(3) - np.outer(com, com))  # parallel axes

@@ -25,7 +25,7 @@ def needle(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     rates = finite_number("spin", spin, "a finite rate, rad/s") * np.array(DEFAULT_DIRECTION)
     return Scene(

@@ -32,7 +32,7 @@ def nutating_top(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     steady = lagrange_top(t_end=t_end)
     rates = steady.w_WB_B0 + steady.body.inverse @ np.array(DEFAULT_DISTURBANCE)
@@ -45,7 +45,7 @@ def cusped_top(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _released("cusped_top", 0.0, t_end)
 
@@ -56,7 +56,7 @@ def looping_top(precession: float = DEFAULT_LOOP_RATE, t_end: float = DEFAULT_T_
     Raises
     ------
     BadInput
-        precession is not below 0, or t_end is not above 0.
+        precession is not below 0, or t_end, s, is not above 0.
     """
     if finite_number("precession", precession, "a finite rate below 0, rad/s") >= 0:
         raise BadInput("precession", precession, "a finite rate below 0, rad/s")
@@ -69,7 +69,7 @@ def unduloid_top(precession: float = DEFAULT_WAVE_RATE, t_end: float = DEFAULT_T
     Raises
     ------
     BadInput
-        precession is not between 0 and the steady rate of 10 rad/s, or t_end is not above 0.
+        precession is not between 0 and the steady rate of 10 rad/s, or t_end, s, is not above 0.
     """
     if not 0 < finite_number("precession", precession, "a rate between 0 and 10, rad/s") < 10:
         raise BadInput("precession", precession, "a rate between 0 and 10, rad/s")

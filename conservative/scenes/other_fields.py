@@ -38,7 +38,7 @@ def sprung_body(
     Raises
     ------
     BadInput
-        stiffness is not above 0, rest_length is below 0, or t_end is not above 0.
+        stiffness is not above 0, rest_length is below 0, or t_end, s, is not above 0.
     """
     return _in_field("sprung_body", LinearSpring(stiffness, DEFAULT_POINT, DEFAULT_ANCHOR, rest_length), t_end)
 
@@ -49,7 +49,7 @@ def attracted_body(strength: float = DEFAULT_STRENGTH, t_end: float = DEFAULT_T_
     Raises
     ------
     BadInput
-        strength is 0 or not finite, or t_end is not above 0.
+        strength is 0 or not finite, or t_end, s, is not above 0.
     """
     return _in_field("attracted_body", PointAttraction(strength, DEFAULT_POINT, DEFAULT_ANCHOR), t_end)
 
@@ -60,7 +60,7 @@ def gravity_gradient_body(rate: float = DEFAULT_RATE, t_end: float = DEFAULT_T_E
     Raises
     ------
     BadInput
-        rate is not above 0, or t_end is not above 0.
+        rate is not above 0, or t_end, s, is not above 0.
     """
     return _in_field("gravity_gradient_body", GravityGradient(rate, DEFAULT_INERTIA, DEFAULT_CENTRE), t_end)
 

@@ -29,7 +29,7 @@ def hanging_rest(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _pendulum("hanging_rest", -DEFAULT_LEVER, 0.0, t_end)
 
@@ -40,7 +40,7 @@ def inverted_rest(t_end: float = DEFAULT_T_END) -> Scene:
     Raises
     ------
     BadInput
-        t_end is not a finite number above 0.
+        t_end, s, is not a finite number above 0.
     """
     return _pendulum("inverted_rest", DEFAULT_LEVER, 0.0, t_end)
 
@@ -51,7 +51,7 @@ def pendulum_over_top(excess: float = DEFAULT_EXCESS, t_end: float = DEFAULT_T_E
     Raises
     ------
     BadInput
-        An argument is not a finite number above 0.
+        An argument, such as t_end, s, is not a finite number above 0.
     """
     energy = 2 * DEFAULT_WEIGHT * DEFAULT_LEVER * (1 + positive_number("excess", excess))
     return _pendulum("pendulum_over_top", -DEFAULT_LEVER, math.sqrt(2 * energy / DEFAULT_INERTIA[0]), t_end)

@@ -35,7 +35,7 @@ def near_separatrix(
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     return brick_flip(disturbance, spin, t_end).renamed("near_separatrix", source="Krenk & Nielsen, 5.1, disturbed less")
 
@@ -46,7 +46,7 @@ def unstable_spin(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> S
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     return brick_flip(0.0, spin, t_end).renamed("unstable_spin", source=SOURCE)
 
@@ -57,7 +57,7 @@ def separatrix(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scen
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     Ja, Jc, Jb = DEFAULT_INERTIA
     speed = finite_number("spin", spin, "a finite rate, rad/s")
@@ -74,7 +74,7 @@ def degenerate_separatrix(disturbance: float = 0.0, spin: float = DEFAULT_SPIN, 
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     rates = (
         finite_number("disturbance", disturbance, "a finite rate, rad/s"),

@@ -36,7 +36,7 @@ def sleeping_top(stability: float = DEFAULT_ABOVE, tilt: float = DEFAULT_TILT, t
     Raises
     ------
     BadInput
-        stability is not above 1, tilt is not finite, or t_end is not above 0.
+        stability is not above 1, tilt is not finite, or t_end, s, is not above 0.
     """
     if positive_number("stability", stability, "a finite number above 1") <= 1:
         raise BadInput("stability", stability, "a finite number above 1")
@@ -49,7 +49,7 @@ def falling_top(stability: float = DEFAULT_BELOW, tilt: float = DEFAULT_TILT, t_
     Raises
     ------
     BadInput
-        stability is not in (0, 1), tilt is not finite, or t_end is not above 0.
+        stability is not in (0, 1), tilt is not finite, or t_end, s, is not above 0.
     """
     if positive_number("stability", stability, "a number in (0, 1)") >= 1:
         raise BadInput("stability", stability, "a number in (0, 1)")
@@ -62,7 +62,7 @@ def simo_wong_top(tilt: float = SIMO_WONG_TILT, t_end: float = SIMO_WONG_T_END) 
     Raises
     ------
     BadInput
-        tilt is not finite, or t_end is not above 0.
+        tilt is not finite, or t_end, s, is not above 0.
     """
     return Scene(
         "simo_wong_top",

@@ -32,7 +32,7 @@ def symmetric_body(axial: float = DEFAULT_AXIAL, transverse: float = DEFAULT_TRA
     Raises
     ------
     BadInput
-        An argument is not a finite number above 0.
+        An argument, such as t_end, s, is not a finite number above 0.
     """
     J1, J3 = positive_number("transverse", transverse), positive_number("axial", axial)
     return _free("symmetric_body", (J1, J1, J3), DEFAULT_RATES, t_end)
@@ -44,7 +44,7 @@ def spherical_body(moment: float = DEFAULT_AXIAL, t_end: float = DEFAULT_T_END) 
     Raises
     ------
     BadInput
-        An argument is not a finite number above 0.
+        An argument, such as t_end, s, is not a finite number above 0.
     """
     J = positive_number("moment", moment)
     return _free("spherical_body", (J, J, J), DEFAULT_RATES, t_end)
@@ -56,7 +56,7 @@ def planar_body(first: float = DEFAULT_PLATE[0], second: float = DEFAULT_PLATE[1
     Raises
     ------
     BadInput
-        An argument is not a finite number above 0.
+        An argument, such as t_end, s, is not a finite number above 0.
     """
     J1, J2 = positive_number("first", first), positive_number("second", second)
     return _free("planar_body", (J1, J2, J1 + J2), DEFAULT_RATES, t_end)
@@ -68,7 +68,7 @@ def axis_spin(axis: int = 1, spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_
     Raises
     ------
     BadInput
-        axis is not 1, 2 or 3, spin is not finite, or t_end is not above 0.
+        axis is not 1, 2 or 3, spin is not finite, or t_end, s, is not above 0.
     """
     choice("axis", axis, (1, 2, 3))
     J1, J2 = DEFAULT_PLATE

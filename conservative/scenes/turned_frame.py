@@ -47,7 +47,7 @@ def turned_brick(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Sc
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     return _turned("turned_brick", brick_flip(), angle, t_end)
 
@@ -58,7 +58,7 @@ def turned_top(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Scen
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end is not above 0.
+        An argument is not finite, or t_end, s, is not above 0.
     """
     return _turned("turned_top", asymmetric_top(), angle, t_end)
 

@@ -1,0 +1,310 @@
+"""What a public docstring has to say: shapes and units of what goes in and comes out, what is raised, where numbers come from.
+
+The rule reads signatures and source, not intentions. It asks
+
+* of every function, method and property that takes or returns an array: a shape such as (3,) or (n, 3), one for what goes in
+  and one for what comes out;
+* of every one with a float or an array: a unit, or a word that says why there is none; of parameters such as dt or inertia the
+  unit that goes with the name;
+* of everything whose code raises an exception of `conservative.errors`, itself or through a check or a private function: the
+  exception's name after "Raises" or "Raise";
+* of every module with formulas: a source, be it an equation, an author, or a word that it is our own.
+
+What a class says holds for its methods, what a base class says for those that override it.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import re
+import textwrap
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import conservative
+import references
+from conservative import check, errors, registry
+from conservative.attitude import Array
+from conservative.check import positive_number
+from conservative.errors import BadInput, MissingEngine
+
+SHAPE = re.compile(r"\((?:\.\.\.\)|[a-z]+,\)|(?:\.\.\.|[nm]|\d+),(?: (?:[nm]|\d+),?)*\))")
+QUANTITIES = r"rad/s|rad|kg m\^2/s|kg m\^2|1/\(kg m\^2\)|kg/m\^3|kg|N m|N/m|N|J|m\^3/s\^2|m/s\^2|m|1/s|s"
+UNIT = re.compile(rf"(?:, |\bin |\(|\d |\bof )({QUANTITIES})(?![\w^/'*])", re.ASCII)
+PLAIN = re.compile(
+    r"rotation|attitude|quaternion|relative|unit vector|skew|factors?\b|number of|dimensionless|any unit", re.IGNORECASE
+)
+"""Words for what has no unit."""
+BY_NAME = {
+    **dict.fromkeys(("dt", "t", "t_end"), "s"),
+    **dict.fromkeys(("w_WB_B", "w_WB_B0", "precession"), "rad/s"),
+    **dict.fromkeys(("inertia", "moments"), "kg m^2"),
+    **dict.fromkeys(("error", "angle"), "rad"),
+    **dict.fromkeys(("com_B", "radius", "height"), "m"),
+    **{"mass": "kg", "density": "kg/m^3", "weight": "N"},
+}
+"""Units that the names of parameters ask for."""
+AUTHOR = r"\b[A-Z][a-z]\w+"
+SOURCE = re.compile(
+    rf"\bSource|\bpaper\b|{AUTHOR} (?:&|and) (?:[A-Z]\. )*{AUTHOR}|{AUTHOR}[^.\n]{{0,80}}\b(?:17|18|19|20)\d\d\b"
+)
+"""Said so, the paper, two authors, or one with a year."""
+RAISED = {name for name, found in vars(errors).items() if inspect.isclass(found) and issubclass(found, Exception)}
+
+
+# ---------------------------------------------------------------------------------------------------------------- the rule
+
+
+def complaints(function, words, around=""):
+    """Return what the documentation `words` of a function lacks; `around` is what its class says."""
+    signature = inspect.signature(function)
+    taken = [str(parameter.annotation) for parameter in signature.parameters.values()]
+    given = str(signature.return_annotation)
+    found = [] if words else ["no docstring"]
+    found += _shapes(taken, given, words + around)
+    if any(map(_physical, [*taken, given])) and not (UNIT.search(words + around) or PLAIN.search(words + around)):
+        found.append("no unit")
+    units = set(UNIT.findall(words + around))
+    found += [f"no {unit} for {name}" for name in signature.parameters if (unit := BY_NAME.get(name)) and unit not in units]
+    promised = re.search(r"\bRaises?\b[\s\S]*", words + around)
+    found += [f"raises {name}" for name in sorted(raised_by(function)) if not (promised and name in promised[0])]
+    return found
+
+
+def _shapes(taken, given, words):
+    wanted = any(map(_is_array, taken)) + _is_array(given)
+    got = len(SHAPE.findall(words))
+    return [f"{got} of {wanted} shapes"] if got < wanted else []
+
+
+def _is_array(annotation):
+    return bool(re.search(r"\bArray(?:Like)?\b", annotation)) and "Callable" not in annotation
+
+
+def _physical(annotation):
+    return _is_array(annotation) or (bool(re.search(r"\bfloat\b", annotation)) and "Callable" not in annotation)
+
+
+@cache
+def raised_by(function):
+    """Return the names of our exceptions that a function raises, by itself or through a check or a private neighbour."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    caught = {name.id for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) for name in _names(node.type)}
+    found = {name.id for node in ast.walk(tree) if isinstance(node, ast.Raise) for name in _names(node.exc)} & RAISED
+    for called in (node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+        neighbour = function.__globals__.get(called)
+        if inspect.isfunction(neighbour) and neighbour is not function and _looked_into(called, neighbour, function):
+            found |= raised_by(neighbour)
+    return frozenset(found - caught)
+
+
+def _names(node):
+    return [] if node is None else [name for name in ast.walk(node) if isinstance(name, ast.Name)]
+
+
+def _looked_into(name, neighbour, function):
+    if neighbour.__module__ == check.__name__:
+        return True
+    return name.startswith("_") and neighbour.__module__ == function.__module__
+
+
+# ------------------------------------------------------------------------------------------------------------ what is public
+
+
+def public_modules():
+    for room in (conservative, references):
+        for found in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+            if not any(part.startswith("_") or part == "kernels" for part in found.name.split(".")):
+                yield found.name
+
+
+def members(module):
+    """Yield name, function and the words of its class for all that is public in a module."""
+    for name, found in vars(module).items():
+        if name.startswith("_") or getattr(found, "__module__", None) != module.__name__:
+            continue
+        if inspect.isclass(found):
+            yield from _of_class(name, found)
+        elif inspect.isfunction(inspect.unwrap(found)):
+            yield name, inspect.unwrap(found), inspect.getdoc(found) or "", ""
+
+
+def _of_class(name, found):
+    around = "\n".join(["", *(base.__doc__ or "" for base in found.__mro__ if base.__module__.startswith(("cons", "ref")))])
+    for attribute, member in vars(found).items():
+        function = _function(member)
+        if function is None or function.__code__.co_filename.startswith("<"):
+            continue  # what dataclasses write themselves
+        if attribute in ("__init__", "__post_init__"):
+            yield f"{name}.{attribute}", function, around, ""
+        elif not attribute.startswith("_"):
+            yield f"{name}.{attribute}", function, _inherited(found, attribute), around
+
+
+def _function(member):
+    for way in ("fget", "func", "__func__"):
+        member = getattr(member, way, member)
+    return member if inspect.isfunction(member) else None
+
+
+def _inherited(found, attribute):
+    words = (inspect.getdoc(vars(base)[attribute]) for base in found.__mro__ if attribute in vars(base))
+    return "\n".join(filter(None, words))
+
+
+@pytest.mark.parametrize("name", sorted(public_modules()))
+def test_shapes_units_and_errors_are_documented(name):
+    found = {n: lacking for n, *rest in members(importlib.import_module(name)) if (lacking := complaints(*rest))}
+    assert not found, "\n".join(f"{name}.{n}: {', '.join(lacking)}" for n, lacking in found.items())
+
+
+def test_everything_in_all_is_walked():
+    walked = {n.partition(".")[0] for name in public_modules() for n, *_ in members(importlib.import_module(name))}
+    functions = {name for name in conservative.__all__ if inspect.isfunction(getattr(conservative, name))}
+    methods = {entry.load().__name__ for entry in registry.registered(registry.METHODS).values()}
+    assert functions | methods <= walked
+
+
+# --------------------------------------------------------------------------------------------------------------- the sources
+
+WITHOUT_FORMULAS = {
+    "conservative.check": "checks of arguments",
+    "conservative.errors": "exceptions",
+    "conservative.method": "the protocol",
+    "conservative.presentation": "tables and cards",
+    "conservative.registry": "names",
+    "conservative.scene": "a value",
+    "conservative.scene_file": "a file format",
+    "conservative.scenes": "what its modules have",
+    "conservative.toml_source": "line numbers",
+    "conservative.trajectory": "a value",
+    "conservative.version": "a number",
+}
+"""Modules that compute nothing, and what they are instead."""
+
+
+def modules_with_formulas():
+    """Yield all others; scenes carry their source as a value, see below."""
+    yield from (name for name in public_modules() if name not in WITHOUT_FORMULAS and ".scenes." not in name)
+
+
+@pytest.mark.parametrize("name", sorted(modules_with_formulas()))
+def test_modules_with_formulas_name_a_source(name):
+    assert SOURCE.search(words_of(importlib.import_module(name))), f"{name}: no source"
+
+
+def words_of(module):
+    """Return what a module, its classes and its functions say."""
+    own = [found for found in vars(module).values() if getattr(found, "__module__", None) == module.__name__]
+    return "\n".join([module.__doc__ or "", *(inspect.getdoc(found) or "" for found in own)])
+
+
+@pytest.mark.parametrize("name", sorted(registry.registered(registry.SCENES)))
+def test_scenes_name_their_source(name):
+    assert registry.scene(name).source
+
+
+# ----------------------------------------------------------------------------------------------- what the rule must not accept
+
+
+def good(inertia: ArrayLike, dt: float) -> Array:
+    """Return rates (n, 3), rad/s, for moments (3,), kg m^2, and a step dt, s.
+
+    Raises
+    ------
+    BadInput
+        dt is not above 0.
+    """
+    return np.atleast_2d(inertia) * positive_number("dt", dt)
+
+
+def one_shape(v: ArrayLike) -> Array:
+    """Return the rotation vector v (3,) once more."""
+    return np.asarray(v)
+
+
+def no_unit(dt: float) -> float:
+    """Return twice the step."""
+    return 2 * dt
+
+
+def other_unit(dt: float) -> float:
+    """Return the angle, rad, turned in a step."""
+    return 2 * dt
+
+
+def hidden_check(dt: float) -> float:
+    """Return a step, s, that is above 0."""
+    return positive_number("dt", dt)
+
+
+def _private(engine: str) -> None:
+    raise MissingEngine(engine, engine)
+
+
+def hidden_neighbour(engine: str) -> None:
+    """Load an engine.
+
+    Raises
+    ------
+    BadInput
+        It has another name.
+    """
+    if not engine:
+        raise BadInput("engine", engine, "a name")
+    _private(engine)
+
+
+def bare(n: int) -> int:
+    return n
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (good, []),
+        (one_shape, ["1 of 2 shapes"]),
+        (no_unit, ["no unit", "no s for dt"]),
+        (other_unit, ["no s for dt"]),
+        (hidden_check, ["raises BadInput"]),
+        (hidden_neighbour, ["raises MissingEngine"]),
+        (bare, ["no docstring"]),
+    ],
+)
+def test_the_rule_finds_what_is_missing(function, expected):
+    assert complaints(function, inspect.getdoc(function) or "") == expected
+
+
+@pytest.mark.parametrize("words", ["Step, s.", "V in J of a matrix", "3 rad", "moments (3,), kg m^2, of a body"])
+def test_units_are_recognised(words):
+    assert UNIT.search(words)
+
+
+@pytest.mark.parametrize(
+    "words", ["the J of a body", "m and n", "its steps", "J_1, J_2", "s' s", "so many", "in motion", "(see there)"]
+)
+def test_letters_are_not_taken_for_units(words):
+    assert not UNIT.search(words)
+
+
+@pytest.mark.parametrize(
+    "words", ["(3,)", "(n, 3)", "(..., 3, 3)", "(n,)", "(...)", "(3, 3)", "(n, 3, 3)", "(n, 17)", "(stages,)"]
+)
+def test_shapes_are_recognised(words):
+    assert SHAPE.fullmatch(words)
+
+
+@pytest.mark.parametrize("words", ["(s)", "(29)(b)", "()", "(see)", "f(x, 3)"])
+def test_other_brackets_are_not_shapes(words):
+    assert not SHAPE.search(words)
+
+
+@pytest.mark.parametrize("words", ["Fast.", "Order 2, 12 stages.", "Return the known solution (3,)."])
+def test_words_that_are_no_source(words):
+    assert not SOURCE.search(words)
