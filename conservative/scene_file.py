@@ -41,6 +41,18 @@ def template() -> str:
     return files(__package__).joinpath("template.toml").read_text(encoding="utf-8")
 
 
+def choices() -> dict[str, dict[str, list[str]]]:
+    """Return what can stand under `shape` and `kind`, and the forms of an attitude, each with the keys that go with it."""
+    potentials = {name: keys_of(build) for name, build in _POTENTIALS.items()}
+    potentials["uniform_gravity"].append("g")
+    potentials["gravity_gradient"].remove("inertia")  # the body's
+    return {
+        "shape": {name: keys_of(build) for name, build in SHAPES.items()},
+        "kind": potentials,
+        "R_WB": {name: keys_of(build) for name, build in _ATTITUDES.items()},
+    }
+
+
 def load(path: str | Path) -> Scene:
     """Return the scene in a TOML file.
 

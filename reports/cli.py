@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
+from . import completing
+from .interrupts import Terminated, terminable
+
 EXIT_CODES = """Exit codes:
-    0  done
-    1  a run failed: it did not converge, or diverged; the gate is not passed; or the command was interrupted
-    2  the command or an input cannot be used, or an engine or a baseline is missing
+    0    done
+    1    a run failed: it did not converge, or diverged; or the gate is not passed
+    2    the command or an input cannot be used, or an engine or a baseline is missing
+    130  interrupted by Ctrl-C, 143 by SIGTERM; a report keeps what is finished, and --resume goes on
 """
 
 
@@ -26,12 +31,32 @@ class _UserError(click.ClickException):
     exit_code = 2
 
 
+class _Interrupted(click.ClickException):
+    exit_code = 130
+
+    def show(self, file: Any = None) -> None:
+        """Say it on a line of its own, below the ^C that a terminal shows."""
+        click.echo("\n" * sys.stderr.isatty() + self.message, err=True)
+
+
+class _Terminated(_Interrupted):
+    exit_code = 143
+
+
+def _notes(error: BaseException) -> list[str]:
+    return getattr(error, "__notes__", [])
+
+
 class Commands(click.Group):
     """Commands whose user errors end as one line on stderr and an exit code, never as a traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with terminable():
+                return super().invoke(ctx)
+        except KeyboardInterrupt as stop:
+            kind = _Terminated if isinstance(stop, Terminated) else _Interrupted
+            raise kind("; ".join(["Interrupted", *_notes(stop)])) from None
         except (ValueError, ImportError, ArithmeticError) as error:
             raise _as_click(error) from None
 
@@ -44,21 +69,10 @@ def _as_click(error: Exception) -> Exception:
     """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
     from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 
+    text = "; ".join([str(error), *_notes(error)])
     if isinstance(error, BadInput | MissingEngine):
-        return _UserError(str(error))
-    return click.ClickException(str(error)) if isinstance(error, IntegrationFailed) else error
-
-
-def _names(group: str) -> Any:
-    """Return the completion of registered names of `group`; several are separated by commas."""
-
-    def complete(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-        from conservative.registry import registered
-
-        before, comma, last = incomplete.rpartition(",")
-        return [before + comma + name for name in registered(f"conservative.{group}") if name.startswith(last)]
-
-    return complete
+        return _UserError(text)
+    return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 
 
 @click.group(
@@ -74,7 +88,7 @@ def _names(group: str) -> Any:
 def main() -> None:
     """Integrate the rotation of rigid bodies so that energy and momentum stay, and measure that beside other engines.
 
-    Completion of names: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)", or zsh_source, or fish_source.
+    Completion of names and files: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)", or zsh_source, or fish_source.
     """
 
 
@@ -94,31 +108,43 @@ def _listed(texts: tuple[str, ...]) -> list[str]:
     epilog=_epilog(
         "conservative report",
         "conservative report --quick --out quick_report",
-        "conservative report --scenes lagrange_top --methods reduced,mujoco:RK4,heyoka",
+        "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
+        "conservative report --resume                 go on after Ctrl-C, with the same options",
     ),
 )
-@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=_names("scenes"), help="[default: the paper's two]")
-@click.option("--methods", multiple=True, metavar="M,N", shell_complete=_names("methods"), help="[default: all registered]")
+@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completing.scenes, help="[default: the paper's two]")
+@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completing.methods, help="[default: all registered]")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option("--png", is_flag=True, help="Pictures as PNG, too.")
 @click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
+@click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
 @click.option(
     "--out", type=click.Path(path_type=Path), default="report", show_default=True, help="Folder, replaced as a whole."
 )
 def report(
-    scenes: tuple[str, ...], methods: tuple[str, ...], quick: bool, skip_missing: bool, png: bool, as_json: bool, out: Path
+    scenes: tuple[str, ...],
+    methods: tuple[str, ...],
+    quick: bool,
+    skip_missing: bool,
+    png: bool,
+    as_json: bool,
+    resume: bool,
+    out: Path,
 ) -> None:
     """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
 
-    The folder is there whole or not at all. A family's bare name, such as mujoco, stands for all its variants.
+    The folder is there whole or not at all; until then, what is finished is in a file beside it, OUT.partial.json.
+    A family's bare name, such as mujoco, stands for all its variants.
     """
-    from . import document, output
+    from . import document, output, partial
     from .progress import progress
 
     plan = document.plan(_listed(scenes), _listed(methods), quick, skip_missing, png)
+    if not resume and partial.path_for(out).exists():
+        click.echo(f"{partial.path_for(out)}: unfinished work that --resume goes on with; without it, to be replaced", err=True)
     with progress() as step:
-        measured = document.write(plan, out, step)
+        measured = document.write(plan, out, step, resume)
     click.echo((out / output.MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
     bad = document.failed(measured)
     if bad:
@@ -131,6 +157,7 @@ def report(
         "pytest --benchmark --gate                     run and compare; leaves the results where this command finds them",
         "conservative gate                             compare them again",
         'conservative gate --update "Fewer corrections"   accept them, with the reason',
+        "conservative gate --json | jq '.verdicts[].violations'",
     ),
 )
 @click.argument("results", nargs=-1, type=click.Path(path_type=Path))
@@ -139,16 +166,17 @@ def report(
 @click.option(
     "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."
 )
-def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: str | None) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Violations and notes, or the new entry of the history, as JSON.")
+def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: str | None, as_json: bool) -> None:
     """Compare RESULTS of `pytest --benchmark` with the baseline; by default those of the last run with --gate.
 
     Exits with 1 and a line for each violation, or with 2 where there is no baseline to compare with.
     """
     from . import gating
 
-    text, passed = gating.gate(results, baseline, times) if update is None else gating.update(results, baseline, update)
-    click.echo(text)
-    if not passed:
+    found = gating.gate(results, baseline, times) if update is None else gating.update(results, baseline, update)
+    click.echo(found.as_json() if as_json else found)
+    if not found.passed:
         raise click.exceptions.Exit(1)
 
 
@@ -160,10 +188,10 @@ def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: s
         "conservative recommend lagrange_top --json --out recommended | jq .cheapest",
     ),
 )
-@click.argument("scene", shell_complete=_names("scenes"))
+@click.argument("scene", shell_complete=completing.scenes)
 @click.option("--error", type=float, default=1e-6, show_default=True, help="Largest attitude error over the duration, rad.")
 @click.option("--duration", type=float, help="s.  [default: the scene's]")
-@click.option("--engine", multiple=True, metavar="A,B", shell_complete=_names("methods"), help="[default: all installed]")
+@click.option("--engine", multiple=True, metavar="A,B", shell_complete=completing.methods, help="[default: all installed]")
 @click.option(
     "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
 )
@@ -214,13 +242,20 @@ def list_command(as_json: bool) -> None:
 
 @main.command(
     short_help="Write a scene file to start from.",
-    epilog=_epilog("conservative new > my_body.toml", "conservative run my_body.toml"),
+    epilog=_epilog(
+        "conservative new > my_body.toml",
+        "conservative run my_body.toml",
+        "conservative new --json | jq '.choices.shape'",
+    ),
 )
-def new() -> None:
+@click.option("--json", "as_json", is_flag=True, help="Keys with their meanings, what else there is, and the text, as JSON.")
+def new(as_json: bool) -> None:
     """Print a scene file with every key explained; every command takes such a file where it takes the name of a scene."""
     from conservative.scene_file import template
 
-    click.echo(template(), nl=False)
+    from . import starting
+
+    click.echo(starting.as_json() if as_json else template(), nl=as_json)
 
 
 @main.command(
@@ -231,9 +266,9 @@ def new() -> None:
         "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
     ),
 )
-@click.argument("scene", shell_complete=_names("scenes"))
+@click.argument("scene", shell_complete=completing.scenes)
 @click.option(
-    "--method", "-m", default="reduced", show_default=True, shell_complete=_names("methods"), help="Name, with settings."
+    "--method", "-m", default="reduced", show_default=True, shell_complete=completing.methods, help="Name, with settings."
 )
 @click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")

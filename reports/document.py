@@ -4,134 +4,59 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from benchmarks import measurement, selection, studies
 from benchmarks.cases import MISSING, SKIPPED, UNSUPPORTED
-from benchmarks.measurement import Measurement
-from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import OK
 
-from . import choosing, drifts, figures, figures_of_paper, frontier, orders, output, page, paper, tables, verdict
+from . import choosing, drifts, figures, figures_of_paper, frontier, orders, output, page, paper, partial, tables, verdict
+from .measuring import Measured as Measured
+from .measuring import measure
+from .planning import Plan as Plan
+from .planning import plan as plan
 from .progress import Step
 from .provenance import Provenance, provenance
 
 SCHEMA = 1
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
-COSTS = {
-    "paper": 20.0,
-    "convergence": 15.0,
-    "speed": 15.0,
-    "work_precision": 35.0,
-    "stability": 15.0,
-    "hard_cases": 30.0,
-    drifts.STUDY: 10.0,
-    "pictures": 5.0,
-}
-"""How long each piece of work takes against the others, for the time left."""
 
-
-@dataclass(frozen=True)
-class Plan:
-    """What a report is made of.
-
-    Raises
-    ------
-    BadInput
-        A name or a setting is unknown.
-    MissingEngine
-        An engine is not installed, and `skip_missing` is False.
-    """
-
-    scenes: tuple[Scene, ...]
-    methods: tuple[Method, ...]
-    quick: bool = False
-    skip_missing: bool = False
-    png: bool = False
-    hard: bool = False
-
-    def __post_init__(self) -> None:
-        if not self.skip_missing:
-            for method in self.methods:
-                _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
-
-    @property
-    def studies(self) -> tuple[studies.Study, ...]:
-        """What is measured, in this order; the hard cases only where nobody asked for less."""
-        crossed = studies.studies(self.scenes, self.methods, self.quick, self.skip_missing)
-        return (*crossed, *studies.hard(self.methods, self.skip_missing)) if self.hard else crossed
-
-    def share(self, name: str) -> float:
-        """Return which part of the time a piece of work takes."""
-        return COSTS[name] / sum(COSTS[piece] for piece in (*(s.name for s in self.studies), drifts.STUDY, "pictures"))
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What was measured: the tidy table, and drifts over time (see `drifts.samples`)."""
-
-    table: pd.DataFrame
-    drifts: pd.DataFrame
-
-
-def plan(scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False) -> Plan:
-    """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
-    chosen = selection.scenes(scenes) if scenes else selection.scenes()
-    return Plan(chosen, selection.methods(methods or None), quick, skip_missing, png, hard=not (scenes or quick))
-
-
-def write(made: Plan, out: Path, step: Step) -> Measured:
+def write(made: Plan, out: Path, step: Step, resume: bool = False) -> Measured:
     """Measure and write the report into the folder `out`; return what was measured.
 
+    Where that is interrupted, or ends in an error, the finished studies are kept (`partial`), and the exception has a note that
+    says so; with `resume` they are not measured again.
+
     Raises
     ------
     BadInput
-        The folder cannot be written; found before any work.
+        The folder cannot be written, or there is nothing that can be resumed; found before any work.
     """
+    kept = partial.begun(made, out, provenance(), resume)
+    showing = made.spans(name for name in made.pieces if name not in kept.pieces)
     with output.report_folder(out) as folder:
-        measured = measure(made, step)
-        step(1 - made.share("pictures"), "pictures")
-        write_files(made, measured, folder, provenance())
+        try:
+            measured = measure(made, step, kept)
+            source = replace(provenance(), resumed=kept.earlier)
+            write_files(made, measured, folder, source, lambda what: step(showing[what][0], what))
+        except BaseException as error:
+            error.add_note(kept.story)
+            raise
+    kept.remove()
     return measured
 
 
-def measure(made: Plan, step: Step) -> Measured:
-    """Return all rows: the studies, then long runs for the drift over time."""
-    rows: list[Measurement] = []
-    start = 0.0
-    for study in made.studies:
-        rows += studies.rows(study, _within(made, step, study.name, start))
-        start += made.share(study.name)
-    pictures = []
-    for found, picture in _long_runs(made, _within(made, step, drifts.STUDY, start)):
-        rows += found
-        pictures.append(picture)
-    return Measured(measurement.frame(rows), pd.concat(pictures, ignore_index=True))
-
-
-def _within(made: Plan, step: Step, name: str, start: float) -> Callable[[int, int, str], None]:
-    """Return a study's progress as a share of the whole."""
-    share = made.share(name)
-    return lambda done, total, what: step(start + share * done / total, f"{name.replace('_', ' ')}: {what}")
-
-
-def _long_runs(made: Plan, progress: Callable[[int, int, str], None]) -> Iterator[tuple[list[Measurement], pd.DataFrame]]:
-    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.room != "truth"]
-    for k, (scene, method) in enumerate(pairs):
-        progress(k, len(pairs), f"{scene.name}: {method.name}")
-        yield drifts.measured(drifts.case_for(scene, method), made.skip_missing)
-
-
-def write_files(made: Plan, measured: Measured, folder: Path, source: Provenance) -> None:
-    """Write pictures, tables, CSV, and last the JSON that lists them."""
+def write_files(made: Plan, measured: Measured, folder: Path, source: Provenance, begin: Callable[[str], None]) -> None:
+    """Write pictures, tables, page, CSV, and last the JSON that lists them; `begin` is told which of `SHOWING` comes next."""
+    begin("pictures")
     text = render(made, measured, source, lambda name, chart: draw(chart, folder / name, made.png))
     (folder / "report.md").write_text(text, encoding="utf-8")
+    begin("page")
     (folder / "index.html").write_text(page.render(made, measured, source), encoding="utf-8")
     measured.table.to_csv(folder / "measurements.csv", index=False)
     files = sorted({path.name for path in folder.iterdir()} | {output.MANIFEST})

@@ -2,16 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from benchmarks import baseline, results
 from benchmarks import gate as comparison
 
 
-def gate(paths: Sequence[Path], kept: Path | None, times: str) -> tuple[str, bool]:
-    """Return the verdicts on each file of results as text, and whether all passed.
+@dataclass(frozen=True)
+class Compared:
+    """The verdict on each file of results."""
+
+    verdicts: Sequence[comparison.Verdict]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the gate is passed by all."""
+        return all(verdict.passed for verdict in self.verdicts)
+
+    def as_json(self) -> str:
+        """Return verdicts with their violations and notes as JSON."""
+        verdicts = [{"passed": verdict.passed, **asdict(verdict)} for verdict in self.verdicts]
+        return json.dumps({"passed": self.passed, "verdicts": verdicts}, indent=2, ensure_ascii=False)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.verdicts))
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """The baseline that was written, how many rows it has, and the new entry of its history."""
+
+    path: Path
+    rows: int
+    entry: Mapping[str, Any]
+    passed: bool = True
+
+    def as_json(self) -> str:
+        """Return it as JSON."""
+        content = {"passed": self.passed, "baseline": str(self.path), "rows": self.rows, "entry": dict(self.entry)}
+        return json.dumps(content, indent=2, ensure_ascii=False)
+
+    def __str__(self) -> str:
+        changes = [f"{len(self.entry[kind])} {kind}" for kind in ("added", "changed", "removed")]
+        return f"{self.path}: {self.rows} rows from {self.entry['runs']} runs; {', '.join(changes)}"
+
+
+def gate(paths: Sequence[Path], kept: Path | None, times: str) -> Compared:
+    """Return the verdicts on each file of results.
 
     Raises
     ------
@@ -19,11 +60,10 @@ def gate(paths: Sequence[Path], kept: Path | None, times: str) -> tuple[str, boo
         A file holds no results, or there is no baseline.
     """
     before = baseline.read(kept or baseline.PATH)
-    verdicts = [comparison.judged(before, found, cast(comparison.Times, times)) for found in _read(paths)]
-    return "\n".join(map(str, verdicts)), all(verdict.passed for verdict in verdicts)
+    return Compared([comparison.judged(before, found, cast(comparison.Times, times)) for found in _read(paths)])
 
 
-def update(paths: Sequence[Path], kept: Path | None, reason: str) -> tuple[str, bool]:
+def update(paths: Sequence[Path], kept: Path | None, reason: str) -> Accepted:
     """Write the baseline that accepts results, and return what changed.
 
     Raises
@@ -35,9 +75,7 @@ def update(paths: Sequence[Path], kept: Path | None, reason: str) -> tuple[str, 
     before = baseline.read(path) if path.exists() else None
     after = baseline.updated(before, _read(paths), reason)
     baseline.write(after, path)
-    entry = after.history[-1]
-    changes = [f"{len(entry[kind])} {kind}" for kind in ("added", "changed", "removed")]
-    return f"{path}: {len(after.rows)} rows from {entry['runs']} runs; {', '.join(changes)}", True
+    return Accepted(path, len(after.rows), after.history[-1])
 
 
 def _read(paths: Sequence[Path]) -> list[results.Results]:

@@ -16,6 +16,8 @@ from typing import IO, Any
 
 from conservative.errors import BadInput
 
+from .interrupts import unstoppable
+
 MANIFEST = "measurements.json"
 """The file of a report that lists the others under `files`, and by which a folder is known to be one."""
 
@@ -40,7 +42,8 @@ def report_folder(target: Path) -> Iterator[Path]:
         fresh = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
     try:
         yield fresh
-        _swap(fresh, target, foreign)
+        with unstoppable():
+            _swap(fresh, target, foreign)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
 
@@ -93,15 +96,16 @@ def _manifest(path: Path) -> list[str] | None:
 
 
 def _swap(fresh: Path, target: Path, foreign: list[str]) -> None:
+    """Put one folder in the place of another. Nothing is deleted before all that must stay is where it belongs."""
     _open_to_all(fresh, 0o777)
     if not target.exists():
         fresh.rename(target)
         return
-    for name in foreign:
-        (target / name).rename(fresh / name)
     old = target.with_name(f"{fresh.name}-old")
     target.rename(old)
     fresh.rename(target)
+    for name in foreign:
+        (old / name).rename(target / name)
     shutil.rmtree(old)
 
 

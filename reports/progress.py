@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar with the time left on a terminal, one plain line a step elsewhere."""
+"""Progress on stderr: a bar with the time left on a terminal, nothing elsewhere."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Step = Callable[[float, str], None]
 def progress() -> Iterator[Step]:
     """Yield the function to call before each step."""
     if not sys.stderr.isatty():
-        yield _line
+        yield lambda share, what: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -30,7 +30,3 @@ def progress() -> Iterator[Step]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda share, what: bar.update(task, completed=share, description=what)
-
-
-def _line(share: float, what: str) -> None:
-    print(f"[{share:4.0%}] {what}", file=sys.stderr, flush=True)

@@ -18,7 +18,10 @@ COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy"
 
 @dataclass(frozen=True)
 class Provenance:
-    """What it takes to make a report again."""
+    """What it takes to make a report again.
+
+    `resumed` says what earlier processes measured, one sentence each, where this one did not measure everything.
+    """
 
     command: str
     machine: dict[str, str]
@@ -26,6 +29,7 @@ class Provenance:
     packages: dict[str, str]
     commit: str
     date: str
+    resumed: tuple[str, ...] = ()
 
     @property
     def compared(self) -> dict[str, str]:

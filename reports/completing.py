@@ -1,0 +1,49 @@
+"""Tab completion of what stands on the command line: registered names, and scene files beside the names of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+from click.shell_completion import CompletionItem
+
+Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+
+
+def methods(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the registered methods that the last of several, separated by commas, may become."""
+    before, last = _last(incomplete)
+    return [CompletionItem(before + name) for name in _registered("methods", last)]
+
+
+def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the registered scenes, scene files, and folders on the way to one, that the last of several may become."""
+    before, last = _last(incomplete)
+    found = [*_registered("scenes", last), *_files(last)]
+    if not before and (not found or found == [f"{found[0].rstrip('/')}/"]):
+        return [CompletionItem(incomplete, type="file")]  # the shell knows ~ and puts no space after the only folder
+    return [CompletionItem(before + name) for name in found]
+
+
+def _last(incomplete: str) -> tuple[str, str]:
+    before, comma, last = incomplete.rpartition(",")
+    return before + comma, last
+
+
+def _registered(group: str, start: str) -> list[str]:
+    from conservative.registry import registered
+
+    return [name for name in registered(f"conservative.{group}") if name.startswith(start)]
+
+
+def _files(start: str) -> list[str]:
+    """Return what begins with `start`: files that end in .toml, and folders, with a slash; hidden ones only where asked for."""
+    folder, slash, name = start.rpartition("/")
+    try:
+        entries = sorted(Path(folder + slash).iterdir())
+    except OSError:
+        return []
+    shown = [path for path in entries if path.name.startswith(name) and (name or not path.name.startswith("."))]
+    endings = ((path, "/" if path.is_dir() else "") for path in shown)
+    return [f"{folder}{slash}{path.name}{end}" for path, end in endings if end or path.suffix == ".toml"]

@@ -1,0 +1,248 @@
+"""A report that is interrupted keeps what is finished, and --resume goes on with it: tried with real signals."""
+
+import json
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.measurement import Measurement
+from conservative import BadInput
+from reports import document, partial
+from reports.cli import main
+from reports.interrupts import Terminated, terminable, unstoppable
+from reports.provenance import provenance
+
+SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
+TIMES = ("s", "s/s")
+
+
+def started(arguments, folder):
+    code = [sys.executable, "-c", "from reports.cli import main; main()"]
+    return subprocess.Popen([*code, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def stopped(arguments, folder, number, ready):
+    """Start a command, send it a signal once `ready`, and return its exit code, stdout and stderr."""
+    process = started(arguments, folder)
+    deadline = time.monotonic() + 120
+    while not ready() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def pieces(path):
+    return list(json.loads(path.read_text())["pieces"]) if path.exists() else []
+
+
+def an_earlier_report(folder):
+    folder.mkdir()
+    (folder / "measurements.json").write_text(json.dumps({"files": ["report.md", "measurements.json"]}))
+    (folder / "report.md").write_text("earlier")
+    (folder / "mine.txt").write_text("mine")
+
+
+@pytest.fixture(scope="module")
+def resumed(tmp_path_factory):
+    """The folder of a report that was interrupted and resumed, and what was said on the way."""
+    folder = tmp_path_factory.mktemp("resumed")
+    an_earlier_report(folder / "report")
+    kept = folder / "report.partial.json"
+    code, out, err = stopped(SMALL, folder, signal.SIGINT, lambda: "speed" in pieces(kept))
+    left = {path.name for path in folder.iterdir()}
+    earlier = {path.name: path.read_text() for path in (folder / "report").iterdir()}
+    content = json.loads(kept.read_text())
+    again = shlex.split(err.partition("go on with: ")[2])
+    done = started(again[1:], folder)
+    said = done.communicate(timeout=120)
+    return folder, (code, out, err), left, earlier, content, again, (done.returncode, *said)
+
+
+def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
+    _, (code, out, err), left, earlier, content, again, _ = resumed
+    assert code == 130
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("Interrupted; ")
+    assert f"{len(content['pieces'])} of 5 studies are finished (paper, convergence, speed" in err
+    assert again == ["conservative", *SMALL, "--resume"]
+    assert left == {"report", "report.partial.json"}
+    assert earlier["report.md"] == "earlier"
+    assert len(earlier) == 3
+
+
+def test_resume_does_the_rest_and_tidies_up(resumed):
+    folder, *_, (code, out, err) = resumed
+    assert (code, out, err) == (0, "report/report.md\n", "")
+    assert {path.name for path in folder.iterdir()} == {"report"}
+    listed = json.loads((folder / "report" / "measurements.json").read_text())["files"]
+    assert {path.name for path in (folder / "report").iterdir()} == {*listed, "mine.txt"}
+    assert (folder / "report" / "mine.txt").read_text() == "mine"
+
+
+def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(resumed, tmp_path):
+    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    kept = partial.begun(made, tmp_path / "report", provenance(SMALL), resume=False)
+    document.measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
+    found, whole = (pd.read_csv(path) for path in (resumed[0] / "report" / "measurements.csv", tmp_path / "whole.csv"))
+    assert len(found) > 100
+    timed = found["unit"].isin(TIMES)
+    assert timed.any()
+    pd.testing.assert_frame_equal(found[~timed], whole[~timed], check_exact=True)
+    same = ["study", "scene", "method", "label", "room", "dt", "measure", "unit", "status"]
+    pd.testing.assert_frame_equal(found.loc[timed, same], whole.loc[timed, same], check_exact=True)
+
+
+def test_what_was_finished_is_not_measured_again(resumed):
+    folder, content = resumed[0], resumed[4]
+    rows = json.loads((folder / "report" / "measurements.json").read_text())["rows"]
+    kept = [tuple(row) for row in content["pieces"]["speed"]["rows"]]
+    assert [tuple(row.values())[:7] for row in rows if row["study"] == "speed"] == [row[:7] for row in kept]
+    times = [row["value"] for row in rows if row["study"] == "speed"]
+    assert times == pytest.approx([row[7] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
+
+
+def test_a_resumed_report_says_so(resumed):
+    folder, content = resumed[0], resumed[4]
+    by = content["pieces"]["paper"]["by"]
+    made = json.loads((folder / "report" / "measurements.json").read_text())
+    assert len(made["resumed"]) == 1
+    assert made["resumed"][0].startswith(f"{', '.join(content['pieces'])}: measured by an earlier process")
+    assert by["begun"] in made["resumed"][0]
+    assert made["command"].endswith("--resume")
+    for name in ("report.md", "index.html"):
+        text = (folder / "report" / name).read_text()
+        assert "interrupted and resumed" in text
+        assert by["begun"] in text
+
+
+def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
+    def at_work():
+        return any(path.name.startswith(".report-") for path in tmp_path.iterdir())
+
+    code, out, err = stopped(SMALL, tmp_path, signal.SIGTERM, at_work)
+    assert (code, out, err) == (143, "", "Interrupted; nothing was finished, nothing is kept\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def unfinished(tmp_path, monkeypatch):
+    """A folder with the file of a report that has finished one study."""
+    monkeypatch.chdir(tmp_path)
+    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    source = provenance(SMALL)
+    kept = partial.begun(made, Path("report"), source, resume=False)
+    row = ("paper", "brick_flip", "reduced", "reduced", "ours", 0.1, "energy drift max", float("nan"), "1", "ok")
+    kept.keep("paper", [Measurement(*row)], [["brick_flip", 0.1 + 0.2]])
+    return tmp_path
+
+
+def test_floats_come_back_as_they_are(unfinished):
+    _, found = partial.read(unfinished / "report.partial.json")
+    assert found["paper"].rows[0].dt == 0.1
+    assert found["paper"].rows[0].value != found["paper"].rows[0].value
+    assert found["paper"].samples == (("brick_flip", 0.1 + 0.2),)
+
+
+@pytest.mark.parametrize(
+    ("changed", "parts"),
+    [
+        (SMALL[:1] + SMALL[2:], ["--quick True, now False"]),
+        ([*SMALL[:3], "turned_brick", *SMALL[4:]], ["scenes: brick_flip (now without)", "turned_brick missing (now with)"]),
+        ([*SMALL[:5], "reduced:order=4"], ["methods: moser_veselov:order=2 (now without)"]),
+        ([*SMALL, "--skip-missing"], ["--skip-missing False, now True"]),
+        ([*SMALL[:3], "brick_flip:disturbance=1e-6", *SMALL[4:]], ["scenes: brick_flip"]),
+    ],
+)
+def test_what_differs_cannot_be_put_together(changed, parts, unfinished):
+    done = CliRunner().invoke(main, [*changed, "--resume"])
+    assert done.exit_code == 2
+    assert done.stderr.count("\n") == 1
+    for part in [*parts, "resume: got 'report.partial.json'", f"it was `conservative {' '.join(SMALL)}`", "no --resume"]:
+        assert part in done.stderr
+    assert [path.name for path in unfinished.iterdir()] == ["report.partial.json"]
+
+
+@pytest.mark.parametrize(("key", "part"), [("source", "source abc, now"), ("versions", "versions: numpy 1.0, now 2")])
+def test_neither_can_other_versions_or_source(key, part, unfinished):
+    path = unfinished / "report.partial.json"
+    content = json.loads(path.read_text())
+    content["terms"][key] = "abc" if key == "source" else {**content["terms"][key], "numpy": "1.0"}
+    path.write_text(json.dumps(content))
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert done.exit_code == 2
+    assert part in done.stderr
+
+
+def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert done.exit_code == 2
+    assert done.stderr.startswith("Error: resume: got no 'report.partial.json'; allowed: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 1, "pieces": {"paper": {}}}'])
+@pytest.mark.parametrize("resume", [[], ["--resume"]])
+def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "report.partial.json").write_text(content)
+    done = CliRunner().invoke(main, [*SMALL, *resume])
+    assert done.exit_code == 2
+    assert "out: got 'report.partial.json'" in done.stderr
+    assert (tmp_path / "report.partial.json").read_text() == content
+
+
+def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finished(unfinished):
+    before = (unfinished / "report.partial.json").read_text()
+
+    def stop(share, what):
+        raise KeyboardInterrupt
+
+    made = document.plan(["brick_flip"], ["reduced:order=4"], quick=True)
+    with pytest.raises(KeyboardInterrupt):
+        document.write(made, unfinished / "report", stop)
+    assert (unfinished / "report.partial.json").read_text() == before
+
+
+def test_an_error_keeps_what_is_finished_too(tmp_path):
+    def fail(share, what):
+        if what.startswith("convergence"):
+            raise BadInput("dt", "0", "above 0")
+
+    made = document.plan(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+    with pytest.raises(BadInput) as caught:
+        document.write(made, tmp_path / "report", fail)
+    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
+    assert pieces(tmp_path / "report.partial.json") == ["paper"]
+
+
+@pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt, 130), (Terminated, 143)])
+def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
+    def stopping(*arguments):
+        raise stop
+
+    monkeypatch.setattr("reports.recommend.run", stopping)
+    done = CliRunner().invoke(main, ["recommend", "brick_flip"])
+    assert (done.exit_code, done.stdout, done.stderr) == (code, "", "Interrupted\n")
+
+
+def test_sigterm_is_an_interrupt_only_inside():
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(Terminated), terminable():
+        signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_interrupts_wait_outside_of_what_belongs_together():
+    with unstoppable():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
