@@ -54,7 +54,8 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     """
     rows = table[(table["study"] == "work_precision") & (table["status"] == "ok") & table["measure"].isin([ERROR, TIME])]
     keys = ["scene", "detail", "method", "label", "room", "dt"]
-    wide = rows.pivot_table(index=keys, columns="measure", values="value", sort=False).reset_index()
+    wide = rows.pivot_table(index=keys, columns="measure", values="value").reset_index()
+    wide = rows[keys].drop_duplicates().merge(wide, how="left", on=keys)  # pivot_table orders rows by the values of the keys
     wide = wide.reindex(columns=[*keys, ERROR, TIME]).rename(columns={ERROR: "error", TIME: "time"})
     return wide.dropna(subset=["error", "time"]).assign(series=_line_names).drop(columns="detail").reset_index(drop=True)
 

@@ -25,6 +25,16 @@ def test_between_points_the_cost_is_log_log():
     assert found.ratio == pytest.approx(1.0, rel=1e-14)
 
 
+def test_lines_stay_coarse_to_fine_where_they_share_steps():
+    first = [point("first", "ours", dt, 1 / dt, dt=dt) for dt in (2.0, 1.0)]
+    second = [point("second", "engine", dt, 1 / dt, dt=dt) for dt in (3.0, 2.0, 1.5, 1.0)]
+    found = frontier.points(table(*first, *second))
+    assert found[["series", "dt"]].to_numpy().tolist() == [
+        *(["first", 2.0], ["first", 1.0]),
+        *(["second", 3.0], ["second", 2.0], ["second", 1.5], ["second", 1.0]),
+    ]
+
+
 def test_a_more_accurate_point_counts_for_a_larger_error():
     assert contest(1e-1, *OURS, *ENGINE).theirs.time == 2.0
 
