@@ -1,8 +1,8 @@
 """Conservative integration of rigid-body rotation, and the words that every method here shares.
 
-    import conservative as cv
+import conservative as cv
 
-    trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
+trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 """
 
 from . import scenes, shapes
