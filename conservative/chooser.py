@@ -23,6 +23,7 @@ from .errors import AccuracyNotReached, IntegrationFailed, Unsupported
 from .lame import Lame
 from .method import Grid, Method
 from .moser_veselov import MoserVeselov
+from .projected import Projected
 from .reduced import Reduced
 from .scene import Scene
 from .trajectory import Trajectory
@@ -71,10 +72,10 @@ def candidates(scene: Scene) -> tuple[Method, ...]:
     for method in (MoserVeselov(), Lame()):  # no truncation error
         if method.unsupported(scene) is None:
             return (method,)
-    collocations = tuple(Gauss(stages) for stages in (2, 3, 4, 6, 8))
+    collocations = tuple(Gauss(stages) for stages in (2, 4, 6, 8))
     if collocations[0].unsupported(scene) is None:
-        return collocations
-    return tuple(Reduced(order=order) for order in (2, 4, 6, 8))
+        return Projected(), *collocations
+    return Projected(), *(Reduced(order=order) for order in (2, 4, 6, 8))
 
 
 def chosen(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
@@ -181,6 +182,13 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
 
 
 def _work(method: Method, trajectory: Trajectory) -> float:
-    """Return a count of work: corrections of all stages, plus what a step costs besides."""
-    counters = trajectory.counters
-    return (counters.iterations or 0) * (method.stages if isinstance(method, Gauss) else 1) + 4.0 * counters.steps
+    """Return a count of work: corrections and steps, weighted by what they cost beside those of the other candidates."""
+    correction, step = _costs(method)
+    return correction * (trajectory.counters.iterations or 0) + step * trajectory.counters.steps
+
+
+def _costs(method: Method) -> tuple[float, float]:
+    """Return what a correction and what a step costs besides: ratios are what matters, and ns is their unit here."""
+    if isinstance(method, Gauss):
+        return 12.0 * method.stages, 50.0
+    return (80.0, 340.0) if isinstance(method, Projected) else (50.0, 10.0)

@@ -28,7 +28,8 @@ class Projected(Method):
     whatever a step loses of them is put back (Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.4): they are
     imposed, where the other methods here inherit them. It is neither symmetric in time nor symplectic, and needs steps well
     below the fastest turn; but no equations are solved, so that a step costs twelve evaluations of the torque and little more.
-    Near a steady precession, where energy and momentum depend on each other, what is left of them is of the square of the error.
+    Near a steady precession, where energy and momentum depend on each other, what a step loses of them is put back to the
+    square of its error only.
 
     Free bodies have `MoserVeselov`, which has no truncation error at all.
     """
@@ -56,9 +57,7 @@ class Projected(Method):
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, corrections, defect = march(
-                coefficients, grid.dt, grid.n_steps, grid.every, *model, start.q, start.L, q, L
-            )
+            done, corrections, defect = march(coefficients, grid.dt, grid.n_steps, grid.every, *model, start.q, start.L, q, L)
             failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, defect, TOO_LONG)
             work = Counters(steps=done, stages=done * stages, iterations=corrections, evaluations=done * stages)
             return start.trajectory(self.label, grid, done, q, L, work, failure)
@@ -75,5 +74,5 @@ def field_axis(scene: Scene) -> Any:
 
 @lru_cache(maxsize=256)
 def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what that energy can turn into."""
+    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
     return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))

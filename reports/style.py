@@ -15,7 +15,7 @@ import altair as alt
 
 from .naming import family
 
-BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE = (
+BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, TEAL = (
     "#0072B2",
     "#56B4E9",
     "#009E73",
@@ -27,6 +27,7 @@ BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE = 
     "#332288",
     "#882255",
     "#999933",
+    "#44AA99",
 )
 
 FAMILY_COLOURS = {
@@ -35,6 +36,7 @@ FAMILY_COLOURS = {
     "gauss": INDIGO,
     "moser_veselov": WINE,
     "lame": OLIVE,
+    "projected": TEAL,
     "heyoka": GREEN,
     "mujoco": VERMILION,
     "scipy": ORANGE,
@@ -42,7 +44,7 @@ FAMILY_COLOURS = {
     "exact": BLACK,
     "precise": GREY,
 }
-_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#44AA99", "#88CCEE")
+_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
 """For families registered by other packages, in the order of their names (Tol's muted scheme)."""
 
 SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-left", "triangle-right")

@@ -4,10 +4,10 @@ The state is the attitude as a quaternion q and the momentum L, principal axes: 
 
     q' = q (0, w) / 2        L' = L x w + T
 
-Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is restored, and
-then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
+Coefficients that are zero are left out, and those of the stages are multiplied by h beforehand. After the step |q| = 1 is
+restored, and then energy and momentum about the field's axis are brought back to their values at the start (Hairer, Lubich &
 Wanner, IV.4): by Newton's method along their gradients with respect to L and to a turn of the body, so that the state moves
-least. An invariant that is met to round-off is left alone; nothing can accumulate.
+least. An invariant that is met to round-off is left alone, and nothing can accumulate.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from .vector import add, cross, dot, product, scaled, times
 MOST_CORRECTIONS = 8
 ROUND_OFF = 2.0**-51
 """Defect, relative to its scale, that counts as none."""
-HOPELESS = 1e-6
-"""Defect that a projection may leave; above it the step was so long that its end is not near the invariants."""
-DEPENDENT = 1e-8
-"""Regularisation, relative: in a steady precession the gradients of energy and momentum are parallel."""
+FAR, LEFT = 0.1, 1e-6
+"""Defects, relative: what a step may lose, for its end not to be far from the invariants, and what a projection may leave."""
+DEPENDENT, TINY = 1e-8, 1e-300
+"""Added, relatively, since gradients of energy and momentum are parallel in a steady precession, and to what may be 0."""
 
 
 @small
@@ -52,7 +52,7 @@ def rates(J_inverse, field, q, L, slopes, at):
 
 @small
 def combined(q, L, weights, columns, first, last, slopes):
-    """(q, L) + sum of weights[i] times the slopes of stage columns[i], i from first to last - 1; the newest slopes come last."""
+    """(q, L) + sum of weights[i] times the slopes of stage columns[i], first <= i < last; the newest slopes come last."""
     for i in range(first, last):
         weight, at = spread(weights, i), 2 * LANES * columns[i]
         q = fused(weight, four(slopes, at), q)
@@ -90,37 +90,43 @@ def values(J_inverse, field, axis, q, L):
 
 
 @small
-def projected(J_inverse, field, axis, kept, scales, q, L):
-    """Return (q, L, corrections, defect) of a state brought back to the energy and momentum `kept`.
+def shortest_move(J_inverse, field, axis, size, e, m, q, L):
+    """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order.
 
-    Gradients are with respect to (L / `scales[1]`, turn of the body): (size w, -T) and (size axis, L x axis).
+    Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are scaled to length one here,
+    and a little is added to that length, so that parallel gradients share what is to be done.
     """
+    w, T = times(J_inverse, L), body_torque(field, q)
+    by_energy = 1.0 / math.sqrt(size * size * dot(w, w) + dot(T, T) + TINY)
+    if axis is None:
+        a = e * by_energy * by_energy
+        return scaled(a * size * size, w), scaled(-a, T)
+    v = in_body(q, axis)
+    turn = cross(L, v)
+    by_momentum = 1.0 / math.sqrt(size * size + dot(turn, turn))
+    cosine = (size * size * dot(w, v) - dot(T, turn)) * by_energy * by_momentum
+    one = 1.0 + DEPENDENT
+    over = 1.0 / (one * one - cosine * cosine)
+    a = over * by_energy * (one * (e * by_energy) - cosine * (m * by_momentum))
+    b = over * by_momentum * (one * (m * by_momentum) - cosine * (e * by_energy))
+    return scaled(size * size, add(scaled(a, w), scaled(b, v))), add(scaled(-a, T), scaled(b, turn))
+
+
+@small
+def projected(J_inverse, field, axis, kept, scales, q, L):
+    """Return (q, L, corrections, relative defect left) of a state brought back to the energy and momentum `kept`."""
     q = near_unit(q)
-    size = scales[1]
-    for correction in range(MOST_CORRECTIONS):
+    corrections = 0
+    while True:
         now = values(J_inverse, field, axis, q, L)
         e, m = kept[0] - now[0], kept[1] - now[1]
-        defect = max(abs(e) / scales[0], abs(m) / size)
-        if not defect > ROUND_OFF:
-            break
-        w, T = times(J_inverse, L), body_torque(field, q)
-        by_energy = 1.0 / (size * size * dot(w, w) + dot(T, T))
-        if axis is None:
-            a, b, v, turn = e * by_energy, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        else:
-            v = in_body(q, axis)
-            turn = cross(L, v)
-            # Both gradients scaled to size one, and c their cosine.
-            by_momentum = 1.0 / (size * size + dot(turn, turn))
-            product_ = size * size * dot(w, v) - dot(T, turn)
-            c2 = product_ * product_ * by_energy * by_momentum
-            over = 1.0 / ((1.0 + DEPENDENT) * (1.0 + DEPENDENT) - c2)
-            a = over * by_energy * ((1.0 + DEPENDENT) * e - product_ * by_momentum * m)
-            b = over * by_momentum * ((1.0 + DEPENDENT) * m - product_ * by_energy * e)
-        L = add(L, scaled(size * size, add(scaled(a, w), scaled(b, v))))
-        half = scaled(0.5, add(scaled(-a, T), scaled(b, turn)))
-        q = near_unit(product(q, (1.0, half[0], half[1], half[2])))
-    return q, L, correction, defect
+        defect = max(abs(e) / scales[0], abs(m) / scales[1])
+        if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
+            return q, L, corrections, defect
+        corrections += 1
+        dL, turn = shortest_move(J_inverse, field, axis, scales[1], e, m, q, L)
+        L = add(L, dL)
+        q = near_unit(product(q, (1.0, 0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])))
 
 
 @kernel
@@ -142,7 +148,7 @@ def march(coefficients, h, n_steps, every, J_inverse, field, axis, scales, q, L,
         q, L = stepped(h, J_inverse, field, weights, columns, starts, q, L, slopes)
         q, L, more, defect = projected(J_inverse, field, axis, kept, scales, q, L)
         corrections += more
-        if not defect < HOPELESS:
+        if not defect < LEFT:
             return step - 1, corrections, defect
         until_sample -= 1
         if until_sample == 0 or step == n_steps:
