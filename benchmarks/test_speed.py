@@ -1,5 +1,6 @@
 """Wall time of every method on every scene, in its own loop, with accuracy in `extra_info`; and the ratios that we claim."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -12,7 +13,8 @@ from benchmarks.plugin import REPEAT
 from benchmarks.points import Point
 from benchmarks.timing import interleaved, prepared
 from benchmarks.yardstick import elsewhere, time_ratio
-from conservative.method import Method, grid_for
+from conservative.compiled import kernels
+from conservative.method import Method, grid_for, integrate
 from conservative.registry import method as named
 from conservative.registry import scene as registered
 from conservative.scene import Scene
@@ -20,6 +22,9 @@ from conservative.scene import Scene
 POINTS = [pytest.param(point, id=point.id) for point in points.points()]
 GOALS = {"mujoco:Euler": 25, "mujoco:RK4": 100, "convected": 100}
 """How many times cheaper than these a step of `reduced` is meant to be on the brick."""
+KERNELS = {"reduced": "march", "gauss": "gauss", "moser_veselov": "moser_veselov", "lame": "lame", "projected": "projected"}
+"""Modules in `conservative.kernels` by the families that they take the steps of."""
+FEW_STEPS, OVERHEAD_GOAL = 5, 20
 
 
 @pytest.mark.parametrize("point", POINTS)
@@ -55,6 +60,42 @@ def test_step_ratios(benchmark: Any) -> None:
         benchmark.extra_info[f"{label} / reduced (goal {goal})"] = per_step[name] / per_step["reduced"]
     benchmark.extra_info["reduced, s a step"] = per_step["reduced"]
     benchmark(ready["reduced"][1].run)
+
+
+def test_call_overhead(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a call of `integrate` costs beside its kernel, us, a few steps with a sample of each; nothing is asserted."""
+    runs: dict[str, Callable[[], Any]] = {}
+    for method in compiled():
+        scene = next(scene for scene in map(registered, points.PAPER) if not method.unsupported(scene))
+        call = partial(integrate, scene, scene.dt, method, FEW_STEPS * scene.dt)
+        runs[method.name] = call
+        runs[f"kernel of {method.name}"] = kernel_alone(call, method, monkeypatch)
+    timings = interleaved(runs, rounds=15, min_time=0.002)
+    benchmark.group = "calls"
+    for method in compiled():
+        over = timings[method.name].minimum - timings[f"kernel of {method.name}"].minimum
+        benchmark.extra_info[f"{method.name}, us (goal {OVERHEAD_GOAL})"] = 1e6 * over
+    benchmark(runs["reduced"])
+
+
+def compiled() -> list[Method]:
+    """Return the settings of those families of ours whose steps are one call of a kernel."""
+    return [method for family in KERNELS for method in type(named(family)).variants()]
+
+
+def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.MonkeyPatch) -> Callable[[], Any]:
+    """Return the kernel with what `call` hands to it."""
+    module = kernels(KERNELS[method.family])
+    march, handed = module.march, []
+
+    def recorded(*arguments: Any) -> Any:
+        handed.append(arguments)
+        return march(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "march", recorded)
+        call()
+    return partial(march, *handed[0])
 
 
 def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:

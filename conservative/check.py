@@ -1,4 +1,4 @@
-"""Checks of arguments, made before any work."""
+"""Checks of arguments, made before any work. `value` may have any unit; `allowed` is what the message says of it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from .errors import BadInput
 
 
 def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...], ...], allowed: str) -> Array:
-    """Return `value` as a new float array of one of `shapes`, all finite; `BadInput` otherwise."""
+    """Return `value` as a new array of one of `shapes`, such as (3,) or (3, 3), of finite numbers in any unit.
+
+    Raises
+    ------
+    BadInput
+        It is none.
+    """
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -26,14 +32,16 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
 
 
 def finite_number(argument: str, value: object, allowed: str) -> float:
-    """Return `value` as a finite float; `BadInput` otherwise."""
+    """Return `value`, of any unit, as a finite float. Raise `BadInput` otherwise."""
+    if type(value) is float and math.isfinite(value):  # nearly always, and twenty times as fast as asking for a `Real`
+        return value
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise BadInput(argument, repr(value), allowed)
     return float(value)
 
 
 def positive_number(argument: str, value: object, allowed: str = "a finite number above 0") -> float:
-    """Return `value` as a float that is finite and above 0; `BadInput` otherwise."""
+    """Return `value`, of any unit, as a float that is finite and above 0. Raise `BadInput` otherwise."""
     number = finite_number(argument, value, allowed)
     if number <= 0:
         raise BadInput(argument, repr(value), allowed)
@@ -41,14 +49,16 @@ def positive_number(argument: str, value: object, allowed: str = "a finite numbe
 
 
 def positive_integer(argument: str, value: object, allowed: str = "an integer of 1 or more") -> int:
-    """Return `value` as an int of 1 or more; `BadInput` otherwise."""
+    """Return `value` as an int of 1 or more. Raise `BadInput` otherwise."""
+    if type(value) is int and value >= 1:
+        return value
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
         raise BadInput(argument, repr(value), allowed)
     return int(value)
 
 
 def rotation(argument: str, value: object) -> Array:
-    """Return `value`, a matrix (3, 3) or a SciPy `Rotation`, as a rotation matrix; `BadInput` says how far off it is."""
+    """Return `value`, a matrix (3, 3) or a SciPy `Rotation`, as a rotation matrix. Raise `BadInput` with how far off it is."""
     allowed = f"a rotation matrix (3, 3), orthonormal to {ROTATION_TOLERANCE:g} with determinant +1, or a SciPy Rotation"
     as_matrix = getattr(value, "as_matrix", None)
     R = finite_array(argument, as_matrix() if as_matrix else value, ((3, 3),), allowed)  # type: ignore[arg-type]

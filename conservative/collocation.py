@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from .attitude import Array, from_quaternion
+from .attitude import Array, from_quaternion, triple
 from .check import choice, positive_integer
+from .compiled import kernels
 from .errors import BadInput, NotConverged
-from .frames import FRAMES, Frame, frame_unsupported, resolved, without_spin
+from .frames import FRAMES, Frame, frame_unsupported, in_frame
 from .method import Grid, Method, Run
 from .potential import UniformGravity
-from .principal import PrincipalStart, Quadruple, Triple, principal_start
+from .principal import PrincipalStart, Quadruple, Triple, axes_about, principal_start, quadruple
 from .scene import Scene
 from .tableau import MOST_STAGES, tableau
 from .trajectory import Counters, Trajectory
@@ -73,91 +74,61 @@ class Gauss(Method):
         return tuple(cls(stages) for stages in (2, 4, 6, 8))
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        frame = resolved(self.frame, scene)
-        label = self.label if frame == self.frame else replace(self, frame=frame).label
-        if frame == "body":
-            return _prepared(self.stages, scene, grid, label)
-        slow = without_spin(scene)
-        run = _prepared(self.stages, slow.scene, grid, label)
-        return lambda: slow.trajectory(run(), label)
+        frame, label = in_frame(self, scene)
+        start = principal_start(scene, frame)
+        march, coefficients, system = kernels("gauss").march, padded(self.stages), closed_system(start)
+
+        def run() -> Trajectory:
+            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
+            done, work, change = march(self.stages, *coefficients, grid.dt, grid.n_steps, grid.every, *system, q, L)
+            failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, change)
+            counters = Counters(steps=done, stages=done * self.stages, iterations=work)
+            return start.trajectory(label, grid, done, q, L, counters, failure)
+
+        return run
 
 
-def _prepared(stages: int, scene: Scene, grid: Grid, label: str) -> Run:
-    from .kernels.gauss import march
-    from .kernels.simd import LANES
-
-    start = principal_start(scene)
-    coefficients = padded(stages, LANES)
-    model = closed_system(start)
-
-    def run() -> Trajectory:
-        q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-        done, work, change = march(stages, *coefficients, grid.dt, grid.n_steps, grid.every, *model.arguments, q, L)
-        failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, change)
-        counters = Counters(steps=done, stages=done * stages, iterations=work)
-        return start.trajectory(label, grid, done, turned_to(start.q, q), L * model.unit, counters, failure)
-
-    return run
-
-
-@lru_cache(maxsize=2 * MOST_STAGES)
-def padded(stages: int, lanes: int) -> tuple[Array, ...]:
-    """Return A, E by columns and b, b_low, each in one dimension, stages filled up with zeros to a multiple of `lanes`."""
+@lru_cache(maxsize=MOST_STAGES)
+def padded(stages: int) -> tuple[Array, ...]:
+    """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
     table = tableau(stages)
-    extra = (0, -len(table.b) % lanes)
+    extra = (0, -len(table.b) % kernels("simd").LANES)
     rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
     return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
 
 
-@dataclass(frozen=True)
-class ClosedSystem:
-    """Momentum and vertical as the kernel takes them: floats in tuples, principal axes, momenta in units of `unit` kg m^2/s."""
+class ClosedSystem(NamedTuple):
+    """Momentum and vertical as the kernel takes them, in its order: principal axes, momenta in units of `unit` kg m^2/s.
+
+    `q` is the attitude against axes whose third is the vertical, and `left` takes those to world axes.
+    """
 
     unit: float
     J_inverse: Triple
     torque: Triple
     L: Triple
     gamma: Triple
-
-    @property
-    def arguments(self) -> tuple[Triple, Triple, Triple, Triple]:
-        """What `march` takes of it, in its order."""
-        return self.J_inverse, self.torque, self.L, self.gamma
+    q: Quadruple
+    left: Quadruple
 
 
 @lru_cache(maxsize=256)
 def closed_system(start: PrincipalStart) -> ClosedSystem:
     """Return the closed system of a start; the vertical of a free body is the direction of its momentum."""
+    R_WP, L = from_quaternion(start.q), np.array(start.L)
     size = math.hypot(*start.L)
-    if start.field is not None:
-        gamma = from_quaternion(start.q)[2]
-    else:
-        gamma = np.array(start.L) / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    falls = start.field is not None or size == 0
+    R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
     moment = np.zeros(3) if start.field is None else np.array(start.field)
     # A power of two, so that scaling rounds nothing; a body at rest gets the size of what its field can make of it.
     largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
     unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
     return ClosedSystem(
-        unit, triple(unit * np.array(start.J_inverse)), triple(moment / unit), triple(np.array(start.L) / unit), triple(gamma)
+        unit,
+        triple(unit * np.array(start.J_inverse)),
+        triple(moment / unit),
+        triple(L / unit),
+        triple(R_WP[2] if falls else L / size),
+        quadruple(R_WV.T @ R_WP),
+        quadruple(R_WV),
     )
-
-
-def triple(values: Array) -> Triple:
-    """Return three numbers as a tuple of floats."""
-    x, y, z = values.tolist()
-    return x, y, z
-
-
-def turned_to(q0: Quadruple, q: Array) -> Array:
-    """Return the quaternions (n, 4) turned in the world by the one rotation that takes the first of them to `q0`.
-
-    The kernel starts from an angle of zero about its vertical, whatever the world's axes are.
-    """
-    a = left_matrix(np.array(q0)) @ (q[0] * (1, -1, -1, -1))
-    return q @ left_matrix(a).T
-
-
-def left_matrix(q: Array) -> Array:
-    """Return the matrix (4, 4) with `left_matrix(q) @ p` the quaternion product q p."""
-    w, x, y, z = q
-    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])

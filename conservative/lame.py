@@ -31,20 +31,18 @@ rotations and kicks have a truncation error and bound the energy only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from .attitude import Array, from_quaternion, to_quaternion
-from .errors import Diverged
-from .frames import SpinFreeScene, frame_unsupported, without_spin
+from .compiled import kernels
+from .frames import frame_unsupported
 from .method import Grid, Method, Run
 from .potential import UniformGravity
-from .principal import Quadruple, Triple
+from .principal import principal_start
 from .scene import Scene
-from .trajectory import Counters, Trajectory, finite_prefix
+from .trajectory import Counters, Trajectory
 
 
 @dataclass(frozen=True)
@@ -76,66 +74,13 @@ class Lame(Method):
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from .kernels.lame import march
-
-        top = upright(scene)
+        march, start = kernels("lame").march, principal_start(scene, "non_spinning")
+        moment = start.field.z if start.field else 0.0
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            parts = march(grid.dt, top.slow.J1, top.moment, grid.n_steps, grid.every, top.q, top.L, q, L)
+            parts = march(grid.dt, start.J[0], moment, grid.n_steps, grid.every, start.q, start.L, q, L)
             work = Counters(steps=grid.n_steps, stages=grid.n_steps * parts, iterations=0)
-            return top.trajectory(self.label, grid, q, L, work)
+            return start.trajectory(self.label, grid, grid.n_steps, q, L, work, None)
 
         return run
-
-
-@dataclass(frozen=True, eq=False)
-class Upright:
-    """A symmetric scene as the kernel takes it: the slow frame turned so that its third axis is the axis of symmetry.
-
-    Attributes
-    ----------
-    slow
-        The scene without its spin.
-    R_SA
-        Rotation (3, 3) that takes components in the turned frame to those in the slow frame.
-    moment
-        Weight times lever arm, N m, along the axis.
-    q, L
-        Attitude of the turned frame at the start, scalar first, and momentum in it, kg m^2/s.
-    """
-
-    slow: SpinFreeScene
-    R_SA: Array
-    moment: float
-    q: Quadruple
-    L: Triple
-
-    def trajectory(self, label: str, grid: Grid, q: Array, L: Array, work: Counters) -> Trajectory:
-        """Return the body's trajectory from samples of the turned frame: quaternions (n, 4), momenta (n, 3)."""
-        R_WS = from_quaternion(q / np.sqrt(np.einsum("ij,ij->i", q, q))[:, None]) @ self.R_SA.T
-        R_WB, w_WB_B = self.slow.state(grid.t, R_WS, L @ self.R_SA.T / self.slow.J1)
-        done = Trajectory(self.slow.spinning, grid.t, R_WB, w_WB_B, label, work)
-        finite = finite_prefix(R_WB, w_WB_B)
-        if finite == len(done):
-            return done
-        failure = Diverged(float(grid.t[max(finite - 1, 0)]))
-        return replace(done, t=done.t[:finite], R_WB=R_WB[:finite], w_WB_B=w_WB_B[:finite], failure=failure)
-
-
-@lru_cache(maxsize=256)
-def upright(scene: Scene) -> Upright:
-    """Return a symmetric scene as the kernel takes it."""
-    slow = without_spin(scene)
-    R_SA = frame_with_axis(slow.axis_B)
-    potential = scene.potential
-    moment = float(potential.moment_B @ slow.axis_B) if isinstance(potential, UniformGravity) else 0.0
-    L = (R_SA.T @ scene.body.momentum(scene.w_WB_B0)).tolist()
-    return Upright(slow, R_SA, moment, tuple(to_quaternion(scene.R_WB0 @ R_SA).tolist()), tuple(L))
-
-
-def frame_with_axis(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,)."""
-    first = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis], axis=1)

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -35,13 +35,14 @@ class Grid:
     n_steps: int
     every: int = 1
 
-    @cached_property
+    @property
     def steps(self) -> Array:
-        """Numbers (n,) of the steps after which a sample is kept, from 0."""
-        steps = np.arange(0, self.n_steps + 1, self.every, dtype=float)
-        return steps if steps[-1] == self.n_steps else np.append(steps, float(self.n_steps))
+        """Number of steps (n,) after which each sample is kept, from 0."""
+        steps = np.arange(0, self.n_samples * self.every, self.every, dtype=float)
+        steps[-1] = self.n_steps
+        return steps
 
-    @cached_property
+    @property
     def t(self) -> Array:
         """Times (n,) of the samples, s."""
         return self.steps * self.dt
@@ -57,7 +58,7 @@ class Grid:
 
 
 def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: object = 1) -> Grid:
-    """Return the checked grid of a run.
+    """Return the checked grid of a run of steps dt up to t_end, both in s; the duration is by default the scene's.
 
     Raises
     ------
@@ -114,8 +115,8 @@ class Method(ABC):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
-        Timing calls the run, so all that happens once per model belongs before it. A run may be called many times and
-        starts afresh each time.
+        Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
+        of the same scene, which never changes. A run may be called many times and starts afresh each time.
         """
 
     @classmethod
@@ -124,7 +125,13 @@ class Method(ABC):
         return (cls(),)
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
-        """Return the trajectory, whatever its status; `integrate` is this with checks and exceptions."""
+        """Return the trajectory of steps dt to t_end, s, whatever its status; `integrate` is this with checks and exceptions.
+
+        Raises
+        ------
+        BadInput
+            dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
+        """
         return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
 
 

@@ -9,10 +9,11 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from .attitude import Array, to_quaternion
+from .attitude import Array
+from .compiled import kernels
 from .errors import BadInput
 from .method import Grid, Method, Run
-from .principal import PrincipalStart, principal_start
+from .principal import PrincipalStart, start_along
 from .scene import Scene
 from .trajectory import Counters, Trajectory
 
@@ -76,34 +77,37 @@ class MoserVeselov(Method):
         return tuple(cls(order) for order in ORDERS)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from .kernels.moser_veselov import march, polhode
-
-        require_short(scene, grid.dt)
-        start = principal_start(scene)
-        R_PS, q_axes, moments, momenta = polhode_start(start)
-        p = polhode(*moments, *momenta)
-        step = self._step(p, grid.dt)
+        march, (start, p, step) = kernels("moser_veselov").march, calibrated(self, scene, grid.dt)
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            march(p, step, grid.n_steps, grid.every, start.q, q_axes, q, L)
+            march(p, step, grid.n_steps, grid.every, start.q, q, L)
             work = Counters(steps=grid.n_steps, stages=grid.n_steps, iterations=0)
-            return start.trajectory(self.label, grid, grid.n_steps, q, L @ R_PS.T, work, None)
+            return start.trajectory(self.label, grid, grid.n_steps, q, L, work, None)
 
         return run
 
-    def _step(self, p: Any, dt: float) -> Any:
-        """Return the constants of one step."""
-        from .kernels.moser_veselov import exact_step, normalised, preprocessed_step
 
-        step = exact_step(p, dt) if self.order is None else preprocessed_step(p, dt, self.order)
-        if not (math.isfinite(step.r0) and step.C > FARTHEST):
-            raise BadInput("dt", f"{dt:g}, for which {self.name} has no step", "a shorter step")
-        return normalised(step)
+@lru_cache(maxsize=256)
+def calibrated(method: MoserVeselov, scene: Scene, dt: float) -> tuple[PrincipalStart, Any, Any]:
+    """Return the start along `polhode_axes`, its polhode, and the constants of a step dt, s.
+
+    Raises
+    ------
+    BadInput
+        dt is too long.
+    """
+    require_short(scene, dt)
+    dmv, start = kernels("moser_veselov"), polhode_start(scene)
+    p = dmv.polhode(*start.J, *start.L)
+    step = dmv.exact_step(p, dt) if method.order is None else dmv.preprocessed_step(p, dt, method.order)
+    if not (math.isfinite(step.r0) and step.C > FARTHEST):
+        raise BadInput("dt", f"{dt:g}, for which {method.name} has no step", "a shorter step")
+    return start, p, dmv.normalised(step)
 
 
 def require_short(scene: Scene, dt: float) -> None:
-    """Raise `BadInput` unless |w| dt is below `LONGEST` at the start."""
+    """Raise `BadInput` unless |w| dt is below `LONGEST` at the start; dt in s."""
     speed = float(np.linalg.norm(scene.w_WB_B0))
     if speed * dt >= LONGEST:
         raise BadInput(
@@ -111,16 +115,17 @@ def require_short(scene: Scene, dt: float) -> None:
         )
 
 
-@lru_cache(maxsize=256)
-def polhode_start(start: PrincipalStart) -> tuple[Array, Any, Any, Any]:
-    """Return `polhode_axes` as a matrix (3, 3) and as a quaternion, and moments and momenta along them."""
-    J, L = np.array(start.J), np.array(start.L)
-    R_PS = polhode_axes(J, L)
-    return R_PS, floats(to_quaternion(R_PS)), floats(J @ np.abs(R_PS)), floats(L @ R_PS)
+def polhode_start(scene: Scene) -> PrincipalStart:
+    """Return the scene's start along `polhode_axes`."""
+    R_BP, moments = scene.body.R_BP, scene.body.moments
+    R_PS = polhode_axes(moments, (scene.w_WB_B0 @ R_BP) * moments)
+    return start_along(scene, R_BP @ R_PS, moments @ np.abs(R_PS))
 
 
 def polhode_axes(J: Array, L: Array) -> Array:
     """Return R_PS (3, 3), axes e1, e2, e3 in principal components: e2 intermediate, e3 the one that L keeps to one side of.
+
+    J are the moments (3,), kg m^2, and L is the momentum (3,), kg m^2/s, both in principal axes.
 
     That is the axis of the largest moment where L^2 > 2 E J2 and of the smallest where it is less; on the separatrix either.
     """
@@ -131,8 +136,3 @@ def polhode_axes(J: Array, L: Array) -> Array:
     if L @ e3 < 0:
         e3 = -e3
     return np.column_stack([np.cross(e2, e3), e2, e3])
-
-
-def floats(values: Array) -> Any:
-    """Return numbers as the tuple of floats that kernels take."""
-    return tuple(float(value) for value in values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Literal
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from .attitude import Array
 from .check import choice, positive_number
+from .compiled import kernels
 from .composition import BEST, composition_of
 from .errors import NotConverged, WrongBranch
-from .frames import FRAMES, Frame, frame_unsupported, resolved, without_spin
+from .frames import FRAMES, Frame, frame_unsupported, in_frame
 from .method import Grid, Method, Run
 from .principal import principal_start
 from .scene import Scene
@@ -83,19 +84,9 @@ class Reduced(Method):
         return tuple(cls(order) for order in BEST)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        frame = resolved(self.frame, scene)
-        label = self.label if frame == self.frame else replace(self, frame=frame).label
-        if frame == "body":
-            return self._prepared(scene, grid, label)
-        slow = without_spin(scene)
-        run = self._prepared(slow.scene, grid, label)
-        return lambda: slow.trajectory(run(), label)
-
-    def _prepared(self, scene: Scene, grid: Grid, label: str) -> Run:
-        from .kernels.march import march
-
-        start = principal_start(scene)
-        stages = stage_lengths(self.order, self.composition, grid.dt)
+        frame, label = in_frame(self, scene)
+        start = principal_start(scene, frame)
+        march, stages = kernels("march").march, stage_lengths(self.order, self.composition, grid.dt)
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))

@@ -175,6 +175,7 @@ def test_everything_in_all_is_walked():
 
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
+    "conservative.compiled": "imports",
     "conservative.errors": "exceptions",
     "conservative.method": "the protocol",
     "conservative.presentation": "tables and cards",

@@ -6,6 +6,7 @@ machine code behind. All kernels therefore live in this folder, and caches older
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ from numba import njit
 def _drop_stale_caches(folder: Path) -> None:
     newest = max(file.stat().st_mtime for file in folder.glob("*.py"))
     for index in (folder / "__pycache__").glob("*.nbi"):
-        if index.stat().st_mtime < newest:
-            index.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process may be at it
+            if index.stat().st_mtime < newest:
+                index.unlink()
 
 
 _drop_stale_caches(Path(__file__).parent)

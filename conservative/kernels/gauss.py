@@ -6,12 +6,13 @@ the world momentum): a closed system of six with quadratic invariants only,
     L' = L x w + gamma x c,    gamma' = gamma x w,    w = J^-1 L,
 
 energy L.w/2 + c.gamma, L.gamma and gamma.gamma, which collocation at Gauss points keeps whatever the step. What is left of the
-attitude is one angle about the vertical, a quadrature. With the minimal rotation M that takes gamma to a principal axis a and a
-constant rotation C that takes a to e_z,
+attitude is one angle about the vertical, a quadrature. With the minimal rotation M that takes gamma to a unit vector a fixed in
+the body, and a constant rotation C that takes a to e_z,
 
-    R = Rz(phi) C M(gamma),    phi' = w.(gamma + a) / (1 + gamma.a),
+    R = Rz(phi) C M(gamma),    phi' = w.(gamma + a) / (1 + gamma.a),    R1 = Rz(phi1 - phi0) R0 M(gamma0)' M(gamma1).
 
-and six choices of a, the charts, keep the divisor above 1.5. The kernel works in units that make L of size one.
+Each step has its own a, the gamma at its middle: the divisor stays near 2, and nothing depends on the axes of the body or the
+direction of time. The kernel works in units that make L of size one.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ import math
 
 import numpy as np
 
-from . import kernel
+from . import kernel, small
 from .simd import LANES, four, fused, larger_size, place, put, splat, spread
-from .vector import accumulate, cross, dot, product
+from .vector import accumulate, add, cross, dot, product, scaled, subtract, vertical
 
 MAX_SWEEPS = 120
 MAX_NEWTON = 25
@@ -30,13 +31,8 @@ ROUND_OFF = 2e-17
 STAGNATION = 2e-15
 SLOWEST = 0.8
 """Pairs of sweeps that gain less than this are left for Newton, whose step costs as much as a hundred sweeps."""
-
-# Chart k + 3 (s < 0) has a = s e_k; the quaternion is that of the constant rotation C.
-_R = math.sqrt(0.5)
-CHART_AXES = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]])
-CHART_TURNS = np.array([[_R, 0, -_R, 0], [_R, _R, 0, 0], [1, 0, 0, 0], [_R, 0, _R, 0], [_R, -_R, 0, 0], [0, 1, 0, 0]])
-KEPT_CHART = 0.5
-"""A chart is kept while gamma.a is above this at the middle of the step; the best of six has 0.577 at least."""
+LONGEST = 2.0**64
+"""Length up to which a quaternion is let grow; dividing by it then rounds nothing."""
 
 
 @kernel
@@ -163,52 +159,57 @@ def tangent_block(J_inverse, c, U, block):
         block[3 + k, j] = U[3 + i] * J_inverse[j]
 
 
-@kernel
-def chart_rotation(chart, gamma):
-    """Quaternion, not normalised, of C M(gamma)."""
-    a = (CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2])
-    turn = (CHART_TURNS[chart, 0], CHART_TURNS[chart, 1], CHART_TURNS[chart, 2], CHART_TURNS[chart, 3])
-    n = cross(gamma, a)
-    return product(turn, (1.0 + dot(gamma, a), n[0], n[1], n[2]))
-
-
-@kernel
-def attitude(chart, phi, gamma):
-    """Unit quaternion of Rz(phi) C M(gamma)."""
-    m = chart_rotation(chart, gamma)
-    size = 1.0 / math.sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + m[3] * m[3])
-    return product((size * math.cos(0.5 * phi), 0.0, 0.0, size * math.sin(0.5 * phi)), m)
-
-
-@kernel
-def angle_in(chart, q, gamma):
-    """The phi for which `attitude(chart, phi, gamma)` is q or -q."""
-    m = chart_rotation(chart, gamma)
-    z = product(q, (m[0], -m[1], -m[2], -m[3]))
-    return 2.0 * math.atan2(z[3], z[0])
-
-
-@kernel
-def best_chart(gamma):
-    """The chart whose axis is nearest to gamma."""
-    k = 0
-    for i in range(1, 3):
-        if abs(gamma[i]) > abs(gamma[k]):
-            k = i
-    return k if gamma[k] >= 0.0 else k + 3
-
-
-@kernel
-def turned(h, b, chart, J_inverse, Z):
-    """Integral of phi' over the step."""
+@small
+def middle(s, Z):
+    """A vector along gamma at the middle of the step: that of the stage there, or the mean of the two next to it."""
     width = Z.shape[0] // 6
-    a = (CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2])
+    i, j = 3 * width + (s - 1) // 2, 3 * width + s // 2
+    return (0.5 * (Z[i] + Z[j]), 0.5 * (Z[width + i] + Z[width + j]), 0.5 * (Z[2 * width + i] + Z[2 * width + j]))
+
+
+@small
+def carried(q, carry, a, size, g0, g1):
+    """A quaternion, longer than q, of R M(g0)' M(g1), as a compensated sum; a is of length `size`.
+
+    With a of unit length the quaternion of M(g0)' M(g1) is along (1 + g0.a + g1.a + g0.g1, (g1 - g0) x (g0 + a)).
+    """
+    v = cross(subtract(g1, g0), add(scaled(size, g0), a))
+    v = scaled(1.0 / (size + dot(add(g0, g1), a) + size * dot(g0, g1)), v)
+    d = product(q, (0.0, v[0], v[1], v[2]))
+    w, cw = accumulate(q[0], carry[0], d[0])
+    x, cx = accumulate(q[1], carry[1], d[1])
+    y, cy = accumulate(q[2], carry[2], d[2])
+    z, cz = accumulate(q[3], carry[3], d[3])
+    if max(max(abs(w), abs(x)), max(abs(y), abs(z))) > LONGEST:
+        s = 1.0 / LONGEST
+        return (s * w, s * x, s * y, s * z), (s * cw, s * cx, s * cy, s * cz)
+    return (w, x, y, z), (cw, cx, cy, cz)
+
+
+@small
+def minimal(g, a):
+    """Quaternion, not normalised, of the minimal rotation that takes the unit vector g to a."""
+    n = cross(g, a)
+    return (1.0 + dot(g, a), n[0], n[1], n[2])
+
+
+@kernel
+def attitude(left, phi, q, gamma):
+    """Quaternion, not normalised, of Rz(phi) R turned by `left`, R of q but for round-off: that which takes gamma to e_z."""
+    z = product(left, (math.cos(0.5 * phi), 0.0, 0.0, math.sin(0.5 * phi)))
+    return product(z, product(q, minimal(gamma, vertical(q))))
+
+
+@kernel
+def turned(h, b, a, size, J_inverse, Z):
+    """Integral of phi' over the step; a is of length `size`."""
+    width = Z.shape[0] // 6
     total = splat(0.0)
     for i in range(0, width, LANES):
         w = (J_inverse[0] * four(Z, i), J_inverse[1] * four(Z, width + i), J_inverse[2] * four(Z, 2 * width + i))
         g = (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
-        top = w[0] * (g[0] + splat(a[0])) + w[1] * (g[1] + splat(a[1])) + w[2] * (g[2] + splat(a[2]))
-        total = total + four(b, i) * top / (splat(1.0) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
+        above = w[0] * (size * g[0] + splat(a[0])) + w[1] * (size * g[1] + splat(a[1])) + w[2] * (size * g[2] + splat(a[2]))
+        total = total + four(b, i) * above / (splat(size) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
     return h * summed(total)
 
 
@@ -242,21 +243,20 @@ def start(A, s, h, J_inverse, c, U, F, D, Z):
 
 
 @kernel
-def march(s, A, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_out, L_out):
+def march(s, A, E, b, b_low, h, n_steps, every, unit_L, J_inverse, c, L0, gamma0, q0, left, q_out, L_out):
     """Take n_steps steps of h s and store attitude and momentum of every `every`-th and the last.
 
-    Returns (steps done, sweeps and Newton corrections, size of the last change); steps done < n_steps means that the next one
-    did not converge. Coefficients come with their stages filled up with zeros to a multiple of four.
+    L0 is in units of `unit_L`, gamma0 is where q0 has e_z, and `left` turns that to world axes. Returns (steps done, sweeps and
+    Newton corrections, size of the last change); steps done < n_steps means that the next one did not converge. Coefficients
+    come with their stages filled up with zeros to a multiple of four.
     """
     width = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)
     for k in range(3):
         U[k], U[3 + k] = L0[k], gamma0[k]
     F, D, Z = np.empty(6 * width), np.zeros(6 * width), np.empty(6 * width)
-    chart = best_chart(gamma0)
-    phi, phi_carry = 0.0, 0.0
-    q_out[0, :] = attitude(chart, phi, gamma0)
-    L_out[0, :] = L0
+    q, q_carry, gamma, phi, phi_carry = q0, (0.0, 0.0, 0.0, 0.0), gamma0, 0.0, 0.0
+    store(0, left, phi, q, gamma, unit_L, U, q_out, L_out)
     row, work, change = 0, 0, 0.0
     for step in range(1, n_steps + 1):
         if step == 1:
@@ -272,17 +272,21 @@ def march(s, A, E, b, b_low, h, n_steps, every, J_inverse, c, L0, gamma0, q_out,
             if not good:
                 return step - 1, work, change
         rates(J_inverse, c, Z, F)
-        m = 3 * width + s // 2
-        middle = (Z[m], Z[m + width], Z[m + 2 * width])
-        if dot(middle, (CHART_AXES[chart, 0], CHART_AXES[chart, 1], CHART_AXES[chart, 2])) < KEPT_CHART:
-            gamma = (U[3], U[4], U[5])
-            q = attitude(chart, phi - phi_carry, gamma)
-            chart = best_chart(middle)
-            phi, phi_carry = angle_in(chart, q, gamma), 0.0
-        phi, phi_carry = accumulate(phi, phi_carry, turned(h, b, chart, J_inverse, Z))
+        a = middle(s, Z)
+        size = math.sqrt(dot(a, a))
+        phi, phi_carry = accumulate(phi, phi_carry, turned(h, b, a, size, J_inverse, Z))
         advance(h, b, b_low, F, U, carry)
+        before, gamma = gamma, (U[3], U[4], U[5])
+        q, q_carry = carried(q, q_carry, a, size, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1
-            q_out[row, :] = attitude(chart, phi - phi_carry, (U[3], U[4], U[5]))
-            L_out[row, :] = U[:3]
+            store(row, left, phi - phi_carry, q, gamma, unit_L, U, q_out, L_out)
     return n_steps, work, change
+
+
+@kernel
+def store(row, left, phi, q, gamma, unit_L, U, q_out, L_out):
+    """Write a state."""
+    q_out[row, :] = attitude(left, phi, q, gamma)
+    for k in range(3):
+        L_out[row, k] = unit_L * U[k]

@@ -274,21 +274,21 @@ def directions(p):
 
 
 @kernel
-def store(row, p, a, s, c, d, z_re, z_im, left, right, q_out, L_out):
-    """Write a state: its momentum in the axes of this module and its quaternion, turned by what is constant on both sides."""
+def store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out):
+    """Write a state: its momentum and its quaternion, turned in the world by what is constant."""
     x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
     own = (z_re * up, z_re * y + z_im * x, z_im * y - z_re * x, z_im * up)
-    q_out[row, :] = product(product(left, own), right)
+    q_out[row, :] = product(left, own)
     L_out[row, 0], L_out[row, 1], L_out[row, 2] = p.A1 * c, p.A2 * s, p.A3 * d
 
 
 @kernel
-def march(p, step, n_steps, every, q_start, q_axes, q_out, L_out):
+def march(p, step, n_steps, every, q_start, q_out, L_out):
     """Take n_steps steps and store every `every`-th state and the last.
 
-    q_start is the attitude at t = 0 and q_axes takes the axes of this module to principal axes. After the addition theorem
-    c and s are brought back to s^2 + c^2 = 1 and d is formed from c, so energy and momentum cannot drift, and mc is not
-    forgotten near the separatrix, where it is far below the round-off of L.
+    q_start is the attitude at t = 0. After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from
+    c, so energy and momentum cannot drift, and mc is not forgotten near the separatrix, where it is far below the round-off of
+    L.
     """
     S, C, D = step.S, step.C, step.D
     m, mc = p.m, p.mc
@@ -303,9 +303,8 @@ def march(p, step, n_steps, every, q_start, q_axes, q_out, L_out):
     s, c, d, z_re, z_im = p.s, p.c, p.d, 1.0, 0.0
     x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
     n = 1.0 / (x * x + y * y + up * up)
-    right = (q_axes[0], -q_axes[1], -q_axes[2], -q_axes[3])
-    left = product(product(q_start, q_axes), (n * up, -n * y, n * x, 0.0))
-    store(0, p, a, s, c, d, z_re, z_im, left, right, q_out, L_out)
+    left = product(q_start, (n * up, -n * y, n * x, 0.0))
+    store(0, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
     row, until_rescale, until_sample = 0, RESCALE, every
     for step_number in range(1, n_steps + 1):
         r = 1.0 / (1.0 - mS1 * (s * s))
@@ -327,4 +326,4 @@ def march(p, step, n_steps, every, q_start, q_axes, q_out, L_out):
         if until_sample == 0 or step_number == n_steps:
             until_sample = every
             row += 1
-            store(row, p, a, s, c, d, z_re, z_im, left, right, q_out, L_out)
+            store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out)

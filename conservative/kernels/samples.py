@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 
 from . import kernel
+from .vector import product
 
 
 @kernel
-def to_body_axes(q, L, J_inverse, R_BP, R_WB, w_WB_B):
-    """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from q (n, 4) of any length and L (n, 3); return how many of the first are finite.
+def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
+    """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from the first n of q (., 4), of any length, and L (., 3), at times t (.,).
 
-    `R_BP` is None where principal and body axes are the same, which leaves out its products.
+    `spin` is None, or what the frame of q lacks of the body's rate about its third axis, with 1/J3; `R_BP` is None where
+    principal and body axes are the same. Either leaves out its products. Returns how many of the first are finite.
     """
     finite = 0
-    for i in range(len(q)):
-        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        s = 2.0 / (w * w + x * x + y * y + z * z)
+    for i in range(len(R_WB)):
         rates = (L[i, 0] * J_inverse[0], L[i, 1] * J_inverse[1], L[i, 2] * J_inverse[2])
+        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        if spin is not None:
+            cos, sin = math.cos(0.5 * spin[0] * t[i]), math.sin(0.5 * spin[0] * t[i])
+            w, x, y, z = product((w, x, y, z), (cos, 0.0, 0.0, sin))
+            c, s = 1.0 - 2.0 * sin * sin, 2.0 * sin * cos
+            rates = (c * rates[0] + s * rates[1], c * rates[1] - s * rates[0], L[i, 2] * spin[1])
+        s = 2.0 / (w * w + x * x + y * y + z * z)
         rows = (
             (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
             (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)),

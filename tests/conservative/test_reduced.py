@@ -7,7 +7,8 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, cayley, rotation_about
-from conservative.frames import resolved, without_spin
+from conservative.frames import resolved
+from conservative.principal import principal_start
 
 TURN = rotation_about((3, -1, 2), 1.3)
 
@@ -126,7 +127,7 @@ def test_frames_are_chosen_and_refused() -> None:
     with pytest.raises(cv.Unsupported, match="symmetric about one axis"):
         cv.integrate(cv.scenes.brick_flip(), method=cv.Reduced(frame="non_spinning"))
     with pytest.raises(cv.BadInput, match="frame"):
-        without_spin(cv.scenes.brick_flip())
+        principal_start(cv.scenes.brick_flip(), "non_spinning")
     with pytest.raises(cv.BadInput, match="frame"):
         cv.Reduced(frame="world")
     with pytest.raises(cv.BadInput, match="tol"):
