@@ -22,7 +22,7 @@ SECONDS = {
     drifts.STUDY: 0.7,
 }
 """How long each piece takes for one scene and one method, roughly: for the time left."""
-SHOWING = {"pictures": 3.0, "page": 12.0}
+SHOWING = {"pictures": 6.0, "page": 12.0}
 """How long what comes after the measurements takes, roughly."""
 QUICK = 0.3
 """How much of that a quick report takes."""
@@ -66,7 +66,9 @@ class Plan:
     def spans(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
         """Return when each of the pieces named begins and ends, and each part of showing them, as shares of all the time."""
         pairs = len(self.scenes) * len(self.methods)
-        costs = {name: pairs * SECONDS[name] * (QUICK if self.quick else 1.0) for name in names} | SHOWING
+        factor = QUICK if self.quick else 1.0
+        costs = {name: factor * pairs * SECONDS[name] for name in names}
+        costs |= {name: factor * seconds for name, seconds in SHOWING.items()}
         ends = [end / sum(costs.values()) for end in accumulate(costs.values())]
         return dict(zip(costs, pairwise([0.0, *ends]), strict=True))
 

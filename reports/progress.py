@@ -7,10 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
 
 Step = Callable[[float, str], None]
 """Called with the share of all work that is done, 0 to 1, and what comes next."""
@@ -31,7 +27,9 @@ def progress() -> Iterator[Step]:
     if not shown():
         yield lambda share, what: None
         return
-    with _bar() as bar:
+    from .bars import Bar
+
+    with Bar() as bar:
         task = bar.add_task("", total=1.0)
         yield lambda share, what: bar.update(task, completed=share, description=what)
 
@@ -42,7 +40,9 @@ def waiting(what: str) -> Iterator[Expect | None]:
     if not shown():
         yield None
         return
-    bar, done = _bar(), Event()
+    from .bars import Bar
+
+    bar, done = Bar(), Event()
     task = bar.add_task(what, total=None)
 
     start = monotonic()
@@ -67,22 +67,3 @@ def waiting(what: str) -> Iterator[Expect | None]:
         done.set()
         ticking.join()
         bar.stop()
-
-
-def _bar() -> Progress:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-    from rich.table import Column
-
-    # Numbers keep their width where the terminal is narrow; bar and text share what is left.
-    return Progress(
-        BarColumn(None, table_column=Column(ratio=1)),
-        TaskProgressColumn(table_column=Column(min_width=4, no_wrap=True)),
-        TimeElapsedColumn(table_column=Column(min_width=7, no_wrap=True)),
-        TextColumn("left"),
-        TimeRemainingColumn(table_column=Column(min_width=7, no_wrap=True)),
-        TextColumn("{task.description}", table_column=Column(ratio=2, no_wrap=True, overflow="ellipsis")),
-        console=Console(stderr=True),
-        transient=True,
-        expand=True,
-    )

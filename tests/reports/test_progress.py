@@ -50,7 +50,7 @@ def on_a_terminal(code, columns=80):
 def test_a_terminal_shows_share_time_spent_and_time_left(columns):
     lines = re.split(r"[\r\n]+", on_a_terminal(STEPS, columns))
     assert any(re.search(r" \d\d% 0:00:\d\d left 0:00:\d\d a study", line) for line in lines), lines
-    assert max(map(len, lines)) <= columns
+    assert max(map(len, lines)) <= columns - len("^C")  # or the terminal's ^C breaks the line, which then stays
 
 
 def test_a_single_piece_of_work_shows_how_long_it_is_expected_to_take():

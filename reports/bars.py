@@ -1,0 +1,35 @@
+"""The bar of `progress`, in a file of its own, since importing rich takes longer than showing a --help."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.console import Console, RenderableType
+from rich.constrain import Constrain
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Column
+
+ECHO = len("^C") + 1
+"""Columns left free at the end of a line: the ^C that a terminal shows must not break it, or the bar cannot be removed."""
+
+
+class Bar(Progress):
+    """A bar on stderr: share, time spent, time left, what is done. It is gone when it stops."""
+
+    def __init__(self) -> None:
+        # Numbers keep their width where the terminal is narrow; bar and text share what is left.
+        columns = (
+            BarColumn(None, table_column=Column(ratio=1)),
+            TaskProgressColumn(table_column=Column(min_width=4, no_wrap=True)),
+            TimeElapsedColumn(table_column=Column(min_width=7, no_wrap=True)),
+            TextColumn("left"),
+            TimeRemainingColumn(table_column=Column(min_width=7, no_wrap=True)),
+            TextColumn("{task.description}", table_column=Column(ratio=2, no_wrap=True, overflow="ellipsis")),
+        )
+        self._terminal = Console(stderr=True)
+        super().__init__(*columns, console=self._terminal, transient=True, expand=True)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Yield what is shown, a little narrower than the terminal."""
+        for renderable in super().get_renderables():
+            yield Constrain(renderable, max(1, self._terminal.width - ECHO))
