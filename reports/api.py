@@ -16,7 +16,10 @@ MODULES = (
     "conservative",
     "conservative.attitude",
     "conservative.chooser",
+    "conservative.composition",
+    "conservative.frames",
     "conservative.invariants",
+    "conservative.lame",
     "conservative.registry",
     "conservative.scene_file",
     "references",
@@ -38,7 +41,7 @@ def write(folder: Path) -> Path:
     try:
         import pdoc
     except ImportError as error:
-        raise MissingEngine("pdoc", "'conservative-rotation[docs]'") from error
+        raise MissingEngine("pdoc", "pdoc") from error
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
     _name_aliases()
     pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")

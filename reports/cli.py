@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import click
 
 from . import completing
-from .interrupts import Terminated, terminable
+from .interrupts import Terminated, interruptible, notes
 
 EXIT_CODES = """Exit codes:
     0    done
@@ -43,20 +44,16 @@ class _Terminated(_Interrupted):
     exit_code = 143
 
 
-def _notes(error: BaseException) -> list[str]:
-    return getattr(error, "__notes__", [])
-
-
 class Commands(click.Group):
     """Commands whose user errors end as one line on stderr and an exit code, never as a traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with terminable():
+            with interruptible(signal.SIGINT):
                 return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             kind = _Terminated if isinstance(stop, Terminated) else _Interrupted
-            raise kind("; ".join(["Interrupted", *_notes(stop)])) from None
+            raise kind("; ".join(["Interrupted", *notes(stop)])) from None
         except (ValueError, ImportError, ArithmeticError) as error:
             raise _as_click(error) from None
 
@@ -69,7 +66,7 @@ def _as_click(error: Exception) -> Exception:
     """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
     from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 
-    text = "; ".join([str(error), *_notes(error)])
+    text = "; ".join([str(error), *notes(error)])
     if isinstance(error, BadInput | MissingEngine):
         return _UserError(text)
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
@@ -92,14 +89,19 @@ def main() -> None:
     """
 
 
-def _listed(texts: tuple[str, ...]) -> list[str]:
-    """Return names out of `a,b:setting=1,other=2,c`: what has an equals sign and no colon belongs to the name before it."""
+def _listed(argument: str, texts: tuple[str, ...]) -> list[str]:
+    """Return names out of `a,b:setting=1,other=2,c`: what has an equals sign and no colon belongs to the name before it.
+
+    An option that is given but names nothing, as `--scenes "$EMPTY"` does, would mean everything: it is a mistake.
+    """
     found: list[str] = []
     for item in (item.strip() for text in texts for item in text.split(",")):
         if found and "=" in item and ":" not in item:
             found[-1] += f",{item}"
         elif item:
             found.append(item)
+    if texts and not found:
+        raise click.BadParameter("it names nothing", param_hint=f"--{argument}")
     return found
 
 
@@ -140,10 +142,10 @@ def report(
     from . import document, output, partial
     from .progress import progress
 
-    plan = document.plan(_listed(scenes), _listed(methods), quick, skip_missing, png)
+    plan = document.plan(_listed("scenes", scenes), _listed("methods", methods), quick, skip_missing, png)
     if not resume and partial.path_for(out).exists():
         click.echo(f"{partial.path_for(out)}: unfinished work that --resume goes on with; without it, to be replaced", err=True)
-    with progress() as step:
+    with interruptible(signal.SIGTERM), progress() as step:
         measured = document.write(plan, out, step, resume)
     click.echo((out / output.MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
     bad = document.failed(measured)
@@ -213,8 +215,8 @@ def recommend(
     from . import recommend as recommending
     from .progress import progress
 
-    with progress() as step:
-        found = recommending.run(scene, error, duration, _listed(engine), cost_limit, out, step)
+    with interruptible(signal.SIGTERM), progress() as step:
+        found = recommending.run(scene, error, duration, _listed("engine", engine), cost_limit, out, step)
     if as_json:
         click.echo(recommending.as_json(found))
     else:
@@ -273,15 +275,18 @@ def new(as_json: bool) -> None:
 @click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
-@click.option("--csv", type=click.Path(path_type=Path), help="Write every sample: t, R_WB, w_WB_B, energy, momentum.")
+@click.option("--csv", type=click.Path(path_type=Path), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
 def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and show how it ended, its drifts and its last state.
 
+    Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
     A run that fails leaves what it reached in the file, and exits with 1.
     """
     from . import single
+    from .progress import waiting
 
-    summary = single.run(scene, method, dt, t_end, csv)
+    with waiting(f"{scene}: {method}") as expect:
+        summary = single.run(scene, method, dt, t_end, csv, expect)
     click.echo(single.as_json(summary) if as_json else single.as_text(summary))
     if summary["status"] != "ok":
         raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['status']}")

@@ -6,7 +6,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import Any
 
 
 class Terminated(KeyboardInterrupt):
@@ -14,33 +14,50 @@ class Terminated(KeyboardInterrupt):
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Turn SIGTERM into `Terminated`, so that it cleans up after itself as Ctrl-C does; unless someone else handles it."""
-    if not _in_main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGTERM, _terminate)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+def interruptible(number: signal.Signals) -> Iterator[None]:
+    """Turn SIGINT into `KeyboardInterrupt`, SIGTERM into `Terminated`, also where another exception is made of it on the way.
+
+    Compiled code that is interrupted while it is loaded raises `SystemError`, for one.
+    """
+    arrived: list[KeyboardInterrupt] = []
+
+    def stop(number: int, frame: object) -> None:
+        arrived.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
+        raise arrived[0]
+
+    with _handled(stop, number):
+        try:
+            yield
+        except Exception as error:
+            if not arrived:
+                raise
+            for note in notes(error):
+                arrived[0].add_note(note)
+            raise arrived[0] from error
 
 
 @contextmanager
 def unstoppable() -> Iterator[None]:
     """Ignore interrupts for the moment that a few renames take, which make sense only together."""
-    signals = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
-    before = [signal.signal(number, signal.SIG_IGN) for number in signals]
+    with _handled(signal.SIG_IGN, signal.SIGINT, signal.SIGTERM):
+        yield
+
+
+def notes(error: BaseException) -> list[str]:
+    """Return the notes of an exception: what has become of the work that it ended."""
+    return list(getattr(error, "__notes__", ()))
+
+
+@contextmanager
+def _handled(handler: Any, *numbers: signal.Signals) -> Iterator[None]:
+    """Handle signals that are not ignored already, as under nohup; only the main thread can."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = {number: signal.getsignal(number) for number in numbers} if in_main_thread else {}
+    ours = [number for number, was in before.items() if was not in (None, signal.SIG_IGN)]
+    for number in ours:
+        signal.signal(number, handler)
     try:
         yield
     finally:
-        for number, handler in zip(signals, before, strict=True):
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-
-def _terminate(number: int, frame: object) -> NoReturn:
-    raise Terminated
-
-
-def _in_main_thread() -> bool:
-    return threading.current_thread() is threading.main_thread()
+        for number in ours:
+            signal.signal(number, before[number])

@@ -35,7 +35,7 @@ def report_folder(target: Path) -> Iterator[Path]:
     BadInput
         The target cannot be written, is a file, or is a folder with other things in it.
     """
-    target = target.absolute()
+    target = target.resolve()  # a link stays one
     foreign = _foreign_files(target)
     with _as_bad_input("out", target, _FOLDER):
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -93,7 +93,9 @@ class Partial:
 
 def path_for(out: Path) -> Path:
     """Return where the unfinished work of a report into the folder `out` is kept."""
-    return out.with_name(f"{out.absolute().name}.partial.json")
+    folder = out.resolve()
+    path = folder.parent / f"{folder.name}.partial.json"
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def begun(made: Plan, out: Path, source: Provenance, resume: bool) -> Partial:

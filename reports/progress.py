@@ -5,28 +5,84 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Event, Thread
+from time import monotonic
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 Step = Callable[[float, str], None]
 """Called with the share of all work that is done, 0 to 1, and what comes next."""
+Expect = Callable[[float], None]
+"""Called with the time, s, that the rest is expected to take."""
+PATIENCE = 1.0
+"""How long, s, one piece of work goes on before a bar appears."""
+
+
+def shown() -> bool:
+    """Return whether there is a terminal to show progress on."""
+    return sys.stderr.isatty()
 
 
 @contextmanager
 def progress() -> Iterator[Step]:
     """Yield the function to call before each step."""
-    if not sys.stderr.isatty():
+    if not shown():
         yield lambda share, what: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (
-        BarColumn(30),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with _bar() as bar:
         task = bar.add_task("", total=1.0)
         yield lambda share, what: bar.update(task, completed=share, description=what)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[Expect | None]:
+    """Show, if it takes long, that one piece of work goes on; yield the function to tell how long, None without a terminal."""
+    if not shown():
+        yield None
+        return
+    bar, done = _bar(), Event()
+    task = bar.add_task(what, total=None)
+
+    start = monotonic()
+
+    def expect(seconds: float) -> None:
+        # Compiled code keeps the interpreter locked, and the bar standing: so its text has the time as well.
+        bar.update(task, total=monotonic() - start + seconds, description=f"{what}, about {seconds:.0f} s")
+        if seconds > PATIENCE:
+            bar.start()
+
+    def tick() -> None:
+        while not done.wait(0.1):
+            if monotonic() - start > PATIENCE:
+                bar.start()
+            bar.update(task, completed=monotonic() - start)
+
+    ticking = Thread(target=tick, daemon=True)
+    ticking.start()
+    try:
+        yield expect
+    finally:
+        done.set()
+        ticking.join()
+        bar.stop()
+
+
+def _bar() -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.table import Column
+
+    # Numbers keep their width where the terminal is narrow; bar and text share what is left.
+    return Progress(
+        BarColumn(None, table_column=Column(ratio=1)),
+        TaskProgressColumn(table_column=Column(min_width=4, no_wrap=True)),
+        TimeElapsedColumn(table_column=Column(min_width=7, no_wrap=True)),
+        TextColumn("left"),
+        TimeRemainingColumn(table_column=Column(min_width=7, no_wrap=True)),
+        TextColumn("{task.description}", table_column=Column(ratio=2, no_wrap=True, overflow="ellipsis")),
+        console=Console(stderr=True),
+        transient=True,
+        expand=True,
+    )

@@ -4,29 +4,48 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Iterable
 from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from io import StringIO
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from benchmarks.errors import relative_drift
+from benchmarks.timing import elapsed
 from conservative import registry
 from conservative.attitude import orthonormality
+from conservative.errors import BadInput
 from conservative.invariants import Invariant
-from conservative.method import Method, grid_for, integrate, require_support
+from conservative.method import Grid, Method, grid_for, integrate, require_support
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from .output import text_file
+from .progress import Expect
+
+TRIAL = 100
+"""Part of the steps of a run, as a divisor, that is run before it to tell how long it takes."""
+SAMPLES = 1_000_000
+"""Samples that are kept at most; every step is one in runs of no more steps."""
+STEPS = 10**11
+"""Steps that are taken at most: a day's work of a fast method."""
 
 
-def run(scene_name: str, method_name: str, dt: float | None, t_end: float | None, samples: Path | None) -> dict[str, Any]:
-    """Integrate and return the summary; the samples go to the file `samples` if there is one.
+def run(
+    scene_name: str,
+    method_name: str,
+    dt: float | None,
+    t_end: float | None,
+    samples: Path | None,
+    expect: Expect | None = None,
+) -> dict[str, Any]:
+    """Integrate and return the summary; samples go to the file `samples` if there is one; `expect` is told how long it takes.
 
     Raises
     ------
@@ -36,20 +55,39 @@ def run(scene_name: str, method_name: str, dt: float | None, t_end: float | None
         The method's engine is not installed.
     """
     scene, method = registry.scene(scene_name), registry.method(method_name)
-    step = scene.dt if dt is None else dt
-    _check(scene, method, step, t_end)
-    assert step is not None  # a scene always has one
+    grid = _grid(scene, method, scene.dt if dt is None else dt, t_end)
     with text_file(samples, "csv") if samples else nullcontext() as stream:
-        trajectory = integrate(scene, step, method, t_end, on_failure="return")
-        if stream is not None:
-            write_samples(trajectory, stream)
-    return summary_of(trajectory, method, step)
+        if expect is not None:
+            _trial(scene, method, grid, stream is not None, expect)
+        return _done(scene, method, grid, stream)
 
 
-def _check(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> None:
-    """Find what `integrate` would refuse before a file is opened."""
-    grid_for(scene, dt, t_end)
+def _grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
+    """Return the steps and samples, or find what `integrate` would refuse before a file is opened."""
+    try:
+        grid = grid_for(scene, dt, t_end)
+    except OverflowError:  # more steps than a float can count
+        grid = Grid(dt or 0.0, STEPS + 1)
     require_support(method, scene)
+    if grid.n_steps > STEPS:
+        raise BadInput("dt", f"{grid.dt:g}, for more than {STEPS:.0e} steps", "a longer step, or a shorter run (--t-end)")
+    return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
+
+
+def _done(scene: Scene, method: Method, grid: Grid, stream: IO[str] | None) -> dict[str, Any]:
+    duration = grid.dt * grid.n_steps
+    trajectory = integrate(scene, grid.dt, method, duration, grid.every, on_failure="return")
+    if stream is not None:
+        write_samples(trajectory, stream)
+    return summary_of(trajectory, method, grid.dt)
+
+
+def _trial(scene: Scene, method: Method, grid: Grid, written: bool, expect: Expect) -> None:
+    """Do the first of `TRIAL` parts, and again once it is compiled, to tell how long all take; of few steps say nothing."""
+    if grid.n_steps >= TRIAL:
+        part = replace(grid, n_steps=grid.n_steps // TRIAL)
+        _done(scene, method, part, None)
+        expect(TRIAL * elapsed(lambda: _done(scene, method, part, StringIO() if written else None)))
 
 
 def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:

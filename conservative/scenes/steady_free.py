@@ -1,9 +1,9 @@
 """Free bodies whose formulas degenerate: symmetric, spherical and planar ones, and spins about a principal axis.
 
-symmetric   J1 = J2: the axis precesses about the momentum at |L|/J1, the body turns about it at (1/J3 - 1/J1) L3
-spherical   the rates are constant in body and world
-planar      J1 + J2 = J3, as any plate has it: w1^2 + w2^2 is constant
-axis spin   the rates are constant, about whichever principal axis
+* symmetric, J1 = J2: the axis precesses about the momentum at |L|/J1, the body turns about it at (1/J3 - 1/J1) L3
+* spherical: the rates are constant in body and world
+* planar, J1 + J2 = J3, as any plate has it: w1^2 + w2^2 is constant
+* axis spin: the rates are constant, about whichever principal axis
 """
 
 from __future__ import annotations

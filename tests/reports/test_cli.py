@@ -2,11 +2,14 @@ import csv
 import json
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from benchmarks import results
+from benchmarks.results import Row
 from reports.cli import main
 
 
@@ -62,6 +65,16 @@ def test_run_writes_samples(tmp_path):
     assert abs(float(rows[-1]["energy"]) / float(rows[0]["energy"]) - 1) < 1e-13  # measured 3e-15
 
 
+def test_a_run_of_many_steps_keeps_a_limited_number_of_samples(tmp_path, monkeypatch):
+    monkeypatch.setattr("reports.single.SAMPLES", 100)
+    path = tmp_path / "run.csv"
+    summary = json.loads(conservative("run", "brick_flip", "--dt", "0.007", "--csv", path, "--json").stdout)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert summary["counters"]["steps"] == 858
+    assert len(rows) == 97  # every ninth step, the start and the end
+    assert float(rows[-1]["t"]) == pytest.approx(858 * 0.007, rel=1e-14)  # measured 0
+
+
 def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
     path = tmp_path / "run.csv"
     done = conservative("run", "lagrange_top", "-m", "convected:1e-300", "--t-end", "0.1", "--csv", path)
@@ -82,6 +95,9 @@ def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
         (["brick_flip", "--dt", "0"], ["dt: got 0.0", "above 0"]),
         (["brick_flip", "--dt", "nan"], ["dt: got nan", "above 0"]),
         (["brick_flip", "--dt", "7"], ["dt: got 7", "at most t_end = 6"]),
+        (["brick_flip", "--dt", "1e-15"], ["dt: got 1e-15, for more than 1e+11 steps", "--t-end"]),
+        (["brick_flip", "--dt", "1e-300"], ["dt: got 1e-300", "a longer step"]),
+        (["brick_flip", "--dt", "5e-324"], ["dt: got 4.94066e-324", "a longer step"]),
         (["brick_flip", "--t-end", "-1"], ["t_end: got -1.0", "above 0"]),
         (["brick_flip", "--csv", "missing/run.csv"], ["csv: got 'missing/run.csv'", "a folder that exists"]),
     ],
@@ -146,11 +162,60 @@ def test_missing_engine_is_listed_with_its_install_line(monkeypatch):
     assert "pip install some-package" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "offered"), [("run bri", "brick_flip"), ("run brick_flip --method re", "reduced"), ("l", "list")]
-)
-def test_completion_offers_names(words, offered):
-    environment = {"_CONSERVATIVE_COMPLETE": "bash_complete", "COMP_WORDS": f"conservative {words}"}
-    environment["COMP_CWORD"] = str(len(words.split()))
-    done = CliRunner().invoke(main, [], env=environment, prog_name="conservative")
-    assert f"plain,{offered}" in done.stdout.splitlines()
+@pytest.mark.parametrize("command", list(main.commands))
+def test_every_command_speaks_json(command):
+    assert "--json" in {name for parameter in main.commands[command].params for name in parameter.opts}
+
+
+def test_new_as_json_tells_a_program_what_a_scene_file_has():
+    told = json.loads(conservative("new", "--json").stdout)
+    assert tomllib.loads(told["text"]) == tomllib.loads(conservative("new").stdout)
+    keys = {entry["key"]: entry for entry in told["keys"]}
+    assert keys["t_end"]["value"] == 2.0
+    assert keys["t_end"]["meaning"] == "duration, s"
+    assert keys["start.R_WB.angle"]["value"] == pytest.approx(1.0471975511965976, abs=1e-15)  # measured 0
+    assert all(entry["meaning"] for entry in keys.values())
+    assert told["text"].splitlines()[keys["body.shape"]["line"] - 1].startswith("shape = ")
+    assert told["choices"]["shape"]["cone"] == ["radius", "height", "mass", "density"]
+
+
+@pytest.mark.parametrize("table", ["shape", "kind"])
+def test_choices_are_what_a_scene_file_takes(table, tmp_path):
+    choices = json.loads(conservative("new", "--json").stdout)["choices"][table]
+    for name, keys in choices.items():
+        path = tmp_path / f"{name}.toml"
+        body = f'[body]\nshape = "{name}"\nbad = 1' if table == "shape" else "[body]\ninertia = [1, 2, 2.5]"
+        potential = f'[potential]\nkind = "{name}"\nbad = 1\n' if table == "kind" else ""
+        path.write_text(f"t_end = 1.0\n{body}\n{potential}[start]\nw_WB_B = [0, 0, 1]\n")
+        allowed = conservative("run", path).stderr.partition("one of ")[2].strip().split(", ")
+        assert set(keys) == set(allowed) - {"shape", "kind", "com_B" if table == "shape" else "", "R_BS"}
+
+
+@pytest.fixture
+def gated(tmp_path, monkeypatch):
+    """A folder with a baseline of one row, and results in which an error became larger."""
+    monkeypatch.chdir(tmp_path)
+    before, after = (Row("id", "brick_flip", "reduced", "passed", values={"attitude error max": v}) for v in (1e-3, 2e-3))
+    for name, row in (("before.json", before), ("after.json", after)):
+        results.write(results.Results("a machine", {"id": row}, "a commit"), tmp_path / name)
+    return conservative("gate", "before.json", "--baseline", "kept.json", "--update", "First", "--json")
+
+
+def test_gate_as_json_has_the_violations(gated):
+    done = conservative("gate", "after.json", "--baseline", "kept.json", "--json")
+    assert done.exit_code == 1
+    (verdict,) = json.loads(done.stdout)["verdicts"]
+    assert not verdict["passed"]
+    (violation,) = verdict["violations"]
+    assert (violation["measure"], violation["scene"], violation["method"]) == ("attitude error max", "brick_flip", "reduced")
+    assert (violation["was"], violation["now"]) == ("0.001", "0.002")
+    passed = conservative("gate", "before.json", "--baseline", "kept.json", "--json")
+    assert passed.exit_code == 0
+    assert json.loads(passed.stdout)["passed"]
+
+
+def test_update_as_json_has_the_entry_of_the_history(gated):
+    told = json.loads(gated.stdout)
+    assert gated.exit_code == 0
+    assert (told["baseline"], told["rows"]) == ("kept.json", 1)
+    assert (told["entry"]["reason"], told["entry"]["added"]) == ("First", ["id"])

@@ -55,6 +55,32 @@ def test_earlier_report_goes_and_a_persons_notes_stay(tmp_path):
     assert tree(tmp_path) == ["report"]
 
 
+def test_a_link_to_a_folder_stays_one(tmp_path):
+    (tmp_path / "report").symlink_to(tmp_path / "disk" / "real")
+    for name in ("a.svg", "b.svg"):
+        with report_folder(tmp_path / "report") as fresh:
+            write_report(fresh, name)
+        assert tree(tmp_path / "disk" / "real") == [name, MANIFEST]
+    assert (tmp_path / "report").is_symlink()
+    assert tree(tmp_path) == ["disk", "report"]
+
+
+def test_a_persons_file_outlives_a_swap_that_fails(tmp_path):
+    target = tmp_path / "report"
+    with report_folder(target) as fresh:
+        write_report(fresh, "a.svg")
+    (target / "notes.txt").write_text("mine")
+
+    def in_the_way():
+        with report_folder(target) as fresh:
+            write_report(fresh, "b.svg")
+            (fresh / "notes.txt").mkdir()
+
+    with pytest.raises(OSError, match=r"notes\.txt"):
+        in_the_way()
+    assert [path.read_text() for path in tmp_path.rglob("notes.txt") if path.is_file()] == ["mine"]
+
+
 def test_empty_folder_is_taken(tmp_path):
     with report_folder(tmp_path / ".") as fresh:
         write_report(fresh)

@@ -159,8 +159,18 @@ def test_failure_of_ours_is_told(monkeypatch):
 
 
 def test_names_with_settings_are_kept_together():
-    assert _listed(("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
-    assert _listed(()) == []
+    assert _listed("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
+    assert _listed("methods", ()) == []
+
+
+@pytest.mark.parametrize("option", ["--scenes", "--methods"])
+@pytest.mark.parametrize("value", ["", ",", " , "])
+def test_an_option_that_names_nothing_does_not_mean_everything(option, value, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["report", option, value])
+    assert done.exit_code == 2
+    assert f"Invalid value for {option}: it names nothing" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_colours_belong_to_families_whatever_else_is_drawn():

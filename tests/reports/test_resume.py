@@ -16,7 +16,7 @@ from benchmarks.measurement import Measurement
 from conservative import BadInput
 from reports import document, partial
 from reports.cli import main
-from reports.interrupts import Terminated, terminable, unstoppable
+from reports.interrupts import Terminated, interruptible, unstoppable
 from reports.provenance import provenance
 
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
@@ -237,9 +237,44 @@ def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
 
 def test_sigterm_is_an_interrupt_only_inside():
     before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(Terminated), terminable():
+    with pytest.raises(Terminated), interruptible(signal.SIGTERM):
         signal.raise_signal(signal.SIGTERM)
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+def lost(number):
+    try:
+        signal.raise_signal(number)
+    except BaseException as error:
+        other = SystemError("what numba makes of it while it loads compiled code")
+        other.add_note("kept")
+        raise other from error
+
+
+@pytest.mark.parametrize(("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated)])
+def test_an_interrupt_is_not_lost_in_another_exception(number, kind):
+    with pytest.raises(kind) as caught, interruptible(number):
+        lost(number)
+    assert caught.value.__notes__ == ["kept"]
+
+
+def test_what_is_ignored_stays_ignored():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with interruptible(signal.SIGINT):
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])
+def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    found = (here / partial.path_for(Path(out))).resolve()
+    folder = (here / out).resolve()
+    assert found == folder.parent / f"{folder.name}.partial.json"
 
 
 def test_interrupts_wait_outside_of_what_belongs_together():

@@ -1,0 +1,69 @@
+import os
+import pty
+import re
+import subprocess
+import sys
+
+import pytest
+
+from reports import progress
+
+STEPS = """
+from time import sleep
+from reports.progress import progress
+with progress() as step:
+    for k in range(8):
+        step(k / 8, "a study: a scene, with a long name")
+        sleep(0.2)
+"""
+SLOW = """
+from time import sleep
+from reports.progress import waiting
+with waiting("a scene: a method") as expect:
+    expect(4.0)
+    sleep(1.5)
+"""
+FAST = SLOW.replace("4.0", "0.1").replace("1.5", "0.2")
+
+
+def on_a_terminal(code, columns=80):
+    """Return what a program writes to a terminal of that width."""
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "COLUMNS": str(columns), "TERM": "xterm-256color"}
+    process = subprocess.Popen([sys.executable, "-c", code], stderr=theirs, stdout=theirs, env=environment)
+    os.close(theirs)
+    found = b""
+    while True:
+        try:
+            read = os.read(ours, 4096)
+        except OSError:  # what Linux says when the other end is closed
+            break
+        if not read:
+            break
+        found += read
+    os.close(ours)
+    assert process.wait() == 0
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", found.decode())
+
+
+@pytest.mark.parametrize("columns", [50, 80, 140])
+def test_a_terminal_shows_share_time_spent_and_time_left(columns):
+    lines = re.split(r"[\r\n]+", on_a_terminal(STEPS, columns))
+    assert any(re.search(r" \d\d% 0:00:\d\d left 0:00:\d\d a study", line) for line in lines), lines
+    assert max(map(len, lines)) <= columns
+
+
+def test_a_single_piece_of_work_shows_how_long_it_is_expected_to_take():
+    assert re.search(r"\d\d% 0:00:01 left 0:00:0[23] a scene: a method, about 4 s", on_a_terminal(SLOW))
+
+
+def test_what_takes_no_time_shows_nothing():
+    assert on_a_terminal(FAST).strip() == ""
+
+
+def test_elsewhere_there_is_nothing(capsys):
+    with progress.progress() as step:
+        step(0.5, "a study")
+    with progress.waiting("a scene") as expect:
+        assert expect is None
+    assert capsys.readouterr() == ("", "")
