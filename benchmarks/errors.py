@@ -8,7 +8,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between, orthonormality
 from conservative.errors import BadInput
-from conservative.invariants import Invariant
+from conservative.invariants import sizes
 from conservative.potential import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -66,8 +66,8 @@ def drifts(trajectory: Trajectory) -> list[Value]:
     """Return the measures that need no truth: drift of each invariant of the scene, and orthonormality."""
     found: list[Value] = []
     for invariant in trajectory.scene.invariants:
-        relative = relative_drift(trajectory, invariant)
-        size = np.abs(relative) if relative.ndim == 1 else np.linalg.norm(relative, axis=-1)
+        relative = trajectory.drift(invariant)
+        size = sizes(relative)
         slope = secular_slope(trajectory.t, relative)
         found += [
             (f"{invariant.name} drift max", float(size.max()), "1"),
@@ -82,13 +82,6 @@ def names(scene: Scene) -> list[tuple[str, str]]:
     """Return (measure, unit) of all that `measure` finds for a scene: what a run that failed has no values of."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
     return [(name, unit) for name, _, unit in measure(start, start)]
-
-
-def relative_drift(trajectory: Trajectory, invariant: Invariant) -> Array:
-    """Return (I - I0) / scale, (n,) or (n, 3), with I0 from the scene's start and not from what a method made of it."""
-    scene = trajectory.scene
-    start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
-    return np.asarray((invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B) - start) / invariant.scale)
 
 
 def secular_slope(t: Array, drift: Array) -> Slope:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.invariants import sizes
 from conservative.trajectory import Trajectory
 
-from .errors import relative_drift, secular_slope
+from .errors import secular_slope
 
 TREND = 0.5
 """Share of the largest drift that a straight line must explain for the drift to count as one that goes on."""
@@ -51,8 +52,8 @@ def drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
     """Return the drift of every invariant of a run, and what to expect of it over `duration` s."""
     found = []
     for invariant in trajectory.scene.invariants:
-        relative = relative_drift(trajectory, invariant)
-        largest = float(np.linalg.norm(relative.reshape(len(trajectory), -1), axis=1).max())
+        relative = trajectory.drift(invariant)
+        largest = float(sizes(relative).max())
         slope, stderr = secular_slope(trajectory.t, relative)
         length = float(trajectory.t[-1])
         secular = abs(slope) > SIGNIFICANT * stderr and abs(slope) * length > TREND * largest

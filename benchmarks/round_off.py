@@ -22,8 +22,6 @@ from conservative.errors import BadInput
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
-from .errors import relative_drift
-
 BLOCKS = 64
 """Equal parts of a run between which drifts are read."""
 SPREAD = 1e-3
@@ -126,7 +124,7 @@ def drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -> dict[s
         if trajectory.failure is not None:
             raise trajectory.failure
         for invariant in scene.invariants:
-            relative = relative_drift(trajectory, invariant)
+            relative = trajectory.drift(invariant)
             start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])[0]
             along = relative if relative.ndim == 1 else relative @ (start / np.linalg.norm(start))
             found.setdefault(invariant.name, []).append((along - along[0])[: BLOCKS + 1])

@@ -31,7 +31,6 @@ from conservative.scene import Scene
 from conservative.trajectory import OK, Trajectory
 
 from .cases import ENGINE_ERROR, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
-from .errors import relative_drift
 from .measurement import Measurement
 from .patience import TooLong, within
 from .selection import Missing
@@ -146,7 +145,7 @@ def diverged(done: Done) -> Failed | None:
     trajectory = done.trajectory
     energy = next(invariant for invariant in trajectory.scene.invariants if invariant.name == "energy")
     with np.errstate(over="ignore", invalid="ignore"):
-        off = ~(np.abs(relative_drift(trajectory, energy)) <= 1.0)
+        off = ~(np.abs(trajectory.drift(energy)) <= 1.0)
     if not off.any():
         return None
     return Failed(Diverged(float(trajectory.t[int(np.argmax(off))]), "energy").status.replace("diverged after t", DIVERGED))

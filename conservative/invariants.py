@@ -31,6 +31,11 @@ class Invariant:
     evaluate: Callable[[Array, Array], Array]
 
 
+def sizes(drift: Array) -> Array:
+    """Return |x| of each of n values (n,), and of vectors (n, 3) their lengths (n,)."""
+    return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
+
+
 def energy(body: RigidBody, potential: Potential | None, R_WB: Array, w_WB_B: Array) -> Array:
     """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3) and rates (..., 3), rad/s, body axes."""
     kinetic = np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .errors import BadInput, MissingEngine
+from .invariants import sizes
 
 if TYPE_CHECKING:
     import altair
     import pandas
 
     from .attitude import Array
-    from .invariants import Invariant
     from .trajectory import Trajectory
 
 COLUMNS = (
@@ -39,14 +39,6 @@ def samples(trajectory: Trajectory) -> Array:
     """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
     return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
-
-
-def drift(trajectory: Trajectory, invariant: Invariant) -> Array:
-    """Return the change (n,) of an invariant since the scene's start, relative to its scale; of a vector its length."""
-    scene = trajectory.scene
-    start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
-    change = (invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B) - start) / invariant.scale
-    return np.abs(change) if change.ndim == 1 else np.linalg.norm(change, axis=-1)
 
 
 def table(trajectory: Trajectory) -> pandas.DataFrame:
@@ -84,7 +76,7 @@ def picture(trajectory: Trajectory) -> altair.VConcatChart:
         raise BadInput("trajectory", repr(trajectory), "one with a sample or more")
     rates = {f"about axis {number}": rate for number, rate in enumerate(trajectory.w_WB_B.T, start=1)}
     drifts = {
-        invariant.name: np.maximum(drift(trajectory, invariant), LEAST_DRAWN) for invariant in trajectory.scene.invariants
+        invariant.name: np.maximum(sizes(trajectory.drift(invariant)), LEAST_DRAWN) for invariant in trajectory.scene.invariants
     }
     title = alt.Title(trajectory.scene.name, subtitle=[trajectory.label, trajectory.status])
     rows = [
@@ -134,7 +126,7 @@ def card(trajectory: Trajectory) -> str:
         ("samples", f"{len(trajectory)} to {end}"),
         ("work", ", ".join(work)),
         *(
-            (f"drift of {i.name}", f"{drift(trajectory, i).max(initial=0.0):.2e} (relative)")
+            (f"drift of {i.name}", f"{sizes(trajectory.drift(i)).max(initial=0.0):.2e} (relative)")
             for i in trajectory.scene.invariants
         ),
     ]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas
 
     from .chooser import Choice
+    from .invariants import Invariant
 
 OK = "ok"
 
@@ -87,6 +88,14 @@ class Trajectory:
     def momentum_W(self) -> Array:
         """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
+
+    def drift(self, invariant: Invariant) -> Array:
+        """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
+
+        `conservative.invariants.sizes` makes sizes of it, of a vector its length.
+        """
+        start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
+        return np.asarray((invariant.evaluate(self.R_WB, self.w_WB_B) - start) / invariant.scale)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row for each sample: t, R_WB (by rows), w_WB_B, energy, momentum_W; units as above.

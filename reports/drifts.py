@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.cases import Case, Failed, attempt
-from benchmarks.errors import drifts, relative_drift
+from benchmarks.errors import drifts
 from benchmarks.measurement import Measurement
 from conservative.attitude import Array, orthonormality
+from conservative.invariants import sizes
 from conservative.method import Method, grid_for
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -48,14 +49,14 @@ def measured(case: Case, skip_missing: bool) -> tuple[list[Measurement], pd.Data
 
 def samples(trajectory: Trajectory, method: str) -> pd.DataFrame:
     """Return the picture of a run."""
-    kinds = {invariant.name: relative_drift(trajectory, invariant) for invariant in trajectory.scene.invariants}
+    kinds = {invariant.name: trajectory.drift(invariant) for invariant in trajectory.scene.invariants}
     kinds["orthonormality"] = orthonormality(trajectory.R_WB)
     return pd.concat([_largest_so_far(trajectory, kind, values, method) for kind, values in kinds.items()], ignore_index=True)
 
 
 def _largest_so_far(trajectory: Trajectory, kind: str, drift: Array, method: str) -> pd.DataFrame:
     t = trajectory.t
-    size = np.maximum.accumulate(np.linalg.norm(drift.reshape(len(t), -1), axis=1))
+    size = np.maximum.accumulate(sizes(drift))
     kept = np.unique(np.linspace(0, len(t) - 1, KEPT).round().astype(int))[1:]
     return pd.DataFrame(
         {

@@ -12,14 +12,11 @@ from io import StringIO
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
-from benchmarks.errors import relative_drift
 from benchmarks.timing import elapsed
 from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.errors import BadInput
-from conservative.invariants import Invariant
+from conservative.invariants import Invariant, sizes
 from conservative.method import Grid, Method, grid_for, integrate, require_support
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
@@ -109,8 +106,7 @@ def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, A
 
 def _drift(trajectory: Trajectory, invariant: Invariant) -> float:
     """Return the largest change of an invariant, relative to its scale."""
-    change = relative_drift(trajectory, invariant).reshape(len(trajectory), -1)
-    return float(np.linalg.norm(change, axis=1).max(initial=0.0))
+    return float(sizes(trajectory.drift(invariant)).max(initial=0.0))
 
 
 def _last(trajectory: Trajectory) -> dict[str, Any] | None:

@@ -89,9 +89,9 @@ def test_what_round_off_forbids_is_a_warning():
     assert not trajectory.choice.reached
 
 
-def test_other_fields_get_a_composition():
+def test_other_fields_get_the_explicit_method():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         scene = cv.scenes.brick_flip()
         held = cv.Scene("held", scene.body, scene.R_WB0, scene.w_WB_B0, 0.5, cv.LinearSpring(50.0, (0.3, 0.1, 0), (1, 1, 0)))
-        assert cv.integrate(held, error=1e-6).choice.method.family == "reduced"
+        assert cv.integrate(held, error=1e-6).choice.method.family == "projected"
