@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from .attitude import triple
+from .compiled import kernels
 from .errors import NotConverged
 from .explicit import DORMAND_PRINCE_8
 from .method import Grid, Method, Run
@@ -49,9 +50,7 @@ class Projected(Method):
         return "it is for bodies in a field" if scene.free else None
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from .kernels.projected import march
-
-        start = principal_start(scene)
+        march, start = kernels("projected").march, principal_start(scene)
         model = (start.J_inverse, start.field, field_axis(scene), invariant_scales(scene))
         coefficients, stages = DORMAND_PRINCE_8.packed, len(DORMAND_PRINCE_8.b)
 
