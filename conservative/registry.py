@@ -40,7 +40,8 @@ def registered(group: str) -> dict[str, EntryPoint]:
 def _load(group: str, argument: str, name: str) -> Any:
     known = registered(group)
     if name not in known:
-        raise BadInput(argument, repr(name), nearest(name, known))
+        files = ", or a file whose name ends with .toml" if group == SCENES else ""
+        raise BadInput(argument, repr(name), nearest(name, known) + files)
     return known[name].load()
 
 
