@@ -12,7 +12,7 @@ import numpy as np
 from .attitude import Array, from_quaternion, triple
 from .check import choice, positive_integer
 from .compiled import kernels
-from .errors import BadInput, NotConverged
+from .errors import BadInput, branch_ended
 from .frames import FRAMES, Frame, frame_unsupported, in_frame
 from .method import Grid, Method, Run
 from .potential import UniformGravity
@@ -30,6 +30,9 @@ class Gauss(Method):
     closed system with quadratic invariants only, and collocation at Gauss points keeps all of those (Hairer, Lubich & Wanner,
     IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
     the implicit midpoint rule.
+
+    Steps of a radian and more are solved on the branch that leads to them continuously from a step of 0; where that ends before,
+    the run fails: `WrongBranch` if there is a solution elsewhere, else `NotConverged`.
 
     Parameters
     ----------
@@ -80,8 +83,8 @@ class Gauss(Method):
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, work, change = march(self.stages, *coefficients, grid.dt, grid.n_steps, grid.every, *system, q, L)
-            failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, change)
+            done, work, size, elsewhere = march(self.stages, *coefficients, grid.dt, grid.n_steps, grid.every, *system, q, L)
+            failure = None if done == grid.n_steps else branch_ended(done + 1, done * grid.dt, size, elsewhere)
             counters = Counters(steps=done, stages=done * self.stages, iterations=work)
             return start.trajectory(label, grid, done, q, L, counters, failure)
 

@@ -12,15 +12,12 @@ from .attitude import Array
 from .check import choice, positive_number
 from .compiled import kernels
 from .composition import BEST, composition_of
-from .errors import NotConverged, WrongBranch
+from .errors import branch_ended
 from .frames import FRAMES, Frame, frame_unsupported, in_frame
 from .method import Grid, Method, Run
 from .principal import principal_start
 from .scene import Scene
 from .trajectory import Counters, Trajectory
-
-NO_SOLUTION = "no continuous solution"
-"""Why a step fails: what the state leads to continuously, as the step grows from 0, ends before the whole step."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +90,7 @@ class Reduced(Method):
             done, corrections, size, elsewhere = march(
                 stages, grid.n_steps, grid.every, start.J, start.J_inverse, start.field, self.tol, start.q, start.L, q, L
             )
-            failed = WrongBranch if elsewhere else NotConverged
-            failure = None if done == grid.n_steps else failed(done + 1, done * grid.dt, size, NO_SOLUTION)
+            failure = None if done == grid.n_steps else branch_ended(done + 1, done * grid.dt, size, elsewhere)
             work = Counters(steps=done, stages=done * len(stages), iterations=corrections)
             return start.trajectory(label, grid, done, q, L, work, failure)
 

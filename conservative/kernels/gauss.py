@@ -31,6 +31,10 @@ ROUND_OFF = 2e-17
 STAGNATION = 2e-15
 SLOWEST = 0.8
 """Pairs of sweeps that gain less than this are left for Newton, whose step costs as much as a hundred sweeps."""
+FEW, NEAR = 6, 0.25
+"""Corrections of Newton's method that a guess near the solution needs at most, and how near that is, L being of size one."""
+SHORTEST_PART = 2.0**-14
+"""Part of a step below which the continuous branch of its solution must have ended."""
 LONGEST = 2.0**64
 """Length up to which a quaternion is let grow; dividing by it then rounds nothing."""
 
@@ -105,7 +109,10 @@ def swept(A, s, h, J_inverse, c, U, F, D, Z):
 
 @kernel
 def newton(A, s, h, J_inverse, c, U, F, D, Z):
-    """Solve the same equations by Newton from an explicit Euler guess; return (iterations, last change, success)."""
+    """Solve the same equations by Newton from the D and Z given; return (iterations, last change, success, branch).
+
+    The last is whether the determinant of the tangent is positive: it is for h = 0, and zero where the continuous branch ends.
+    """
     width = Z.shape[0] // 6
     states, slopes, increments, matrix = (
         Z.reshape((6, width)),
@@ -137,9 +144,55 @@ def newton(A, s, h, J_inverse, c, U, F, D, Z):
                 states[k, j] = U[k] + increments[k, j]
                 change = max(change, abs(correction[6 * j + k]))
         if change * change <= ROUND_OFF or (change >= before and change < 1e-12):
-            return iteration, change, True
+            return iteration, change, True, np.linalg.slogdet(tangent)[0] > 0.0
         before = change
-    return MAX_NEWTON, before, False
+    return MAX_NEWTON, before, False, False
+
+
+@kernel
+def followed(A, s, h, J_inverse, c, U, F, D, Z):
+    """Solve by Newton along the branch D(h) from D(0) = 0, in parts of h as long as can be; return (iterations, size, success).
+
+    A part is trusted where its few corrections lead not far away from a guess in line with the last two. Where the branch ends
+    before h, the size is not of a correction but the residual of the whole step there.
+    """
+    found, before = np.zeros_like(D), np.zeros_like(D)
+    reached, earlier, part, work = 0.0, 0.0, 1.0, 0
+    while part >= SHORTEST_PART:
+        aim = min(reached + part, 1.0)
+        if reached > 0.0:
+            D[:] = found + (aim - reached) / (reached - earlier) * (found - before)
+            moved(U, D, Z)
+        else:
+            start(A, s, aim * h, J_inverse, c, U, F, D, Z)
+        guess = D.copy()
+        corrections, change, good, positive = newton(A, s, aim * h, J_inverse, c, U, F, D, Z)
+        work += corrections
+        if not (good and positive and corrections <= FEW and np.abs(D - guess).max() <= NEAR):
+            part *= 0.5
+        elif aim == 1.0:
+            return work, change, True
+        else:
+            before, found, earlier, reached, part = found, D.copy(), reached, aim, 2.0 * part
+    D[:] = found
+    moved(U, D, Z)
+    rates(J_inverse, c, Z, F)
+    return work, stages_from(A, s, h, F, U, D, Z), False
+
+
+@kernel
+def moved(U, D, Z):
+    """Z = U + D"""
+    width = Z.shape[0] // 6
+    for k in range(6):
+        Z[k * width : (k + 1) * width] = U[k] + D[k * width : (k + 1) * width]
+
+
+@kernel
+def any_solution(A, s, h, J_inverse, c, U, F, D, Z):
+    """Whether Newton's method from an explicit Euler guess ends at a solution of the equations, whichever."""
+    start(A, s, h, J_inverse, c, U, F, D, Z)
+    return newton(A, s, h, J_inverse, c, U, F, D, Z)[2]
 
 
 @kernel
@@ -247,8 +300,9 @@ def march(s, A, E, b, b_low, h, n_steps, every, unit_L, J_inverse, c, L0, gamma0
     """Take n_steps steps of h s and store attitude and momentum of every `every`-th and the last.
 
     L0 is in units of `unit_L`, gamma0 is where q0 has e_z, and `left` turns that to world axes. Returns (steps done, sweeps and
-    Newton corrections, size of the last change); steps done < n_steps means that the next one did not converge. Coefficients
-    come with their stages filled up with zeros to a multiple of four.
+    Newton corrections, size of the last change, False). Steps done < n_steps means that the next one has no solution on the
+    continuous branch; then the third is the residual where the branch ends, and the fourth whether there is one elsewhere.
+    Coefficients come with their stages filled up with zeros to a multiple of four.
     """
     width = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)
@@ -266,11 +320,10 @@ def march(s, A, E, b, b_low, h, n_steps, every, unit_L, J_inverse, c, L0, gamma0
         sweeps, change, good = swept(A, s, h, J_inverse, c, U, F, D, Z)
         work += sweeps
         if not good:
-            start(A, s, h, J_inverse, c, U, F, D, Z)
-            corrections, change, good = newton(A, s, h, J_inverse, c, U, F, D, Z)
+            corrections, change, good = followed(A, s, h, J_inverse, c, U, F, D, Z)
             work += corrections
             if not good:
-                return step - 1, work, change
+                return step - 1, work, change, any_solution(A, s, h, J_inverse, c, U, F, D, Z)
         rates(J_inverse, c, Z, F)
         a = middle(s, Z)
         size = math.sqrt(dot(a, a))
@@ -281,7 +334,7 @@ def march(s, A, E, b, b_low, h, n_steps, every, unit_L, J_inverse, c, L0, gamma0
         if step % every == 0 or step == n_steps:
             row += 1
             store(row, left, phi - phi_carry, q, gamma, unit_L, U, q_out, L_out)
-    return n_steps, work, change
+    return n_steps, work, change, False
 
 
 @kernel
