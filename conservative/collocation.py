@@ -31,8 +31,8 @@ class Gauss(Method):
     IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
     the implicit midpoint rule.
 
-    Steps of a radian and more are solved on the branch that leads to them continuously from a step of 0; where that ends before,
-    the run fails: `WrongBranch` if there is a solution elsewhere, else `NotConverged`.
+    Steps of a radian and more are solved on the branch that leads to them continuously from a step of 0; where that ends
+    before, the run fails: `WrongBranch` if there is a solution elsewhere, else `NotConverged`.
 
     Parameters
     ----------

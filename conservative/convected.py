@@ -49,7 +49,7 @@ class Convected(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "vertical momentum"})
+        return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from .kernels.convected import G, conjugate_momentum

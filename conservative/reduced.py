@@ -70,7 +70,7 @@ class Reduced(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        kept = frozenset({"momentum", "vertical momentum"})
+        kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
         return kept | {"energy"} if self.frame == "body" else kept
 
     def unsupported(self, scene: Scene) -> str | None:

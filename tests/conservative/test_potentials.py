@@ -94,6 +94,7 @@ def test_reduced_conserves_energy_and_momentum_along_the_axis(potential):
     trajectory = cv.integrate(scene_in(potential), 0.02)
     assert len(trajectory.scene.invariants) == (1 if potential.axis_W is None else 2)
     for invariant in trajectory.scene.invariants:
+        assert invariant.name in cv.Reduced().conserves & cv.Convected().conserves
         value = invariant.evaluate(trajectory.R_WB, trajectory.w_WB_B)
         assert np.abs(value - value[0]).max() < 1e-14 * invariant.scale  # measured 1e-15
 
