@@ -32,7 +32,7 @@ class Invariant:
 
 
 def sizes(drift: Array) -> Array:
-    """Return |x| of each of n values (n,), and of vectors (n, 3) their lengths (n,)."""
+    """Return |x| of each of n relative values (n,), and of vectors (n, 3) their lengths (n,): no unit."""
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
 
 

@@ -44,7 +44,7 @@ class Projected(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "vertical momentum"})
+        return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None
