@@ -115,8 +115,9 @@ def climb(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tup
             continue
         outcome = attempt(case, skip_missing)
         if isinstance(outcome, Done):
-            first = outcome.cost.first_call  # may include compilation, so only a short one is taken for the cost of a run
-            per_step = (first if first < longest / 4 else elapsed(outcome.run)) / case.grid.n_steps
+            # The very first call may include compilation, so that only a short one is taken for the cost of a run.
+            first = outcome.cost.first_call
+            per_step = (first if per_step or first < longest / 4 else elapsed(outcome.run)) / case.grid.n_steps
         yield case, outcome
 
 

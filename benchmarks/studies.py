@@ -75,17 +75,17 @@ class Study:
     @property
     def rounds(self) -> int:
         """Rounds of interleaved timing."""
-        return 4 if self.quick else 9
+        return 3 if self.quick else 9
 
     @property
     def timing_budget(self) -> float:
         """Time, s, for all rounds of one run; slow ones get fewer rounds."""
-        return 0.1 if self.quick else 1.0
+        return 0.06 if self.quick else 1.0
 
     @property
     def longest_run(self) -> float:
         """Time, s, of the longest single run that the study waits for on the way down a ladder of steps."""
-        return 0.25 if self.quick else 1.0
+        return 0.15 if self.quick else 1.0
 
     def __post_init__(self) -> None:
         choice("name", self.name, NAMES)
