@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Literal, NoReturn
 
 from conservative import registry
-from conservative.errors import MissingEngine
+from conservative.errors import MissingEngine, NotLoadable
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
@@ -90,10 +90,10 @@ def _named(name: str, skip_missing: bool) -> tuple[Method, ...]:
         if not skip_missing:
             raise
         return (Missing(name, error.engine, error.package),)
-    except ModuleNotFoundError as error:  # another package's method, registered but not whole
+    except NotLoadable as error:  # another package's method, registered but not whole
         if not skip_missing:
             raise
-        return (Missing(name, name, str(error.name)),)
+        return (Missing(name, name, error.place),)
 
 
 def tolerance_setting(method: Method) -> str | None:

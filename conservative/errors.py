@@ -19,6 +19,15 @@ class Unsupported(BadInput):
     """A method was asked for a scene that it cannot do."""
 
 
+class NotLoadable(BadInput):
+    """What a name is registered for cannot be imported. Attribute: `place`, what the entry point says."""
+
+    def __init__(self, argument: str, name: str, place: str, error: Exception) -> None:
+        self.place = place
+        got = f"{name!r}, registered as {place!r}, which cannot be loaded ({type(error).__name__}: {error})"
+        super().__init__(argument, got, "an entry point that names what is there")
+
+
 class MissingEngine(ImportError):
     """An engine is not installed; the message has the line that installs it."""
 

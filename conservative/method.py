@@ -90,8 +90,11 @@ class Method(ABC):
 
     @property
     def label(self) -> str:
-        """Return name and version of what computes, and the setting, such as `mujoco==4.0.0/RK4`."""
-        return f"conservative=={VERSION}/{self.name}"
+        """Return name and version of what computes, and the setting, such as `mujoco==4.0.0/RK4`.
+
+        By default that is the package the class is from, with its version where one of that name is installed.
+        """
+        return f"{_maker(type(self))}/{self.name}"
 
     @property
     @abstractmethod
@@ -133,6 +136,20 @@ class Method(ABC):
             dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
         """
         return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
+
+
+@lru_cache(maxsize=256)
+def _maker(kind: type) -> str:
+    """Return name and version of the package that a class is from."""
+    package = kind.__module__.partition(".")[0]
+    if package == __package__:
+        return f"{package}=={VERSION}"
+    from importlib import metadata
+
+    try:
+        return f"{package}=={metadata.version(package)}"
+    except metadata.PackageNotFoundError:
+        return package
 
 
 @lru_cache(maxsize=1024)
@@ -198,7 +215,7 @@ def integrate(
     else:
         method = _default() if method is None else method
         if not isinstance(method, Method):
-            raise BadInput("method", repr(method), "a Method, such as conservative.Reduced()")
+            raise BadInput("method", repr(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
         grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
         require_support(method, scene)
         trajectory = method.prepare(scene, grid)()

@@ -21,7 +21,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import BadInput, nearest
+from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
 
@@ -42,7 +42,13 @@ def _load(group: str, argument: str, name: str) -> Any:
     if name not in known:
         files = ", or a file whose name ends with .toml" if group == SCENES else ""
         raise BadInput(argument, repr(name), nearest(name, known) + files)
-    return known[name].load()
+    entry = known[name]
+    try:
+        return entry.load()
+    except MissingEngine:
+        raise
+    except Exception as error:
+        raise NotLoadable(argument, name, entry.value, error) from error
 
 
 def scene(text: str) -> Scene:
@@ -52,6 +58,8 @@ def scene(text: str) -> Scene:
     ------
     BadInput
         The name or a parameter is unknown, a value cannot be used, or the file (see `conservative.scene_file`) cannot.
+    NotLoadable
+        It is registered, but importing what is registered fails.
     """
     if text.endswith(".toml"):
         from .scene_file import load
@@ -68,12 +76,17 @@ def method(text: str) -> Method:
     Raises
     ------
     BadInput
-        The name or a setting is unknown, or a value cannot be used.
+        The name or a setting is unknown, a value cannot be used, or the class has another name than it is registered with.
+    NotLoadable
+        It is registered, but importing what is registered fails.
     MissingEngine
         The engine is not installed.
     """
     name, settings = _split(text)
     family: type[Method] = _load(METHODS, "method", name)
+    if getattr(family, "family", None) != name:
+        got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
+        raise BadInput("method", got, f"family = {name!r}: the name that is registered")
     return family(**_arguments(f"method {name}", family, settings))
 
 
@@ -105,6 +118,9 @@ def _arguments(argument: str, target: Callable[..., object], settings: list[str]
         if key not in parameters:
             raise BadInput(argument, repr(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
         found[key] = _value(value)
+        default = inspect.signature(target).parameters[key].default
+        if isinstance(default, int | float) and isinstance(found[key], str):
+            raise BadInput(argument, repr(item), f"{key}=a number, such as {default!r}, its default")
     return found
 
 

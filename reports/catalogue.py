@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 
 from conservative import registry
-from conservative.errors import MissingEngine
+from conservative.errors import BadInput, MissingEngine
 from conservative.method import Method
 
 
@@ -58,10 +58,9 @@ def methods() -> list[MethodEntry]:
 def _variants(name: str) -> list[MethodEntry]:
     try:
         return [_method(method) for method in registry.method(name).variants()]
-    except ImportError as missing:
-        # An engine that is not installed, or a registered package that cannot be imported: shown, never fatal for the list.
-        reason = str(missing) if isinstance(missing, MissingEngine) else f"{type(missing).__name__}: {missing}"
-        return [MethodEntry(name, "", "", None, (), False, reason)]
+    except (MissingEngine, BadInput) as missing:
+        # An engine that is not installed, or a registered package that is not whole: shown, never fatal for the list.
+        return [MethodEntry(name, "", "", None, (), False, str(missing))]
 
 
 def _method(method: Method) -> MethodEntry:

@@ -76,4 +76,4 @@ class Plan:
 def plan(scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False) -> Plan:
     """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
     chosen = selection.scenes(scenes) if scenes else selection.scenes()
-    return Plan(chosen, selection.methods(methods or None), quick, skip_missing, png, hard=not (scenes or quick))
+    return Plan(chosen, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard=not (scenes or quick))

@@ -179,7 +179,7 @@ def _reason(study: str, detail: str) -> str:
 
 def truths(table: pd.DataFrame) -> Table:
     """Return how well the two independent truths agree, for each scene and step."""
-    rows = table[table["measure"] == "truth agreement"]
+    rows = table[table["measure"] == frontier.AGREEMENT]
     body = [[row["scene"], f"{row['dt']:g}", row["label"], number(row["value"])] for _, row in rows.iterrows()]
     return ["scene", "dt, s", "truths", "largest angle between them, rad"], body
 

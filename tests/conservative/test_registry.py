@@ -1,7 +1,10 @@
+from importlib.metadata import EntryPoint
+
 import pytest
 
 import conservative as cv
 from conservative import registry
+from conservative.errors import BadInput, NotLoadable
 
 
 @pytest.mark.parametrize("name", registry.registered(registry.SCENES))
@@ -36,3 +39,41 @@ def test_an_unknown_scene_is_answered_with_the_nearest(text, hint):
 def test_an_unknown_setting_is_answered_with_the_nearest():
     with pytest.raises(cv.BadInput, match=r"allowed: settings 'tol' \(nearest\)"):
         registry.method("reduced:toll=1")
+
+
+def with_entry(monkeypatch, name, value):
+    """Register one more method, as an installed package would."""
+    known = registry.registered(registry.METHODS) | {name: EntryPoint(name, value, registry.METHODS)}
+    monkeypatch.setattr(registry, "registered", lambda group: known)
+
+
+@pytest.mark.parametrize("value", ["conservative.body:Phantom", "conservative.nowhere:Phantom"])
+def test_an_entry_point_without_anything_behind_it_says_so(monkeypatch, value):
+    with_entry(monkeypatch, "phantom", value)
+    with pytest.raises(NotLoadable, match=f"'phantom', registered as '{value}', which cannot be loaded"):
+        registry.method("phantom")
+
+
+def test_a_method_is_registered_under_its_own_name(monkeypatch):
+    with_entry(monkeypatch, "shorter", "conservative.reduced:Reduced")
+    with pytest.raises(BadInput, match="class Reduced has family = 'reduced'; allowed: family = 'shorter'"):
+        registry.method("shorter")
+
+
+@pytest.mark.parametrize("text", ["heyoka:tol=small", "gauss:stages=two", "gauss:many"])
+def test_words_where_a_number_belongs_are_refused(text):
+    with pytest.raises(BadInput, match="a number, such as"):
+        registry.method(text)
+    with pytest.raises(BadInput, match="disturbance=a number, such as"):
+        registry.scene("brick_flip:disturbance=little")
+
+
+def test_the_label_names_the_package_that_a_method_is_from():
+    class Own(type(registry.method("reduced"))):
+        __module__ = "pytest.somewhere"
+
+    class Local(type(registry.method("reduced"))):
+        __module__ = "my_script"
+
+    assert Own().label == f"pytest=={pytest.__version__}/reduced"
+    assert Local().label == "my_script/reduced"

@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from benchmarks.measurement import Measurement
 from reports import frontier, verdict
 
 from .rows import point, table
@@ -33,6 +34,16 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
         *(["first", 2.0], ["first", 1.0]),
         *(["second", 3.0], ["second", 2.0], ["second", 1.5], ["second", 1.0]),
     ]
+
+
+def test_nothing_is_claimed_below_what_the_truth_is_known_to():
+    def agreement(label):
+        return [Measurement("paper", "made_up", "truth", label, "truth", 0.1, frontier.AGREEMENT, 1e-5, "rad", "ok", label)]
+
+    checked = frontier.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
+    assert [c.error for c in frontier.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
+    exact = frontier.points(table(*OURS, *ENGINE, agreement("references==0.1.0/exact and heyoka==7.13.2/precise")))
+    assert frontier.contests(exact)[-1].error == 1e-8
 
 
 def test_a_more_accurate_point_counts_for_a_larger_error():

@@ -135,6 +135,18 @@ def test_missing_engine_stops_the_plan_unless_it_is_skipped(monkeypatch):
     assert len(document.plan(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
 
 
+def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypatch):
+    def method(text, found=registry.method):
+        if text == "pinocchio":
+            raise MissingEngine("Pinocchio", "pin")
+        return found(text)
+
+    monkeypatch.setattr(registry, "method", method)
+    with pytest.raises(MissingEngine, match="pip install pin"):
+        document.plan(["brick_flip"], [])
+    assert "pinocchio" in [method.name for method in document.plan(["brick_flip"], [], skip_missing=True).methods]
+
+
 def test_failure_of_ours_is_told(monkeypatch):
     from benchmarks.measurement import Measurement, frame
 
