@@ -80,12 +80,12 @@ class Study:
     @property
     def timing_budget(self) -> float:
         """Time, s, for all rounds of one run; slow ones get fewer rounds."""
-        return 0.06 if self.quick else 1.0
+        return 0.06 if self.quick else 0.6
 
     @property
     def longest_run(self) -> float:
         """Time, s, of the longest single run that the study waits for on the way down a ladder of steps."""
-        return 0.15 if self.quick else 1.0
+        return 0.15 if self.quick else 0.6
 
     def __post_init__(self) -> None:
         choice("name", self.name, NAMES)

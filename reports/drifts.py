@@ -44,24 +44,24 @@ def measured(case: Case, skip_missing: bool) -> tuple[list[Measurement], pd.Data
         return case.blanks(names, outcome.status, outcome.detail), pd.DataFrame(columns=list(COLUMNS))
     detail = f"over {case.grid.t[-1]:g} s"
     rows = [case.row(*value, detail=detail) for value in drifts(outcome.trajectory)]
-    return rows, samples(outcome.trajectory, case.method.name)
+    return rows, samples(outcome.trajectory, shown(case.method.name, case.method.label))
 
 
-def samples(trajectory: Trajectory, method: str) -> pd.DataFrame:
-    """Return the picture of a run."""
+def samples(trajectory: Trajectory, series: str) -> pd.DataFrame:
+    """Return the picture of a run, a series by this name."""
     kinds = {invariant.name: trajectory.drift(invariant) for invariant in trajectory.scene.invariants}
     kinds["orthonormality"] = orthonormality(trajectory.R_WB)
-    return pd.concat([_largest_so_far(trajectory, kind, values, method) for kind, values in kinds.items()], ignore_index=True)
+    return pd.concat([_largest_so_far(trajectory, kind, values, series) for kind, values in kinds.items()], ignore_index=True)
 
 
-def _largest_so_far(trajectory: Trajectory, kind: str, drift: Array, method: str) -> pd.DataFrame:
+def _largest_so_far(trajectory: Trajectory, kind: str, drift: Array, series: str) -> pd.DataFrame:
     t = trajectory.t
     size = np.maximum.accumulate(sizes(drift))
     kept = np.unique(np.linspace(0, len(t) - 1, KEPT).round().astype(int))[1:]
     return pd.DataFrame(
         {
             "scene": trajectory.scene.name,
-            "series": shown(method, trajectory.label),
+            "series": series,
             "t": t[kept],
             "invariant": kind,
             "drift": size[kept],
