@@ -22,9 +22,9 @@ class Unsupported(BadInput):
 class NotLoadable(BadInput):
     """What a name is registered for cannot be imported. Attribute: `place`, what the entry point says."""
 
-    def __init__(self, argument: str, name: str, place: str, error: Exception) -> None:
+    def __init__(self, argument: str, name: str, place: str, cause: Exception) -> None:
         self.place = place
-        got = f"{name!r}, registered as {place!r}, which cannot be loaded ({type(error).__name__}: {error})"
+        got = f"{name!r}, registered as {place!r}, which cannot be loaded ({type(cause).__name__}: {cause})"
         super().__init__(argument, got, "an entry point that names what is there")
 
 

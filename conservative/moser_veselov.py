@@ -18,10 +18,12 @@ from .scene import Scene
 from .trajectory import Counters, Trajectory
 
 ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
-LONGEST = 1.5
-"""|w| dt at the start has to be below this, rad."""
+LONGEST, LONGEST_EXACT = 1.5, 6.0
+"""|w| dt at the start has to be below this, rad: with a series, which the equations of a DMV step bound, and with its sum."""
 FARTHEST = 0.2
-"""So has cn of half a step to be above this, which only moments that no mass distribution has (J1 + J2 < J3) can violate."""
+"""So has cn of half a step to be above this: at 0, after half a period of the polhode, the quaternion's form breaks down."""
+LONGEST_SHIFT = 2 * math.acos(FARTHEST)
+"""And below this nu dt, with nu the frequency of the polhode in its elliptic functions, cn is above that."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class MoserVeselov(Method):
     and |L| alone (Hairer & Vilmart 2006, J. Phys. A 39, 13225): order/2 terms of them give an even order, css = 1 and cdd = 0
     the original map of order 2 (Moser & Veselov 1991), and their sum, order "exact", leaves no truncation error at all.
     The step is taken in closed form: see `kernels/moser_veselov.py`. Nothing drifts, neither energy nor momentum nor
-    orthonormality: round-off shows in the phase only.
+    orthonormality: round-off shows in the phase only. The exact step can be longer than one whose Cayley vector is finite: its
+    quaternion goes on through the half turn where c is infinite.
 
     Parameters
     ----------
@@ -48,7 +51,7 @@ class MoserVeselov(Method):
     Raises
     ------
     BadInput
-        order is none of these; and on running: the step is too long, see `LONGEST` and `FARTHEST`.
+        order is none of these; and on running: the step is too long, see `longest_step`.
     """
 
     order: int | None = None
@@ -69,8 +72,7 @@ class MoserVeselov(Method):
         return None if scene.free else "it is for free bodies"
 
     def longest_step(self, scene: Scene) -> float:
-        speed = float(np.linalg.norm(scene.w_WB_B0))
-        return 0.99 * LONGEST / speed if speed > 0 else math.inf
+        return 0.99 * shortest_refused(scene, exact=self.order is None)
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
@@ -97,22 +99,39 @@ def calibrated(method: MoserVeselov, scene: Scene, dt: float) -> tuple[Principal
     BadInput
         dt is too long.
     """
-    require_short(scene, dt)
-    dmv, start = kernels("moser_veselov"), polhode_start(scene)
-    p = dmv.polhode(*start.J, *start.L)
+    require_short(scene, dt, exact=method.order is None)
+    dmv, start, p = kernels("moser_veselov"), polhode_start(scene), polhode(scene)
     step = dmv.exact_step(p, dt) if method.order is None else dmv.preprocessed_step(p, dt, method.order)
     if not (math.isfinite(step.r0) and step.C > FARTHEST):
         raise BadInput("dt", f"{dt:g}, for which {method.name} has no step", "a shorter step")
     return start, p, dmv.normalised(step)
 
 
-def require_short(scene: Scene, dt: float) -> None:
-    """Raise `BadInput` unless |w| dt is below `LONGEST` at the start; dt in s."""
+def require_short(scene: Scene, dt: float, exact: bool) -> None:
+    """Raise `BadInput` unless dt, s, is below `shortest_refused`."""
+    bound = shortest_refused(scene, exact)
+    if dt >= bound:
+        turn = float(np.linalg.norm(scene.w_WB_B0)) * dt
+        rule = f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"|w| dt < {LONGEST:g}"
+        raise BadInput("dt", f"{dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
+
+
+@lru_cache(maxsize=256)
+def shortest_refused(scene: Scene, exact: bool) -> float:
+    """Return the step, s, from which on steps are refused; infinite for a body at rest."""
     speed = float(np.linalg.norm(scene.w_WB_B0))
-    if speed * dt >= LONGEST:
-        raise BadInput(
-            "dt", f"{dt:g}, |w| dt = {speed * dt:.3g} rad", f"a step with |w| dt < {LONGEST:g}: below {LONGEST / speed:.6g} s"
-        )
+    if speed == 0:
+        return math.inf
+    if not exact:
+        return LONGEST / speed
+    nu = abs(polhode(scene).nu)
+    return min(LONGEST_EXACT / speed, LONGEST_SHIFT / nu if nu > 0 else math.inf)
+
+
+def polhode(scene: Scene) -> Any:
+    """Return the polhode of a scene along `polhode_axes`."""
+    start = polhode_start(scene)
+    return kernels("moser_veselov").polhode(*start.J, *start.L)
 
 
 def polhode_start(scene: Scene) -> PrincipalStart:

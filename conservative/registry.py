@@ -97,6 +97,8 @@ def body_file(kind: str) -> Callable[[Path, str], MassDistribution]:
     ------
     BadInput
         The kind is unknown.
+    NotLoadable
+        It is registered, but importing what is registered fails.
     """
     loader: Callable[[Path, str], MassDistribution] = _load(BODY_FILES, "kind of file", kind)
     return loader

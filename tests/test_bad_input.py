@@ -94,7 +94,7 @@ API = [
     (lambda: cv.Gauss(frame="spinning"), "frame", "'spinning'", "'non_spinning'"),
     (lambda: cv.MoserVeselov(order=3), "order", "3", "'exact'"),
     (lambda: cv.integrate(TOP, 0.01, cv.MoserVeselov()), "method", "lagrange_top", "free bod"),
-    (lambda: cv.integrate(BRICK, 0.3, cv.MoserVeselov()), "dt", "0.3", "|w| dt < 1.5"),
+    (lambda: cv.integrate(BRICK, 0.7, cv.MoserVeselov()), "dt", "0.7", "|w| dt < 6"),
     (lambda: cv.integrate(BRICK, 0.01, cv.Gauss(frame="non_spinning")), "method", "brick_flip", "symmetric"),
     (lambda: MuJoCo("RK5"), "integrator", "'RK5'", "'RK4'"),
     (lambda: Pinocchio("verlet"), "scheme", "'verlet'", "RK4"),
