@@ -24,6 +24,8 @@ KEPT, SMALL = 1e-10, 1e-4
 HARD, STABILITY = "hard_cases", "stability"
 """Studies, where a report has them, whose rows are the matrices of hard cases."""
 DASH = "–"
+FEW = 3
+"""Scenes that a list of failures names at most."""
 
 
 @dataclass(frozen=True)
@@ -109,9 +111,18 @@ def _troubles(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _where(trouble: pd.DataFrame, methods: set[str]) -> str:
+    """Return the scenes of each kind of failure; the hard cases have them all, so that here a few names stand for many."""
     rows = trouble[trouble["method"].isin(methods)]
-    found = [f"{scene}: {_kind(status)}" for scene, status in zip(rows["scene"], rows["status"], strict=True)]
-    return "; ".join(dict.fromkeys(found)) or "nowhere here"
+    scenes: dict[str, dict[str, None]] = {}
+    for scene, status in zip(rows["scene"], rows["status"], strict=True):
+        scenes.setdefault(_kind(status), {})[scene] = None
+    return "; ".join(f"{kind}: {_few(list(names))}" for kind, names in scenes.items()) or "nowhere here"
+
+
+def _few(names: list[str]) -> str:
+    if len(names) <= FEW:
+        return ", ".join(names)
+    return f"{', '.join(names[: FEW - 1])} and {len(names) - FEW + 1} more scenes"
 
 
 def _kind(status: str) -> str:

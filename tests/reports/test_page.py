@@ -163,8 +163,9 @@ def test_verdict_names_the_cheapest_and_what_it_keeps():
 
 def test_verdict_tells_where_the_cheapest_fails():
     failed = row("drift", "reduced", "energy drift max", math.nan, scene="other", status="diverged after t = 0.36 s (why)")
-    found = choosing.verdict(frame([failed]), points(made_up()))
-    assert found[1][0][-1] == "other: diverged"
+    cannot = [row("drift", "reduced", "energy drift max", math.nan, scene=f"s{k}", status="unsupported") for k in range(5)]
+    found = choosing.verdict(frame([failed, *cannot]), points(made_up()))
+    assert found[1][0][-1] == "diverged: other; unsupported: s0, s1 and 3 more scenes"
 
 
 def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
