@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -83,7 +84,8 @@ def speed(study: Study, progress: Progress) -> Iterator[Measurement]:
         ready: dict[str, Timed] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
-            case = Case(study.name, scene, method, grid)
+            # A copy, as conversions are kept for each scene, and other studies have paid for this one's.
+            case = Case(study.name, copy(scene), method, grid)
             outcome = attempt(case, study.skip_missing)
             if isinstance(outcome, Done):
                 ready[method.name] = Timed(*stretched(case, outcome), outcome)
