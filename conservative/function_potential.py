@@ -21,7 +21,7 @@ _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
 _NEWTON_DIFFERENCE = 1e-7
 _AGREEMENT = 1e-4
-_ROUND_OFF = 16 * 2.0**-53
+_ROUND_OFF = 8 * 2.0**-53
 _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
 
 
@@ -125,10 +125,12 @@ class FunctionPotential:
 
     def _discrete_gradient(self, V_0: float, R_0: Array, R_1: Array) -> Array:
         V_1 = self._energy_at(R_1)
-        gradient, step = self._gradient_at((R_0 + R_1) / 2), R_1 - R_0
+        mean, step = (R_0 + R_1) / 2, R_1 - R_0
+        gradient = self._gradient_at(mean)
         along = float(np.sum(gradient * step))
         lacking = V_1 - V_0 - along
-        if abs(lacking) <= _ROUND_OFF * (abs(V_0) + abs(V_1) + abs(along)):
+        # The last is what rounding the attitude changes V by, which is more than V where V is small by cancellation.
+        if abs(lacking) <= _ROUND_OFF * (abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())):
             return gradient
         return gradient + lacking / np.sum(step * step) * step
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import conservative as cv
@@ -60,12 +60,13 @@ def test_gradient_is_that_of_the_energy(potential, R):
 @given(R_0=matrices, R_1=matrices)
 def test_finite_derivative_gives_the_difference_of_energy(potential, R_0, R_1):
     gained = np.sum(potential.finite_derivative(R_0, R_1) * (R_1 - R_0))
-    assert abs(gained - (potential.energy(R_1) - potential.energy(R_0))) < 1e-14 * potential.scale()  # measured 5e-16
+    assert abs(gained - (potential.energy(R_1) - potential.energy(R_0))) < 1e-14 * potential.scale()  # measured up to 2e-15
 
 
 @potentials
 @settings(max_examples=30, deadline=None)
 @given(R=attitudes, exponent=st.floats(-18, -3))
+@example(R=rotation_about((0.1875, 0.40625, 1.0), 3.125), exponent=-11.0)  # a small energy, by cancellation
 def test_finite_derivative_of_a_tiny_step_is_the_gradient(potential, R, exponent):
     step = 10.0**exponent
     there = R @ cayley(step * np.array([0.6, -0.7, 0.4]))
