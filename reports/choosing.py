@@ -68,7 +68,7 @@ def verdict(table: pd.DataFrame, points: pd.DataFrame) -> Cells:
 
 
 def _cost(cost: frontier.Cost | None) -> str:
-    return f"{cost.series}: {number(cost.time * 1e6, 3)} µs" if cost else "not reached"
+    return f"{cost.series}: {number(cost.time * 1e6, 3)} µs" if cost else "none gets there"
 
 
 def _drifts(table: pd.DataFrame) -> pd.DataFrame:

@@ -132,7 +132,7 @@ def contests(found: list[frontier.Contest]) -> Table:
 
 
 def _cost(cost: frontier.Cost | None) -> tuple[str, str]:
-    return (cost.series, number(cost.time * 1e6, 3)) if cost else ("not reached", "–")
+    return (cost.series, number(cost.time * 1e6, 3)) if cost else ("none gets there", "–")
 
 
 def positions(errors: pd.DataFrame) -> Table:
