@@ -9,8 +9,6 @@ The shortest use of it:
 
 from . import scenes, shapes
 from .body import RigidBody
-from .collocation import Gauss
-from .convected import Convected
 from .errors import (
     AccuracyNotReached,
     BadInput,
@@ -22,18 +20,20 @@ from .errors import (
     Unsupported,
     WrongBranch,
 )
-from .function_potential import FunctionPotential
-from .gravity_gradient import GravityGradient
 from .invariants import Invariant
-from .lame import Lame
 from .method import Grid, Method, integrate
-from .moser_veselov import MoserVeselov
-from .point_potentials import LinearSpring, PointAttraction
-from .potential import Potential, UniformGravity
-from .projected import Projected
-from .reduced import Reduced
+from .methods.convected import Convected
+from .methods.gauss import Gauss
+from .methods.lame import Lame
+from .methods.moser_veselov import MoserVeselov
+from .methods.projected import Projected
+from .methods.reduced import Reduced
+from .methods.substepped import Substepped
+from .potentials.gravity_gradient import GravityGradient
+from .potentials.point_to_point import LinearSpring, PointAttraction
+from .potentials.potential import Potential, UniformGravity
+from .potentials.python_function import FunctionPotential
 from .scene import Scene
-from .substepped import Substepped
 from .trajectory import Counters, Trajectory
 from .version import VERSION
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .attitude import Array
-from .potential import UniformGravity
+from .potentials.potential import UniformGravity
 
 if TYPE_CHECKING:
     from .body import RigidBody
-    from .potential import Potential
+    from .potentials.potential import Potential
     from .scene import Scene
 
 

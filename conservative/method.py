@@ -192,7 +192,7 @@ def integrate(
         Keep every so many steps (and the first and last state).
     error
         Attitude error over the run, rad, instead of a method and a step: both are chosen, `trajectory.choice` says which and
-        what error is estimated (`conservative.chooser`); a warning `AccuracyNotReached` where round-off is in the way.
+        what error is estimated (`conservative.methods.automatic`); a warning `AccuracyNotReached` where round-off is in the way.
     on_failure
         "raise" or, to get what was reached with a status that says what failed, "return".
 
@@ -225,7 +225,7 @@ def integrate(
 
 
 def _default() -> Method:
-    from .reduced import Reduced
+    from .methods.reduced import Reduced
 
     return Reduced()
 
@@ -233,7 +233,7 @@ def _default() -> Method:
 def _integrated_to(
     scene: Scene, error: float, dt: float | None, method: Method | None, t_end: float | None, sample_every: int
 ) -> Trajectory:
-    from .chooser import chosen
+    from .methods.automatic import chosen
 
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:

@@ -57,12 +57,12 @@ def scene(text: str) -> Scene:
     Raises
     ------
     BadInput
-        The name or a parameter is unknown, a value cannot be used, or the file (see `conservative.scene_file`) cannot.
+        The name or a parameter is unknown, a value cannot be used, or the file (see `conservative.scene_files.scene_file`) cannot.
     NotLoadable
         It is registered, but importing what is registered fails.
     """
     if text.endswith(".toml"):
-        from .scene_file import load
+        from .scene_files.scene_file import load
 
         return load(text)
     name, settings = _split(text)

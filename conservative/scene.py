@@ -14,7 +14,7 @@ from .body import RigidBody
 from .check import finite_array, positive_number, rotation
 from .errors import BadInput
 from .invariants import Invariant, invariants_of
-from .potential import Potential
+from .potentials.potential import Potential
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import altair
     import pandas
 
-    from .chooser import Choice
     from .invariants import Invariant
+    from .methods.automatic import Choice
 
 OK = "ok"
 

@@ -1,6 +1,6 @@
 """Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers.
 
-Source: heyoka's documentation and Biscani & Izzo (2021); the equations are those of `references.taylor`.
+Source: heyoka's documentation and Biscani & Izzo (2021); the equations are those of `conservative.references.heyoka_equations.forms`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Run
-from conservative.potential import UniformGravity
+from conservative.potentials.potential import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from . import taylor
 from .engine import Axes, version
-from .fields import FIELDS, Field, Number
+from .heyoka_equations import forms
+from .heyoka_equations.torques import FIELDS, Field, Number
 
 Reals = NDArray[Any]
 """An array of `heyoka.real`."""
@@ -71,7 +71,7 @@ class Precise(Method):
     def unsupported(self, scene: Scene) -> str | None:
         if scene.potential is None or type(scene.potential) in FIELDS:
             return None
-        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to references.fields.FIELDS"
+        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to conservative.references.heyoka_equations.torques.FIELDS"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         field = None if scene.potential is None else FIELDS[type(scene.potential)]
@@ -142,33 +142,33 @@ def _check_bits(bits: object) -> None:
         raise BadInput("bits", repr(bits), allowed)
 
 
-def _equations(field: Field | None) -> Callable[[Sequence[taylor.Expression]], taylor.Equations]:
+def _equations(field: Field | None) -> Callable[[Sequence[forms.Expression]], forms.Equations]:
     return _free if field is None else _in_field(field)
 
 
-def _free(parameters: Sequence[taylor.Expression]) -> taylor.Equations:
+def _free(parameters: Sequence[forms.Expression]) -> forms.Equations:
     return _system(parameters, None)
 
 
 @cache
-def _in_field(field: Field) -> Callable[[Sequence[taylor.Expression]], taylor.Equations]:
+def _in_field(field: Field) -> Callable[[Sequence[forms.Expression]], forms.Equations]:
     return lambda parameters: _system(parameters, field)
 
 
-def _system(parameters: Sequence[taylor.Expression], field: Field | None) -> taylor.Equations:
+def _system(parameters: Sequence[forms.Expression], field: Field | None) -> forms.Equations:
     """Return q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w), parameters J (9), J^-1 (9) and the field's."""
-    hy = taylor.heyoka()
+    hy = forms.heyoka()
     q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
     J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
-    torque = taylor.cross(taylor.product(J, w), w)
+    torque = forms.cross(forms.product(J, w), w)
     if field is not None:
         torque = [a + b for a, b in zip(torque, field.torque(q, rest), strict=True)]
-    return [*zip(q, taylor.turned_by_body(q, w), strict=True), *zip(w, taylor.product(K, torque), strict=True)]
+    return [*zip(q, forms.turned_by_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]
 
 
 @cache
-def _compiled(form: taylor.Form, bits: int) -> Any:
-    hy = taylor.heyoka()
+def _compiled(form: forms.Form, bits: int) -> Any:
+    hy = forms.heyoka()
     equations = form.build()
     # Compact mode: the code of some 90 orders would take minutes to compile written out, and is no faster on these numbers.
     return hy.taylor_adaptive(equations, _reals([0] * len(equations), bits), fp_type=hy.real, prec=bits, compact_mode=True)
@@ -185,7 +185,7 @@ def _solver(
         quaternion = [_mpf(x) for x in q0]
         norm = mpmath.sqrt(mpmath.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
-        form, used = taylor.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
+        form, used = forms.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
         parameters = _reals(used, bits)
     integrator = _compiled(form, bits)
 
@@ -210,7 +210,7 @@ def _mpf(x: Number) -> mpmath.mpf:
 
 def _real(x: Number, bits: int) -> Any:
     """Return a number as `heyoka.real`: floats and integers exactly, others through their digits."""
-    hy = taylor.heyoka()
+    hy = forms.heyoka()
     if isinstance(x, float | int):
         return hy.real(x, bits)
     with mpmath.workprec(bits + 32):

@@ -21,9 +21,9 @@ from conservative.method import Grid, Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .exact import Exact
+from .engines.scipy import SciPy
+from .exact.method import Exact
 from .precise import Precise
-from .scipy import SciPy
 
 CHECKED_RADIANS = 100.0
 """A closed form is checked this far into the motion, rad turned: multi-precision integration costs seconds per hundred."""

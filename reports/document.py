@@ -10,17 +10,22 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.cases import MISSING, SKIPPED, UNSUPPORTED
+from conservative.benchmarks.studies import long_runs, paper_figures
+from conservative.benchmarks.studies.case import MISSING, SKIPPED, UNSUPPORTED
 from conservative.scene import Scene
 from conservative.trajectory import OK
 
-from . import choosing, drifts, figures, figures_of_paper, frontier, orders, output, page, paper, partial, tables, verdict
-from .measuring import Measured as Measured
-from .measuring import measure
-from .planning import Plan as Plan
-from .planning import plan as plan
-from .progress import Step
-from .provenance import Provenance, provenance
+from .charts import figures, paper
+from .page import page
+from .run import checkpoint
+from .run.measure import Measured as Measured
+from .run.measure import measure
+from .run.plan import Plan as Plan
+from .run.plan import plan as plan
+from .run.provenance import Provenance, provenance
+from .tables import headline, orders, overview, tables, work_precision
+from .terminal import atomic_files
+from .terminal.progress import Step
 
 SCHEMA = 1
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
@@ -37,9 +42,9 @@ def write(made: Plan, out: Path, step: Step, resume: bool = False) -> Measured:
     BadInput
         The folder cannot be written, or there is nothing that can be resumed; found before any work.
     """
-    kept = partial.begun(made, out, provenance(), resume)
+    kept = checkpoint.begun(made, out, provenance(), resume)
     showing = made.spans(name for name in made.pieces if name not in kept.pieces)
-    with output.report_folder(out) as folder:
+    with atomic_files.report_folder(out) as folder:
         try:
             measured = measure(made, step, kept)
             source = replace(provenance(), resumed=kept.earlier)
@@ -59,8 +64,8 @@ def write_files(made: Plan, measured: Measured, folder: Path, source: Provenance
     begin("page")
     (folder / "index.html").write_text(page.render(made, measured, source), encoding="utf-8")
     measured.table.to_csv(folder / "measurements.csv", index=False)
-    files = sorted({path.name for path in folder.iterdir()} | {output.MANIFEST})
-    (folder / output.MANIFEST).write_text(as_json(measured.table, source, files), encoding="utf-8")
+    files = sorted({path.name for path in folder.iterdir()} | {atomic_files.MANIFEST})
+    (folder / atomic_files.MANIFEST).write_text(as_json(measured.table, source, files), encoding="utf-8")
 
 
 def as_json(table: pd.DataFrame, source: Provenance, files: list[str]) -> str:
@@ -88,20 +93,20 @@ def render(made: Plan, measured: Measured, source: Provenance, draw: Draw) -> st
     """Return report.md; `draw(name, chart)` makes a picture and returns the name of its file."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    found = frontier.contests(frontier.points(measured.table))
+    found = work_precision.contests(work_precision.points(measured.table))
     environment = Environment(
-        loader=PackageLoader("reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
+        loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
     )
     others = [f"{name} {version}" for name, version in source.packages.items() if name not in source.compared]
     return environment.get_template("report.md.j2").render(
         scenes=[scene.name for scene in made.scenes],
         quick=made.quick,
-        verdict=verdict.lines(found),
+        verdict=headline.lines(found),
         by_scene={scene.name: _scene_parts(scene, measured, found, draw) for scene in made.scenes},
-        durations=f"{drifts.DURATIONS:g}",
+        durations=f"{long_runs.DURATIONS:g}",
         paper=list(_paper_parts(made, draw)),
-        hard_cases=_matrix(choosing.hard_cases(measured.table)),
-        stability=_matrix(choosing.stability(measured.table)),
+        hard_cases=_matrix(overview.hard_cases(measured.table)),
+        stability=_matrix(overview.stability(measured.table)),
         truths=tables.markdown(tables.truths(measured.table)),
         failures=tables.markdown(tables.failures(measured.table)),
         unsupported=tables.markdown(tables.unsupported(measured.table)),
@@ -110,14 +115,14 @@ def render(made: Plan, measured: Measured, source: Provenance, draw: Draw) -> st
     )
 
 
-def _matrix(cells: choosing.Cells | None) -> str:
+def _matrix(cells: overview.Cells | None) -> str:
     if cells is None:
         return "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
     header, body = cells
     return tables.markdown((list(header), [[str(cell) for cell in row] for row in body]))
 
 
-def _scene_parts(scene: Scene, measured: Measured, contests: list[frontier.Contest], draw: Draw) -> dict[str, str]:
+def _scene_parts(scene: Scene, measured: Measured, contests: list[work_precision.Contest], draw: Draw) -> dict[str, str]:
     table, name = measured.table, scene.name
     errors = orders.errors(table)
     return {
@@ -129,7 +134,7 @@ def _scene_parts(scene: Scene, measured: Measured, contests: list[frontier.Conte
         "accuracy": tables.markdown(tables.accuracy(table, name)),
         "order": tables.markdown(tables.order(table, name)),
         "time": tables.markdown(tables.time(table, name)),
-        "work_precision": draw(f"work_precision_{name}", figures.work_precision(frontier.points(table), name)),
+        "work_precision": draw(f"work_precision_{name}", figures.work_precision(work_precision.points(table), name)),
         "drift_picture": draw(f"drift_{name}", figures.drift(measured.drifts, name)),
         "convergence": draw(f"convergence_{name}", figures.convergence(errors, orders.fits(errors), name)),
     }
@@ -139,13 +144,13 @@ def _paper_parts(made: Plan, draw: Draw) -> Iterator[str]:
     """Yield the paper's figures that belong to the scenes of the report."""
     scenes = {scene.name for scene in made.scenes}
     if "brick_flip" in scenes:
-        picture = draw("paper_figure_1", figures_of_paper.figure_1(paper.body_rates(), paper.conservation()))
+        picture = draw("paper_figure_1", paper.figure_1(paper_figures.body_rates(), paper_figures.conservation()))
         yield f"![Figure 1 of the paper: rates of the brick, errors of energy and momentum]({picture})"
     if "lagrange_top" in scenes:
-        picture = draw("paper_figure_2", figures_of_paper.figure_2(paper.centre_of_mass()))
+        picture = draw("paper_figure_2", paper.figure_2(paper_figures.centre_of_mass()))
         yield f"![Figure 2 of the paper: centre of mass of the top]({picture})"
         yield "Error of the centre of mass of the top after one period of precession (the whole number of steps next to it):"
-        yield tables.markdown(tables.positions(paper.position_errors()))
+        yield tables.markdown(tables.positions(paper_figures.position_errors()))
 
 
 def failed(measured: Measured) -> list[str]:

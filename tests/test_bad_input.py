@@ -12,13 +12,13 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative import registry
-from references import exact
-from references.heyoka import Heyoka
-from references.mujoco import MuJoCo
-from references.pinocchio import Pinocchio
-from references.precise import Precise
-from references.scipy import SciPy
-from reports.cli import main
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.engines.scipy import SciPy
+from conservative.references.exact import method
+from conservative.references.precise import Precise
+from conservative.reports.cli.main import main
 
 NAN, INF = math.nan, math.inf
 ONE = np.eye(3)
@@ -102,8 +102,8 @@ API = [
     (lambda: SciPy("Euler"), "integrator", "'Euler'", "DOP853"),
     (lambda: SciPy(rtol=-1.0), "rtol", "-1.0", "below 1"),
     (lambda: Precise(bits=10), "bits", "10", "53"),
-    (lambda: exact.free_body(BODY, SHEAR, (0, 0, 1), [0.0]), "R_WB0", "0.001", "rotation"),
-    (lambda: exact.free_body(BODY, ONE, (0, 0, 1), [0.0, NAN]), "t", "nan", "finite"),
+    (lambda: method.free_body(BODY, SHEAR, (0, 0, 1), [0.0]), "R_WB0", "0.001", "rotation"),
+    (lambda: method.free_body(BODY, ONE, (0, 0, 1), [0.0, NAN]), "t", "nan", "finite"),
     # names
     (lambda: registry.scene("brick_flipp"), "scene", "'brick_flipp'", "'brick_flip' (nearest)"),
     (lambda: registry.scene("brick_flip:wobble=1"), "scene brick_flip", "wobble", "disturbance"),

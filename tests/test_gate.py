@@ -12,12 +12,13 @@ import pytest
 from click.testing import CliRunner
 
 import conservative as cv
-from benchmarks import baseline, exports, gate, points, results, yardstick
-from benchmarks.false_alarms import Slower
-from benchmarks.results import Results, Row
 from conservative.attitude import rotation_about
+from conservative.benchmarks.gate import baseline, compare, dashboards, results, yardstick
+from conservative.benchmarks.gate.results import Results, Row
+from conservative.benchmarks.suite import points
+from conservative.benchmarks.verification.gate_false_alarms import Slower
 from conservative.registry import method, scene
-from reports.cli import main
+from conservative.reports.cli.main import main
 
 BRICK = scene("brick_flip:t_end=1")
 MACHINE = "this one"
@@ -73,7 +74,7 @@ def with_row(untouched, name, **changes):
 
 def failures(kept, found, times="required"):
     """The violations as (measure, method), and their text."""
-    verdict = gate.judged(kept, found, times)
+    verdict = compare.judged(kept, found, times)
     assert verdict.passed == (not verdict.violations)
     return {(each.measure, each.method) for each in verdict.violations}, str(verdict)
 
@@ -245,10 +246,10 @@ def test_the_limit_of_a_time_follows_from_repeats():
 
 
 def test_exports(untouched):
-    entries = exports.smaller_is_better(untouched)
+    entries = dashboards.smaller_is_better(untouched)
     assert {"name", "unit", "value", "extra"} == set(entries[0])
     assert not any("order" in entry["name"].rpartition("/")[2] for entry in entries)
-    metrics = exports.bmf(untouched)["brick_flip / reduced"]
+    metrics = dashboards.bmf(untouched)["brick_flip / reduced"]
     assert metrics["attitude-error-max"]["lower_value"] <= metrics["attitude-error-max"]["value"]
     json.dumps([entries, metrics], allow_nan=False)
 

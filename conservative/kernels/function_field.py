@@ -1,7 +1,7 @@
 """A field given by Python functions, called from the compiled loop through a C pointer.
 
 The loop writes what it asks about into one array and finds the answer in another; all arithmetic is done in Python, by
-`conservative.function_potential`, so that nothing but these few lines is compiled.
+`conservative.potentials.python_function`, so that nothing but these few lines is compiled.
 """
 
 from __future__ import annotations

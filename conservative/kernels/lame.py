@@ -1,4 +1,4 @@
-"""The step of the symmetric top by addition theorems, and its constants; derivation and symbols in `conservative/lame.py`.
+"""The step of the symmetric top by addition theorems, and its constants; derivation and symbols in `conservative/methods/lame.py`.
 
 State: attitude q of the slow frame, whose third axis is the body's, and momentum L in its axes. Quaternions are scalar first.
 """

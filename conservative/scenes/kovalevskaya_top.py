@@ -15,7 +15,7 @@ from ..attitude import Array
 from ..body import RigidBody
 from ..check import positive_number
 from ..invariants import Invariant
-from ..potential import UniformGravity
+from ..potentials.potential import UniformGravity
 from ..scene import Scene
 
 DEFAULT_AXIAL = 1.0

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..attitude import rotation_about
 from ..body import RigidBody
-from ..gravity_gradient import GravityGradient
-from ..point_potentials import LinearSpring, PointAttraction
-from ..potential import Potential
+from ..potentials.gravity_gradient import GravityGradient
+from ..potentials.point_to_point import LinearSpring, PointAttraction
+from ..potentials.potential import Potential
 from ..scene import Scene
 
 DEFAULT_INERTIA = ((1.2, -0.1, 0.05), (-0.1, 0.9, 0.15), (0.05, 0.15, 0.7))

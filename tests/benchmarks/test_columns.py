@@ -1,4 +1,4 @@
-from benchmarks.columns import lines
+from conservative.benchmarks.gate.accuracy_columns import lines
 
 
 def flat(name, fastest, **extra):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from benchmarks.errors import drifts, measure, names, secular_slope
 from conservative.attitude import rotation_about
+from conservative.benchmarks.measures.errors import drifts, measure, names, secular_slope
 from conservative.errors import BadInput
 from conservative.trajectory import Trajectory
 

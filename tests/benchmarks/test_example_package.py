@@ -46,7 +46,9 @@ def test_an_outside_package_gates_its_own_integrator(project):
     code, text = run(project, *workflow())
     assert code == 2
     assert "no baseline" in text
-    code, text = run(project, "-c", "from reports.cli import main; main()", "gate", "--update", "First release")
+    code, text = run(
+        project, "-c", "from conservative.reports.cli.main import main; main()", "gate", "--update", "First release"
+    )
     assert code == 0, text
     baseline = json.loads((project / "source" / "benchmarks" / "baseline.json").read_text())
     assert sorted(baseline["rows"]) == [

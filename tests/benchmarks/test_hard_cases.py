@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 
 import conservative as cv
-from benchmarks import errors, hard_cases, selection, studies
 from conservative import registry
-from references.exact import Exact
+from conservative.benchmarks.measures import errors
+from conservative.benchmarks.studies import hard_cases, selection, studies
+from conservative.references.exact.method import Exact
 
 METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
 

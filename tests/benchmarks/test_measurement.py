@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.measurement import COLUMNS, Measurement, frame
+from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame
 
 ROW = Measurement(
     "paper", "brick_flip", "reduced", "conservative==1/reduced", "ours", 0.01, "energy drift max", 1e-15, "1", "ok"

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.order import observed_order
+from conservative.benchmarks.measures.convergence_order import observed_order
 from conservative.errors import BadInput
 
 STEPS = 0.1 / 2.0 ** np.arange(9)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-import benchmarks
+from conservative.benchmarks import suite
 
-SUITE = Path(benchmarks.__file__).parent
+SUITE = Path(suite.__file__).parent
 OTHER = """
 def test_plain():
     pass
@@ -34,7 +34,7 @@ def run(folder, *options):
 
 
 def test_the_plugin_is_light():
-    code = "import sys, benchmarks.plugin; sys.exit(any(name in sys.modules for name in ('numpy', 'pandas', 'conservative')))"
+    code = "import sys, conservative.benchmarks.gate.pytest_plugin; sys.exit(any(name in sys.modules for name in ('numpy', 'pandas', 'conservative')))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from benchmarks import growth as growth_module
-from benchmarks.growth import Amplification, Growth, growth
-from benchmarks.recommendation import engines, question, recommend
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
+from conservative.benchmarks.recommendation import extrapolation as growth_module
+from conservative.benchmarks.recommendation.extrapolation import Amplification, Growth, growth
+from conservative.benchmarks.recommendation.recommend import engines, question, recommend
 from conservative.method import Grid
-from references.exact import Exact
-from references.heyoka import Heyoka
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.exact.method import Exact
 
 R_BP = from_quaternion(np.array([0.8, 0.1, -0.5, 0.3]) / np.linalg.norm([0.8, 0.1, -0.5, 0.3]))
 R_WB = from_quaternion(np.array([0.2, 0.7, 0.4, -0.3]) / np.linalg.norm([0.2, 0.7, 0.4, -0.3]))
@@ -88,7 +88,7 @@ def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
 
 
 def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
-    from references.mujoco import MuJoCo
+    from conservative.references.engines.mujoco import MuJoCo
 
     def missing(self):
         raise cv.MissingEngine("MuJoCo", "mujoco")

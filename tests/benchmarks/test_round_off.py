@@ -3,8 +3,8 @@ import pytest
 from click.testing import CliRunner
 
 import conservative as cv
-from benchmarks import round_off
 from conservative.attitude import rotation_about
+from conservative.benchmarks.verification import round_off
 
 STEPS = 64 * 4000
 
@@ -65,7 +65,7 @@ def generic():
 
 
 def test_the_default_method_walks():
-    # After 10^8 steps 8.5e-15 and 4.4e-15, by `python -m benchmarks.round_off --steps 1e8 --members 4`.
+    # After 10^8 steps 8.5e-15 and 4.4e-15, by `python -m conservative.benchmarks.verification.round_off --steps 1e8 --members 4`.
     found = round_off.measure(cv.Reduced(), cv.scenes.brick_flip(), 0.01, 10_000_000, 4)
     for name in ("energy", "momentum"):
         assert not found[name].linear, str(found[name])

@@ -2,9 +2,9 @@ import re
 
 import pytest
 
-from benchmarks import selection
-from benchmarks.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
 from conservative import BadInput, MissingEngine, Reduced, registry
+from conservative.benchmarks.studies import selection
+from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
 from conservative.method import Grid
 
 BRICK = registry.scene("brick_flip")

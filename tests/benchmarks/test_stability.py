@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from benchmarks import stability, studies
-from benchmarks.patience import TooLong, within
 from conservative.attitude import rotation_about
-from references.exact import Exact
+from conservative.benchmarks.studies import stability, studies
+from conservative.benchmarks.studies.time_limit import TooLong, within
+from conservative.references.exact.method import Exact
 
 TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
 AXIS = cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, 0, 2.0), 2.0)

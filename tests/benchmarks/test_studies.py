@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from benchmarks import errors, ladder, studies
-from benchmarks.cost import SPEED
-from benchmarks.selection import Missing
 from conservative.attitude import rotation_about
+from conservative.benchmarks.measures import errors
+from conservative.benchmarks.studies import step_ladder, studies
+from conservative.benchmarks.studies.selection import Missing
+from conservative.benchmarks.studies.speed import SPEED
 from conservative.method import Grid, grid_for
+from conservative.references.exact.method import Exact
 from conservative.registry import method
-from references.exact import Exact
 
 TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
 START = rotation_about((-0.2, 0.4, 0.9), 2.2)
@@ -187,8 +188,8 @@ def test_bad_studies(change, argument):
 @pytest.mark.parametrize("name", ["reduced", "mujoco:Euler", "gauss:stages=4"])
 def test_all_steps_of_a_ladder_have_the_same_samples(name):
     chosen = method(name)
-    grids = ladder.steps(SCENE, chosen)
-    expected = ladder.samples(SCENE, chosen).t
+    grids = step_ladder.steps(SCENE, chosen)
+    expected = step_ladder.samples(SCENE, chosen).t
     assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
     assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
     assert isinstance(grids[0], Grid)

@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from benchmarks.timing import calls_per_sample, interleaved, prepared
+from conservative.benchmarks.measures.timing import calls_per_sample, interleaved, prepared
 from conservative.errors import BadInput
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 import conservative as cv
 from conservative.attitude import cayley, from_quaternion, hat, to_quaternion
-from conservative.potential import torque_W
+from conservative.potentials.potential import torque_W
 
 SWEEPS, STAGNATION = 60, 1e-16
 States = Iterator[tuple[np.ndarray, np.ndarray]]

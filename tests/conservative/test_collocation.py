@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
-from conservative.tableau import MOST_STAGES, tableau
+from conservative.methods.coefficients.gauss_legendre import MOST_STAGES, tableau
 
 
 def generic(kind: str, seed: int = 0) -> cv.Scene:

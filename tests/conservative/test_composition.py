@@ -10,7 +10,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
-from conservative.composition import BEST, COMPOSITIONS, Composition, composition_of
+from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
 
 TURN = rotation_about((1, 2, 3), 0.8)
 TOP = cv.Scene(

@@ -5,8 +5,8 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, hat, rotation_about
+from conservative.methods.coefficients.gauss_legendre import tableau
 from conservative.registry import method
-from conservative.tableau import tableau
 
 TURN = rotation_about((3, -1, 2), 1.3)
 

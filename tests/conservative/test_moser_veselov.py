@@ -10,7 +10,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
-from references.precise import Precise
+from conservative.references.precise import Precise
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
 FREE = [name for name, case in DATA.items() if not any(map(float, case["weight_com_B"]))]

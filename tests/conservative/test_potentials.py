@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import conservative as cv
 from conservative.attitude import angle_between, cayley, rotation_about
-from conservative.potential import torque_W
+from conservative.potentials.potential import torque_W
 
 TURNED = rotation_about((1, 2, 3), 0.7)
 INERTIA = TURNED @ np.diag([1.3, 0.9, 0.7]) @ TURNED.T

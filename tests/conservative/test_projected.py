@@ -7,7 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, orthonormality, rotation_about
-from conservative.explicit import DORMAND_PRINCE_8, ExplicitTableau
+from conservative.methods.coefficients.explicit import DORMAND_PRINCE_8, ExplicitTableau
 
 TURN = rotation_about((1, -2, 0.5), 1.1)
 BODY = cv.RigidBody(TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T)

@@ -7,8 +7,8 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, cayley, rotation_about
-from conservative.frames import resolved
-from conservative.principal import principal_start
+from conservative.methods.non_spinning import resolved
+from conservative.methods.principal_axes import principal_start
 
 TURN = rotation_about((3, -1, 2), 1.3)
 

@@ -55,7 +55,7 @@ def test_an_entry_point_without_anything_behind_it_says_so(monkeypatch, value):
 
 
 def test_a_method_is_registered_under_its_own_name(monkeypatch):
-    with_entry(monkeypatch, "shorter", "conservative.reduced:Reduced")
+    with_entry(monkeypatch, "shorter", "conservative.methods.reduced:Reduced")
     with pytest.raises(BadInput, match="class Reduced has family = 'reduced'; allowed: family = 'shorter'"):
         registry.method("shorter")
 

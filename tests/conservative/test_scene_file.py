@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry, scene_file, shapes
+from conservative import registry, shapes
 from conservative.attitude import rotation_about
-from conservative.toml_source import LARGEST, BadFile, key_lines
+from conservative.scene_files import scene_file
+from conservative.scene_files.toml_reader import LARGEST, BadFile, key_lines
 
 AXIS, ANGLE = np.array([0.3, -1.2, 0.7]), 0.83
 R = rotation_about(AXIS, ANGLE)

@@ -6,11 +6,11 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.method import Grid
-from references.heyoka import Heyoka
-from references.mujoco import MuJoCo
-from references.pinocchio import Pinocchio
-from references.precise import Precise
-from references.scipy import SciPy
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.engines.scipy import SciPy
+from conservative.references.precise import Precise
 
 # Attitude and rates; measured beside: the largest over the four scenes.
 TIGHT = [

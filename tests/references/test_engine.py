@@ -6,7 +6,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import orthonormality, rotation_about
-from references import engine
+from conservative.references import engine
 
 
 @pytest.fixture(autouse=True)

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
+from conservative.benchmarks.verification import exact_solutions as study
 from conservative.invariants import energy, momentum_W
-from references import verify_exact as study
-from references.exact import free_body
+from conservative.references.exact.method import free_body
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]

@@ -1,6 +1,6 @@
 import numpy as np
 
-from references import verify_exact as study
+from conservative.benchmarks.verification import exact_solutions as study
 
 
 def test_the_study_passes_on_a_few_cases(capsys):

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
+from conservative.benchmarks.verification import exact_solutions as study
 from conservative.invariants import energy, momentum_W
 from conservative.method import Grid
-from references import verify_exact as study
-from references.exact import Exact, lagrange_top
+from conservative.references.exact.method import Exact, lagrange_top
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
@@ -141,7 +141,7 @@ def test_the_method_does_free_bodies_tops_and_pendulums_and_nothing_else():
 
 
 def test_a_compound_pendulum_agrees_with_multi_precision():
-    from references.precise import Precise
+    from conservative.references.precise import Precise
 
     scene = cv.Scene("p", cv.RigidBody((1.3, 0.9, 0.7)), np.eye(3), (2.0, 0, 0), 4.0, cv.UniformGravity(8, (0, 0.1, -0.4)))
     grid = Grid(0.5, 8)

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry, scene_file
+from conservative import registry
 from conservative.attitude import from_quaternion, rotation_about
-from references.model_files import body_from_mjcf, body_from_urdf
+from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
+from conservative.scene_files import scene_file
 
 # One body of generic parameters, written in every way that a format has.
 MASS, COM, ANCHOR = 2.5, np.array([0.1, -0.2, 0.3]), np.array([-0.05, 0.07, 0.02])

@@ -8,9 +8,9 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.method import Grid
-from references.mujoco import MuJoCo
-from references.pinocchio import Pinocchio
-from references.precise import Precise
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.precise import Precise
 
 STEPS = (40, 80, 160, 320)
 

@@ -10,9 +10,9 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between
 from conservative.method import Grid
-from references import precise
-from references.precise import Precise
-from references.scipy import SciPy
+from conservative.references import precise
+from conservative.references.engines.scipy import SciPy
+from conservative.references.precise import Precise
 
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
 

@@ -8,13 +8,13 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.invariants import axial_direction
-from references import formulations
-from references.engine import symmetric_axes
-from references.heyoka import Heyoka
-from references.mujoco import MuJoCo
-from references.pinocchio import Pinocchio
-from references.precise import Precise
-from references.scipy import SciPy
+from conservative.references.engine import symmetric_axes
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.engines.scipy import SciPy
+from conservative.references.heyoka_equations import formulations
+from conservative.references.precise import Precise
 
 EVERYTHING = [method for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for method in cls.variants()]
 

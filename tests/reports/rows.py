@@ -1,7 +1,7 @@
 """Made-up measurements, so that what tables and pictures say of them is known beforehand."""
 
-from benchmarks.measurement import Measurement, frame
-from reports.frontier import ERROR, TIME
+from conservative.benchmarks.measures.measurement import Measurement, frame
+from conservative.reports.tables.work_precision import ERROR, TIME
 
 
 def point(line, room, error, time, dt=0.1, scene="made_up", label=None, method=None, status="ok"):

@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 import conservative
-from references import exact
+from conservative.references.exact import method
 
 LOADED = re.compile(r'<(?:script|img|iframe|source)[^>]*\ssrc="([^"]*)"|<link[^>]*\shref="([^"]*)"|url\((http[^)]*)\)')
 
@@ -17,7 +17,7 @@ LOADED = re.compile(r'<(?:script|img|iframe|source)[^>]*\ssrc="([^"]*)"|<link[^>
 def pages(tmp_path_factory):
     """Pages by their path; made in another process, as pdoc runs what stands under `if TYPE_CHECKING`."""
     folder = tmp_path_factory.mktemp("api")
-    command = [sys.executable, "-W", "error", "-m", "reports.api", str(folder)]
+    command = [sys.executable, "-W", "error", "-m", "conservative.reports.documentation.api", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -40,11 +40,13 @@ def test_every_public_name_is_described(pages):
 
 
 def test_exact_solutions_and_engines_are_described(pages):
-    public = {name for name, found in vars(exact).items() if getattr(found, "__module__", "") == exact.__name__}
+    public = {name for name, found in vars(method).items() if getattr(found, "__module__", "") == method.__name__}
     assert {"free_body", "lagrange_top", "Exact"} <= {name for name in public if not name.startswith("_")}
-    assert {name for name in public if not name.startswith("_")} <= described(pages["references/exact.html"])
+    assert {name for name in public if not name.startswith("_")} <= described(
+        pages["conservative/references/exact/method.html"]
+    )
     for engine, family in (("mujoco", "MuJoCo"), ("pinocchio", "Pinocchio"), ("heyoka", "Heyoka"), ("scipy", "SciPy")):
-        assert {family, f"{family}.prepare"} <= described(pages[f"references/{engine}.html"])
+        assert {family, f"{family}.prepare"} <= described(pages[f"conservative/references/engines/{engine}.html"])
 
 
 def test_public_names_are_those_that_the_package_imports():
@@ -63,6 +65,6 @@ def test_pages_load_nothing_from_elsewhere(pages):
 
 
 def test_signatures_name_arrays_briefly(pages):
-    text = re.sub(r"<[^>]+>", "", pages["references/exact.html"])
+    text = re.sub(r"<[^>]+>", "", pages["conservative/references/exact/method.html"])
     assert "w_WB_B0: ArrayLike" in text
     assert "tuple[Array, Array]" in text

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import results
-from benchmarks.results import Row
-from reports.cli import main
+from conservative.benchmarks.gate import results
+from conservative.benchmarks.gate.results import Row
+from conservative.reports.cli.main import main
 
 
 def conservative(*arguments):
@@ -23,7 +23,7 @@ def one_line(text):
 
 def test_import_brings_in_nothing_heavy():
     heavy = ["numpy", "pandas", "numba", "altair", "rich", "jinja2", "mujoco", "scipy"]
-    code = f"import sys, reports.cli; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import sys, conservative.reports.cli.main; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -66,7 +66,7 @@ def test_run_writes_samples(tmp_path):
 
 
 def test_a_run_of_many_steps_keeps_a_limited_number_of_samples(tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.single.SAMPLES", 100)
+    monkeypatch.setattr("conservative.reports.cli.run.SAMPLES", 100)
     path = tmp_path / "run.csv"
     summary = json.loads(conservative("run", "brick_flip", "--dt", "0.007", "--csv", path, "--json").stdout)
     rows = list(csv.DictReader(path.read_text().splitlines()))
@@ -123,7 +123,7 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
     def broken():
         raise ValueError("not the user's mistake")
 
-    monkeypatch.setattr("reports.catalogue.show", broken)
+    monkeypatch.setattr("conservative.reports.cli.list.show", broken)
     assert isinstance(conservative("list").exception, ValueError)
 
 

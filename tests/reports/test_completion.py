@@ -4,7 +4,7 @@ import pytest
 from click.shell_completion import BashComplete
 from click.testing import CliRunner
 
-from reports.cli import main
+from conservative.reports.cli.main import main
 
 
 def completed(words):

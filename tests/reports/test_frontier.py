@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from benchmarks.measurement import Measurement
-from reports import frontier, verdict
+from conservative.benchmarks.measures.measurement import Measurement
+from conservative.reports.tables import headline, work_precision
 
 from .rows import point, table
 
@@ -12,12 +12,12 @@ ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine"
 
 
 def contest(error, *groups):
-    return next(c for c in frontier.contests(frontier.points(table(*groups)), [error]))
+    return next(c for c in work_precision.contests(work_precision.points(table(*groups)), [error]))
 
 
 def test_measured_point_is_its_own_cost():
     found = contest(1e-4, *OURS, *ENGINE)
-    assert found.ours == frontier.Cost("ours", 4.0)
+    assert found.ours == work_precision.Cost("ours", 4.0)
 
 
 def test_between_points_the_cost_is_log_log():
@@ -29,7 +29,7 @@ def test_between_points_the_cost_is_log_log():
 def test_lines_stay_coarse_to_fine_where_they_share_steps():
     first = [point("first", "ours", dt, 1 / dt, dt=dt) for dt in (2.0, 1.0)]
     second = [point("second", "engine", dt, 1 / dt, dt=dt) for dt in (3.0, 2.0, 1.5, 1.0)]
-    found = frontier.points(table(*first, *second))
+    found = work_precision.points(table(*first, *second))
     assert found[["series", "dt"]].to_numpy().tolist() == [
         *(["first", 2.0], ["first", 1.0]),
         *(["second", 3.0], ["second", 2.0], ["second", 1.5], ["second", 1.0]),
@@ -38,12 +38,14 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
 
 def test_nothing_is_claimed_below_what_the_truth_is_known_to():
     def agreement(label):
-        return [Measurement("paper", "made_up", "truth", label, "truth", 0.1, frontier.AGREEMENT, 1e-5, "rad", "ok", label)]
+        return [
+            Measurement("paper", "made_up", "truth", label, "truth", 0.1, work_precision.AGREEMENT, 1e-5, "rad", "ok", label)
+        ]
 
-    checked = frontier.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
-    assert [c.error for c in frontier.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
-    exact = frontier.points(table(*OURS, *ENGINE, agreement("references==0.1.0/exact and heyoka==7.13.2/precise")))
-    assert frontier.contests(exact)[-1].error == 1e-8
+    checked = work_precision.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
+    assert [c.error for c in work_precision.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
+    exact = work_precision.points(table(*OURS, *ENGINE, agreement("references==0.1.0/exact and heyoka==7.13.2/precise")))
+    assert work_precision.contests(exact)[-1].error == 1e-8
 
 
 def test_a_more_accurate_point_counts_for_a_larger_error():
@@ -55,7 +57,7 @@ def test_nothing_is_extrapolated():
     assert found.ours is None
     assert found.lost
     assert math.isnan(found.ratio)
-    assert frontier.contests(frontier.points(table(*OURS, *ENGINE)), [1e-9]) == []
+    assert work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), [1e-9]) == []
 
 
 def test_points_of_failed_runs_and_of_truths_do_not_compete():
@@ -71,18 +73,18 @@ def test_lines_that_differ_in_tolerance_alone_are_one():
         point("heyoka", "engine", 10.0**-k, k, method=f"heyoka:tol=1e-{k}", label=f"heyoka==7.13.2/tol=1e-{k},body")
         for k in (3, 9)
     ]
-    assert frontier.points(table(*groups))["series"].unique().tolist() == ["heyoka 7.13.2 body"]
+    assert work_precision.points(table(*groups))["series"].unique().tolist() == ["heyoka 7.13.2 body"]
 
 
 def test_front_is_what_nothing_beats():
     groups = (*OURS, *ENGINE, point("bad", "engine", 1e-3, 9.0))
-    front = frontier.front(frontier.points(table(*groups)))
+    front = work_precision.front(work_precision.points(table(*groups)))
     assert front["error"].tolist() == [1e-2, 1e-3, 1e-4, 1e-8]
 
 
 def test_verdict_names_the_engine_the_errors_and_the_factor():
     decades = [1e-2, 1e-6, 1e-7]
-    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS, *ENGINE)), decades))
+    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), decades))
     assert lines == [
         "**made_up**: engine beats us: it is faster than anything of ours at 1e-06 rad, by 3.5 times, "  # 16 / (2 x 4^0.6)
         "and reaches 1e-07 rad, which nothing of ours was measured to reach.",
@@ -91,17 +93,19 @@ def test_verdict_names_the_engine_the_errors_and_the_factor():
 
 
 def test_verdict_where_ours_wins_everywhere():
-    lines = verdict.lines(frontier.contests(frontier.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2]))
+    lines = headline.lines(
+        work_precision.contests(work_precision.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2])
+    )
     assert lines[0] == "**made_up**: no engine beats us at any error that it reaches."
 
 
 def test_verdict_joins_neighbouring_decades():
-    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS, *ENGINE))))
+    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS, *ENGINE))))
     assert "reaches 1e-07, 1e-08 rad" in lines[0]
     assert "1e-04 to 1e-06 rad" in lines[0]
 
 
 def test_verdict_without_engines_claims_nothing():
-    lines = verdict.lines(frontier.contests(frontier.points(table(*OURS)), [1e-2]))
+    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS)), [1e-2]))
     assert lines == ["**made_up**: no engine was measured."]
-    assert "No engine" in verdict.lines([])[0]
+    assert "No engine" in headline.lines([])[0]

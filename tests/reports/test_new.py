@@ -2,7 +2,7 @@ import json
 
 from click.testing import CliRunner
 
-from reports.cli import main
+from conservative.reports.cli.main import main
 
 
 def test_new_writes_a_file_that_every_command_takes_for_a_scene(tmp_path):

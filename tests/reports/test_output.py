@@ -5,7 +5,7 @@ import stat
 import pytest
 
 from conservative import BadInput
-from reports.output import MANIFEST, report_folder, text_file
+from conservative.reports.terminal.atomic_files import MANIFEST, report_folder, text_file
 
 
 def write_report(folder, *names):

@@ -9,12 +9,16 @@ import pandas as pd
 import pytest
 import vl_convert
 
-from benchmarks.measurement import Measurement, frame
 from conservative import Reduced, RigidBody, Scene, registry, scenes
 from conservative.attitude import rotation_about
-from reports import audit, choosing, document, embedding, figures, importing, page, spheres
-from reports.frontier import points
-from reports.provenance import provenance
+from conservative.benchmarks.measures.measurement import Measurement, frame
+from conservative.benchmarks.studies import import_time
+from conservative.reports import document
+from conservative.reports.charts import figures, spheres, vega_embed
+from conservative.reports.page import page
+from conservative.reports.run.provenance import provenance
+from conservative.reports.tables import claims, overview
+from conservative.reports.tables.work_precision import points
 
 from .rows import point
 
@@ -55,7 +59,7 @@ def measured():
 def libraries():
     """Libraries that are imported in no time, one of which is not there."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(importing, "MODULES", {"json": "ours", "no_such_library": "engine"})
+        patch.setattr(import_time, "MODULES", {"json": "ours", "no_such_library": "engine"})
         yield
 
 
@@ -130,11 +134,11 @@ def drawn(spec, hidden=()):
 
 
 def test_chart_draws_its_lines_and_the_switch_takes_one_away():
-    (spec,) = embedding.embedded(figures.work_precision(points(made_up()), "brick_flip"), page._hovering("error"))
-    colour = embedding.legend(["reduced"], True)[0].colour
+    (spec,) = vega_embed.embedded(figures.work_precision(points(made_up()), "brick_flip"), page._hovering("error"))
+    colour = vega_embed.legend(["reduced"], True)[0].colour
     assert drawn(spec).count(colour) > 1
     assert colour not in drawn(spec, ["reduced"])
-    assert embedding.legend(["scipy DOP853"], True)[0].colour in drawn(spec, ["reduced"])
+    assert vega_embed.legend(["scipy DOP853"], True)[0].colour in drawn(spec, ["reduced"])
     assert "legend" not in json.dumps(spec).replace('"legend": null', "")
 
 
@@ -147,13 +151,13 @@ def test_legend_has_the_lines_of_the_charts():
 
 
 def test_data_are_short_and_exact_to_their_digits():
-    data = embedding.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
+    data = vega_embed.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
     assert data["values"].splitlines() == ["name,x", '"a, b",0.3333333', "c,1e-17"]
     assert data["format"]["parse"] == {"x": "number"}
 
 
 def test_verdict_names_the_cheapest_and_what_it_keeps():
-    header, body = choosing.verdict(made_up(), points(made_up()))
+    header, body = overview.verdict(made_up(), points(made_up()))
     rows = [dict(zip(header, line, strict=True)) for line in body]
     assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
     assert rows[0]["cheapest"] == "reduced"
@@ -164,14 +168,14 @@ def test_verdict_names_the_cheapest_and_what_it_keeps():
 def test_verdict_tells_where_the_cheapest_fails():
     failed = row("drift", "reduced", "energy drift max", math.nan, scene="other", status="diverged after t = 0.36 s (why)")
     cannot = [row("drift", "reduced", "energy drift max", math.nan, scene=f"s{k}", status="unsupported") for k in range(5)]
-    found = choosing.verdict(frame([failed, *cannot]), points(made_up()))
+    found = overview.verdict(frame([failed, *cannot]), points(made_up()))
     assert found[1][0][-1] == "diverged: other; unsupported: s0, s1 and 3 more scenes"
 
 
 def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
     rows = [row("convergence", "a", "x", math.nan, status="unsupported"), row("drift", "a", "energy drift max", 1e-15)]
-    assert choosing._troubles(frame(rows)).empty
-    assert len(choosing._troubles(frame(rows[:1]))) == 1
+    assert overview._troubles(frame(rows)).empty
+    assert len(overview._troubles(frame(rows[:1]))) == 1
 
 
 @pytest.mark.parametrize(
@@ -185,7 +189,7 @@ def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
     ],
 )
 def test_drift_is_graded_by_symbol_and_colour(value, text, status):
-    assert choosing.graded(value) == choosing.Cell(text, status)
+    assert overview.graded(value) == overview.Cell(text, status)
 
 
 def test_hard_cases_are_a_matrix():
@@ -194,35 +198,35 @@ def test_hard_cases_are_a_matrix():
         row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", status="not converged in step 3"),
         row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", room="engine"),
     ]
-    header, body = choosing.hard_cases(frame(rows))
+    header, body = overview.hard_cases(frame(rows))
     assert header == ["method", "needle", "falling_top"]
     assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
-    assert choosing.hard_cases(made_up()) is None
+    assert overview.hard_cases(made_up()) is None
 
 
 def verdicts(rows, scene="brick_flip"):
-    return {found.claim: found.verdict for found in audit.findings(frame(rows), [registry.scene(scene)])}
+    return {found.claim: found.verdict for found in claims.findings(frame(rows), [registry.scene(scene)])}
 
 
-@pytest.mark.parametrize(("order", "verdict"), [(4, audit.HOLDS), (2, audit.FAILS)])
+@pytest.mark.parametrize(("order", "verdict"), [(4, claims.HOLDS), (2, claims.FAILS)])
 def test_audit_of_an_order(order, verdict):
     assert verdicts(ladder("reduced:order=4", order)) == {"reduced:order=4 is of order 4 (brick_flip)": verdict}
 
 
-@pytest.mark.parametrize(("drift", "verdict"), [(4e-16, audit.HOLDS), (1e-9, audit.FAILS), (math.nan, audit.FAILS)])
+@pytest.mark.parametrize(("drift", "verdict"), [(4e-16, claims.HOLDS), (1e-9, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_a_conserved_quantity(drift, verdict):
     rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
     assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
 
 
-@pytest.mark.parametrize(("error", "verdict"), [(0.1, audit.HOLDS), (0.2, audit.FAILS), (math.nan, audit.FAILS)])
+@pytest.mark.parametrize(("error", "verdict"), [(0.1, claims.HOLDS), (0.2, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_one_map_in_two_programs(error, verdict):
     rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
     found = verdicts(rows)
-    assert found.get("reduced is the paper's map (brick_flip)", audit.FAILS) == verdict
+    assert found.get("reduced is the paper's map (brick_flip)", claims.FAILS) == verdict
 
 
-@pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, audit.HOLDS), (0.5, audit.FAILS), (math.nan, audit.FAILS)])
+@pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, claims.HOLDS), (0.5, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
     rows = [
         row("paper", "mujoco", "energy drift max", coarse, 0.01, room="engine"),
@@ -232,7 +236,7 @@ def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
     ]
     found = verdicts(rows)
     assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
-    assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == audit.HOLDS
+    assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == claims.HOLDS
 
 
 @pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
@@ -266,13 +270,13 @@ def test_picks_one_method_of_each_family_that_has_no_preferred_one():
 
 
 def test_longest_steps_are_a_matrix():
-    largest, first = choosing.LARGEST, "first"
+    largest, first = overview.LARGEST, "first"
     rows = [
         row("stability", "a", largest, 1.0, scene="needle"),
         row("stability", "a", first, 3.2, scene="needle", status="not converged"),
         row("stability", "b", largest, 10.0, scene="needle"),
         row("stability", "c", largest, math.nan, scene="needle", status="unsupported"),
     ]
-    _, body = choosing.stability(frame(rows))
+    _, body = overview.stability(frame(rows))
     assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
-    assert choosing._troubles(frame(rows)).empty
+    assert overview._troubles(frame(rows)).empty

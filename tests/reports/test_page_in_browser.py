@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reports import document
+from conservative.reports import document
 
 pytestmark = pytest.mark.browser
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from reports import progress
+from conservative.reports.terminal import progress
 
 STEPS = """
 from time import sleep

@@ -4,8 +4,8 @@ import re
 import sys
 from pathlib import Path
 
-from reports import readme_pictures
-from reports.readme_pictures import FOLDER
+from conservative.reports.documentation import readme_pictures
+from conservative.reports.documentation.readme_pictures import FOLDER
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -35,7 +35,7 @@ def test_the_command_measures_and_draws(monkeypatch, tmp_path, capsys):
 def test_the_readme_links_every_picture_that_is_checked_in():
     assert sorted(LINKED) == sorted(path.relative_to(ROOT).as_posix() for path in FOLDER.iterdir())
     assert len(LINKED) == 3
-    assert "python -m reports.readme_pictures" in README
+    assert "python -m conservative.reports.documentation.readme_pictures" in README
 
 
 def test_pictures_are_small_and_white_so_that_they_read_on_any_page():

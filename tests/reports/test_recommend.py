@@ -3,7 +3,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from reports.cli import main
+from conservative.reports.cli.main import main
 
 COMMON = ("--error", "1e-4", "--duration", "0.4")
 

@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.measurement import COLUMNS
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
-from reports import document, style
-from reports.cli import _listed, main
-from reports.provenance import provenance
+from conservative.benchmarks.measures.measurement import COLUMNS
+from conservative.reports import document
+from conservative.reports.charts import style
+from conservative.reports.cli.main import _listed, main
+from conservative.reports.run.provenance import provenance
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +149,7 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
 
 
 def test_failure_of_ours_is_told(monkeypatch):
-    from benchmarks.measurement import Measurement, frame
+    from conservative.benchmarks.measures.measurement import Measurement, frame
 
     status = NotConverged(3, 0.02, 1.0).status
     common = (

@@ -12,19 +12,20 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.measurement import Measurement
 from conservative import BadInput
-from reports import document, partial
-from reports.cli import main
-from reports.interrupts import Terminated, interruptible, unstoppable
-from reports.provenance import provenance
+from conservative.benchmarks.measures.measurement import Measurement
+from conservative.reports import document
+from conservative.reports.cli.main import main
+from conservative.reports.run import checkpoint
+from conservative.reports.run.provenance import provenance
+from conservative.reports.terminal.interrupts import Terminated, interruptible, unstoppable
 
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
 TIMES = ("s", "s/s")
 
 
 def started(arguments, folder):
-    code = [sys.executable, "-c", "from reports.cli import main; main()"]
+    code = [sys.executable, "-c", "from conservative.reports.cli.main import main; main()"]
     return subprocess.Popen([*code, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -90,7 +91,7 @@ def test_resume_does_the_rest_and_tidies_up(resumed):
 
 def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(resumed, tmp_path):
     made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
-    kept = partial.begun(made, tmp_path / "report", provenance(SMALL), resume=False)
+    kept = checkpoint.begun(made, tmp_path / "report", provenance(SMALL), resume=False)
     document.measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
     found, whole = (pd.read_csv(path) for path in (resumed[0] / "report" / "measurements.csv", tmp_path / "whole.csv"))
     assert len(found) > 100
@@ -139,14 +140,14 @@ def unfinished(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     source = provenance(SMALL)
-    kept = partial.begun(made, Path("report"), source, resume=False)
+    kept = checkpoint.begun(made, Path("report"), source, resume=False)
     row = ("paper", "brick_flip", "reduced", "reduced", "ours", 0.1, "energy drift max", float("nan"), "1", "ok")
     kept.keep("paper", [Measurement(*row)], [["brick_flip", 0.1 + 0.2]])
     return tmp_path
 
 
 def test_floats_come_back_as_they_are(unfinished):
-    _, found = partial.read(unfinished / "report.partial.json")
+    _, found = checkpoint.read(unfinished / "report.partial.json")
     assert found["paper"].rows[0].dt == 0.1
     assert found["paper"].rows[0].value != found["paper"].rows[0].value
     assert found["paper"].samples == (("brick_flip", 0.1 + 0.2),)
@@ -230,7 +231,7 @@ def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
     def stopping(*arguments):
         raise stop
 
-    monkeypatch.setattr("reports.recommend.run", stopping)
+    monkeypatch.setattr("conservative.reports.cli.recommend.run", stopping)
     done = CliRunner().invoke(main, ["recommend", "brick_flip"])
     assert (done.exit_code, done.stdout, done.stderr) == (code, "", "Interrupted\n")
 
@@ -272,7 +273,7 @@ def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
     here = tmp_path / "here"
     here.mkdir()
     monkeypatch.chdir(here)
-    found = (here / partial.path_for(Path(out))).resolve()
+    found = (here / checkpoint.path_for(Path(out))).resolve()
     folder = (here / out).resolve()
     assert found == folder.parent / f"{folder.name}.partial.json"
 

@@ -2,8 +2,9 @@ import math
 
 import pytest
 
-from benchmarks.measurement import Measurement, frame
-from reports import naming, orders, tables
+from conservative.benchmarks.measures.measurement import Measurement, frame
+from conservative.reports import labels
+from conservative.reports.tables import orders, tables
 
 
 def row(study, measure, value, dt=0.01, status="ok", detail="", method="reduced", label="conservative==0.1.0/reduced"):
@@ -28,14 +29,14 @@ def test_number(value, text):
     ],
 )
 def test_what_a_method_is_called(method, label, text):
-    assert naming.shown(method, label) == text
-    assert naming.family(text) == naming.family(method)
+    assert labels.shown(method, label) == text
+    assert labels.family(text) == labels.family(method)
 
 
 def test_name_without_tolerance():
-    assert naming.without_tolerance("heyoka 7.13.2 tol=1e-06,body") == "heyoka 7.13.2 body"
-    assert naming.without_tolerance("scipy 1.17.1 DOP853,rtol=1e-09") == "scipy 1.17.1 DOP853"
-    assert naming.without_tolerance("reduced") == "reduced"
+    assert labels.without_tolerance("heyoka 7.13.2 tol=1e-06,body") == "heyoka 7.13.2 body"
+    assert labels.without_tolerance("scipy 1.17.1 DOP853,rtol=1e-09") == "scipy 1.17.1 DOP853"
+    assert labels.without_tolerance("reduced") == "reduced"
 
 
 def test_drift_is_that_of_the_scenes_own_step():

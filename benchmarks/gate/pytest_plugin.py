@@ -1,0 +1,121 @@
+"""The pytest plugin behind `pytest --benchmark`; without the option it only keeps the suite in this folder from running.
+
+It is an entry point, so every pytest run of the environment imports this file: nothing heavy at the top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SUITE = Path(__file__).parents[1] / "suite"
+TIMER = "benchmark"
+"""Name under which pytest knows the plugin pytest-benchmark."""
+MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
+"""The suite has many points, and times 0.1 s or two calls of each unless pytest-benchmark's option says otherwise."""
+REPEAT = pytest.StashKey[Callable[[], float]]()
+"""Where a test leaves a function that measures its time ratio again, should the gate ask for it."""
+MEASURED = pytest.StashKey[list[dict[str, Any]]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Register the options. Options that begin with the same letters, all of pytest-benchmark's, keep their meaning."""
+    group = parser.getgroup("conservative", "benchmarks of rotation integrators")
+    group.addoption(
+        "--benchmark",
+        action="store_true",
+        dest="conservative_benchmark",
+        help="Run benchmarks: those under the paths given, by default the suite that comes with conservative.",
+    )
+    group.addoption(
+        "--gate",
+        action="store_true",
+        dest="conservative_gate",
+        help="With --benchmark: compare with the baseline at the end. Exit code 1: a violation; 2: no baseline.",
+    )
+    group.addoption(
+        "--gate-baseline",
+        default="benchmarks/baseline.json",
+        metavar="FILE",
+        dest="conservative_gate_baseline",
+        help="The baseline, relative to the root of the project (default: %(default)s).",
+    )
+    group.addoption(
+        "--gate-times",
+        choices=("required", "known"),
+        default="required",
+        dest="conservative_gate_times",
+        help="required: fail where the baseline has no times of this machine; known: then gate all but time, and say so.",
+    )
+
+
+def wanted(config: pytest.Config) -> bool:
+    """Return whether benchmarks were asked for."""
+    return bool(config.getoption("conservative_benchmark"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """With the option and no path, make the suite what is run.
+
+    Raises
+    ------
+    pytest.UsageError
+        pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
+    """
+    if not wanted(config):
+        if config.getoption("conservative_gate"):
+            raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
+        return
+    if not config.pluginmanager.hasplugin(TIMER):
+        allowed = "allowed after: pip install pytest-benchmark, and without -p no:benchmark"
+        raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
+    if config.args_source is not pytest.Config.ArgsSource.ARGS:
+        config.args = [str(SUITE)]
+        if not any(text.startswith(MAX_TIME) for text in config.invocation_params.args):
+            config.option.benchmark_max_time, config.option.benchmark_min_rounds = SHORT, FEW
+    if config.getoption("conservative_gate"):
+        _gate(config)
+
+
+def _gate(config: pytest.Config) -> None:
+    if getattr(config.option, "dist", "no") != "no" or hasattr(config, "workerinput"):
+        raise pytest.UsageError("--gate: got -n, under which workers disturb each other's times; allowed with -n0")
+    from .pytest_gate import Gate
+
+    config.pluginmanager.register(Gate(config), "conservative_gate")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip the suite unless benchmarks were asked for."""
+    if wanted(config):
+        return
+    for item in items:
+        if SUITE.resolve() in item.path.resolve().parents:
+            item.add_marker(pytest.mark.skip(reason="a benchmark, which runs with --benchmark"))
+
+
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
+def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[str, Any]]) -> None:
+    """Keep what pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
+    config.stash[MEASURED] = list(benchmarks)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Show accuracy beside the times, after pytest-benchmark's own table; or say why nothing was timed."""
+    config = terminalreporter.config
+    if not wanted(config):
+        return
+    if getattr(config.option, "dist", "no") != "no":
+        terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")
+    measured = config.stash.get(MEASURED, [])
+    if measured:
+        from .accuracy_columns import lines
+
+        terminalreporter.section("accuracy beside time")
+        for group in dict.fromkeys(row["group"] for row in measured):
+            for line in (*lines([row for row in measured if row["group"] == group]), ""):
+                terminalreporter.write_line(line)

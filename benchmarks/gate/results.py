@@ -1,0 +1,110 @@
+"""What one run of benchmarks found, as rows, and the file it is kept in."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from conservative.errors import BadInput
+
+FOLDER = Path(".benchmarks") / "gate"
+"""Where a gated run leaves its results, relative to the root of the project."""
+FILE = "results.json"
+PASSED = "passed"
+TIME_RATIO = "time ratio"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One benchmark.
+
+    Attributes
+    ----------
+    id, scene, method
+        What tells it apart: the test's name with its parameters; and what a reader looks for.
+    status
+        "passed", or "failed", "skipped", "xfailed", "error".
+    engine
+        Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for what is itself under test.
+    definition
+        Hash of what is measured.
+    values, spreads
+        Measures that must not get worse, and how much round-off alone changes each.
+    time_ratio
+        Time in units of the yardstick (`conservative.benchmarks.gate.yardstick`); None where time is not gated.
+    seconds
+        Shortest time of a call, s, for dashboards; not gated.
+    """
+
+    id: str
+    scene: str
+    method: str
+    status: str
+    engine: str = ""
+    definition: str = ""
+    values: Mapping[str, float] = field(default_factory=dict)
+    spreads: Mapping[str, float] = field(default_factory=dict)
+    time_ratio: float | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Results:
+    """The rows of one run, by id, the machine they were measured on, and the commit."""
+
+    machine: str
+    rows: Mapping[str, Row]
+    commit: str = ""
+
+
+def machine() -> str:
+    """Return what ratios of times depend on: processor and compiler, as far as they are known."""
+    numba = f"numba {metadata.version('numba')}"
+    return ", ".join((_processor(), platform.machine(), numba))
+
+
+def _processor() -> str:
+    """Return the processor's name, family and model."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
+    except OSError:  # no such file outside Linux
+        return platform.processor() or platform.machine()
+    known = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    parts = [f"{key} {known[key]}" for key in ("cpu family", "model") if key in known]
+    return " ".join([known.get("model name", platform.processor() or "unknown"), *parts])
+
+
+def write(results: Results, path: Path) -> None:
+    """Write results as JSON; floats come back as they are, nan as nan."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(as_json(results), indent=1) + "\n", encoding="utf-8")
+
+
+def as_json(results: Results) -> dict[str, Any]:
+    """Return results as what JSON knows."""
+    return {**vars(results), "rows": [vars(row) for row in results.rows.values()]}
+
+
+def read(path: Path) -> Results:
+    """Return the results in a file: one that a gated run left, or that `pytest --benchmark --benchmark-json=FILE` wrote.
+
+    Raises
+    ------
+    BadInput
+        There is no such file, or it holds no results.
+    """
+    allowed = "a file of results, which `pytest --benchmark --gate` leaves"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        content = content.get("conservative", content)
+        rows = [Row(**row) for row in content["rows"]]
+        return Results(content["machine"], {row.id: row for row in rows}, content["commit"])
+    except OSError as error:
+        raise BadInput("results", f"{path} ({error.strerror})", allowed) from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BadInput("results", f"{path} ({type(error).__name__}: {error})", allowed) from None

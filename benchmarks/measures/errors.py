@@ -1,0 +1,116 @@
+"""How far a trajectory is from the truth, and how far what should be conserved has drifted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from conservative.attitude import Array, angle_between, orthonormality
+from conservative.errors import BadInput
+from conservative.invariants import sizes
+from conservative.potentials.potential import UniformGravity
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+Value = tuple[str, float, str]
+"""Measure, value, unit."""
+
+
+class Slope(NamedTuple):
+    """A least-squares slope, 1/s, and its standard error; nan where there are too few samples."""
+
+    value: float
+    stderr: float
+
+
+def measure(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
+    """Return every measure of a trajectory; `names(trajectory.scene)` has the same measures and units in the same order.
+
+    Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity also the
+    distance of the centre of mass from where it should be, m. For each invariant of the scene: |I - I0| / scale, I0 that of the
+    scene's start, and the slope of (I - I0) / scale over time. Orthonormality: the largest component of |R'R - 1|.
+
+    Parameters
+    ----------
+    trajectory
+        May end early; what it has is measured.
+    truth
+        The exact motion at the same times.
+
+    Raises
+    ------
+    BadInput
+        The trajectory is empty, or its times are not the first ones of the truth.
+    """
+    require_same_times(trajectory, truth)
+    n = len(trajectory)
+    R_ref, w_ref = truth.R_WB[:n], truth.w_WB_B[:n]
+    attitude = angle_between(R_ref, trajectory.R_WB)
+    rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=-1) / (np.linalg.norm(truth.w_WB_B, axis=-1).max() or 1.0)
+    found: list[Value] = [
+        ("attitude error max", float(attitude.max()), "rad"),
+        ("attitude error final", float(attitude[-1]), "rad"),
+        ("attitude error rms", float(np.sqrt(np.mean(attitude**2))), "rad"),
+        ("rate error max", float(rates.max()), "1"),
+        ("rate error final", float(rates[-1]), "1"),
+    ]
+    potential = trajectory.scene.potential
+    if isinstance(potential, UniformGravity):
+        position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=-1)
+        found += [("position error max", float(position.max()), "m"), ("position error final", float(position[-1]), "m")]
+    return found + drifts(trajectory)
+
+
+def drifts(trajectory: Trajectory) -> list[Value]:
+    """Return the measures that need no truth: drift of each invariant of the scene, and orthonormality."""
+    found: list[Value] = []
+    for invariant in trajectory.scene.invariants:
+        relative = trajectory.drift(invariant)
+        size = sizes(relative)
+        slope = secular_slope(trajectory.t, relative)
+        found += [
+            (f"{invariant.name} drift max", float(size.max()), "1"),
+            (f"{invariant.name} drift final", float(size[-1]), "1"),
+            (f"{invariant.name} drift slope", slope.value, "1/s"),
+            (f"{invariant.name} drift slope stderr", slope.stderr, "1/s"),
+        ]
+    return [*found, ("orthonormality max", float(orthonormality(trajectory.R_WB).max()), "1")]
+
+
+def names(scene: Scene) -> list[tuple[str, str]]:
+    """Return (measure, unit) of all that `measure` finds for a scene: what a run that failed has no values of."""
+    start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
+    return [(name, unit) for name, _, unit in measure(start, start)]
+
+
+def secular_slope(t: Array, drift: Array) -> Slope:
+    """Return the least-squares slope of a drift (n,) over t (n,) with its standard error.
+
+    Of a vector (n, 3) the length of the three slopes. The standard error takes the residuals as independent; a drift that only
+    oscillates has a slope within a few of them, or one that shrinks as the run gets longer.
+    """
+    n = len(t)
+    if n < 3:
+        return Slope(float("nan"), float("nan"))
+    columns = drift.reshape(n, -1)
+    centred = t - t.mean()
+    square = float(centred @ centred)
+    slopes = centred @ columns / square
+    residuals = columns - columns.mean(axis=0) - np.outer(centred, slopes)
+    variances = np.sum(residuals**2, axis=0) / (n - 2) / square
+    value = float(slopes[0]) if drift.ndim == 1 else float(np.linalg.norm(slopes))
+    return Slope(value, float(np.sqrt(variances.sum())))
+
+
+def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:
+    """Raise `BadInput` unless the trajectory's times are the first ones of the truth's, to round-off."""
+    n = len(trajectory)
+    if n == 0:
+        raise BadInput("trajectory", "no sample", "one sample or more")
+    allowed = f"the {n} times of the trajectory, to {trajectory.t[-1]:g} s, or more"
+    if len(truth) < n:
+        raise BadInput("truth", f"{len(truth)} samples", allowed)
+    off = np.abs(truth.t[:n] - trajectory.t).max()
+    if off > 1e-12 * max(1.0, abs(float(trajectory.t[-1]))):
+        raise BadInput("truth", f"times that differ by up to {off:.3g} s", allowed)

@@ -1,0 +1,218 @@
+"""From an error measured over a short run to the error to expect over a long one, and what that rests on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.invariants import sizes
+from conservative.trajectory import Trajectory
+
+from ..measures.errors import secular_slope
+
+TREND = 0.5
+"""Share of the largest drift that a straight line must explain for the drift to count as one that goes on."""
+SIGNIFICANT = 3.0
+"""Standard errors that its slope must be away from zero."""
+FASTER_THAN_LINEAR = 10.0
+"""How far above a straight line a disturbance must rise before it is called amplified."""
+LOST = 0.2
+"""Error, rad, from which on one says nothing any more about how errors grow: angles end at pi."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Change of an invariant, relative to its scale.
+
+    Attributes
+    ----------
+    name
+        Of the invariant.
+    measured
+        The largest over the run.
+    expected
+        The largest to expect over the duration: in proportion to time where `secular`, else as measured.
+    slope
+        Of a straight line through it, 1/s.
+    secular
+        Whether it goes on in one direction.
+    """
+
+    name: str
+    measured: float
+    expected: float
+    slope: float
+    secular: bool
+
+
+def drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
+    """Return the drift of every invariant of a run, and what to expect of it over `duration` s."""
+    found = []
+    for invariant in trajectory.scene.invariants:
+        relative = trajectory.drift(invariant)
+        largest = float(sizes(relative).max())
+        slope, stderr = secular_slope(trajectory.t, relative)
+        length = float(trajectory.t[-1])
+        secular = abs(slope) > SIGNIFICANT * stderr and abs(slope) * length > TREND * largest
+        factor = max(1.0, duration / length) if secular else 1.0
+        found.append(Drift(invariant.name, largest, largest * factor, slope, secular))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """The law by which an error is carried from a run to the duration.
+
+    Attributes
+    ----------
+    length, error
+        Of the run, s, and the largest attitude error over it, rad.
+    exponent
+        p of t^p between half the run and all of it.
+    linear, quadratic
+        Coefficients of a t + b t^2, rad/s and rad/s^2, b the larger of what that exponent says and what a steady drift of an
+        invariant makes of the phase.
+    excess
+        Factor by which the motion itself amplifies errors beyond that, between the length and the duration.
+    scaled
+        Where the law is that of a coarser setting, how it was carried over; else empty.
+    """
+
+    length: float
+    error: float
+    exponent: float
+    linear: float
+    quadratic: float
+    excess: float
+    scaled: str = ""
+
+    def at(self, duration: float) -> float:
+        """Return the error to expect over `duration` s, rad; infinite where the body's attitude is lost."""
+        if self.error >= LOST:
+            return math.inf
+        if self.covers(duration):
+            return self.error
+        return self.excess * max(self.error, self.linear * duration + self.quadratic * duration**2)
+
+    def holds(self, error: float) -> float:
+        """Return for how long, s, the error to expect stays within `error`, rad; without amplification by the motion."""
+        if not self.linear + self.quadratic > 0:
+            return math.inf
+        root = math.sqrt(self.linear**2 + 4 * self.quadratic * error)
+        return 2 * error / (self.linear + root)
+
+    def covers(self, duration: float) -> bool:
+        """Whether nothing needs to be extrapolated."""
+        return not self.scaled and self.length >= duration * (1 - 1e-9)
+
+    def finer(self, factor: float, how: str) -> Growth:
+        """Return the law for a setting with `factor` times the error; `how` says in words where the factor comes from."""
+        linear, quadratic = self.linear * factor, self.quadratic * factor
+        return replace(self, error=self.error * factor, linear=linear, quadratic=quadratic, scaled=how)
+
+    def law(self, duration: float) -> str:
+        """Return in words what `at` did."""
+        if self.covers(duration):
+            return f"measured over all {duration:g} s"
+        run = f"measured over {self.length:.3g} s{self.scaled}"
+        if self.error >= LOST:
+            return f"{run}, lost there"
+        if math.isinf(self.excess):
+            return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
+        steady, growing = self.linear * duration, self.quadratic * duration**2
+        kind = "linearly" if growing <= 0.1 * steady else "quadratically" if steady <= 0.1 * growing else "as a t + b t^2"
+        times = f", times {self.excess:.2g} as the motion amplifies errors" if self.excess > FASTER_THAN_LINEAR else ""
+        return f"{run} (grew as t^{self.exponent:.1f}), extrapolated {kind} to {duration:g} s{times}"
+
+
+def growth(t: Array, error: Array, phase_acceleration: float, excess: float) -> Growth:
+    """Return the law of an error.
+
+    With E1 and E2 the largest error over the first half of the run and over all of it, a t + b t^2 goes through both where the
+    error grows faster than t and slower than t^2; b is 0 below that, and a above.
+
+    Parameters
+    ----------
+    t
+        Times (n,), s, from 0.
+    error
+        Attitude errors (n,), rad.
+    phase_acceleration
+        Rate at which a steady drift of an invariant changes the rate of the phase, rad/s^2.
+    excess
+        See `Growth`.
+    """
+    length, whole = float(t[-1]), float(error.max())
+    half = float(error[t <= length / 2 * (1 + 1e-9)].max())
+    exponent = math.log2(whole / half) if half > 0 else 0.0
+    b = min(max(2 * (whole - 2 * half) / length**2, 0.0), whole / length**2)
+    a = max(whole / length - b * length, 0.0)
+    return Growth(length, whole, exponent, a, max(b, phase_acceleration / 2), excess)
+
+
+@dataclass(frozen=True, eq=False)
+class Amplification:
+    """What becomes of a small disturbance of the start.
+
+    Attributes
+    ----------
+    t, factor
+        Times (n,), s, and the largest difference so far (n,), rad, for each unit of relative change of the rates.
+    disturbance
+        The relative change that was made.
+    label
+        Who computed both motions.
+    """
+
+    t: Array
+    factor: Array
+    disturbance: float
+    label: str
+
+    @property
+    def _known(self) -> int:
+        """Return how many samples come before the two motions have nothing in common any more."""
+        lost = self.factor * self.disturbance > LOST
+        return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the two motions have nothing in common in the end."""
+        return self._known < len(self.t)
+
+    @property
+    def until(self) -> float:
+        """End of what is known, s."""
+        return float(self.t[self._known - 1])
+
+    @property
+    def becomes(self) -> float:
+        """Largest difference up to there, rad."""
+        return float(self.factor[self._known - 1]) * self.disturbance
+
+    @property
+    def steepness(self) -> float:
+        """By how much the disturbance ends above a straight line through what it was after an eighth of the samples."""
+        last = self._known - 1
+        early = max(1, last // 8)
+        if self.factor[early] <= 0:
+            return math.inf if self.factor[last] > 0 else 1.0
+        return float(self.factor[last] / self.factor[early] * self.t[early] / self.t[last])
+
+    @property
+    def unstable(self) -> bool:
+        """Whether the disturbance grows far more than in proportion to time."""
+        return self.steepness > FASTER_THAN_LINEAR
+
+    def excess(self, start: float, end: float) -> float:
+        """Return how much more than in proportion to time a disturbance grows between two times; infinite where lost."""
+        if self.lost and self.unstable and self.until < end:
+            return math.inf
+        known, last = slice(self._known), min(end, self.until)
+        if last <= start:
+            return 1.0
+        before, after = np.interp([start, last], self.t[known], self.factor[known]).tolist()
+        return max(1.0, after / before * start / last) if before > 0 else 1.0

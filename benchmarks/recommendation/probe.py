@@ -1,0 +1,219 @@
+"""Probe runs: one method at one setting, its error against the truth, and the error that this makes expect in the end.
+
+Samples of all runs are multiples of one spacing, a round number, and steps are that spacing divided or multiplied by a product
+of twos and fives: so they are numbers that people type, and one truth serves all runs of a motion that has no closed form.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from conservative.attitude import Array, angle_between
+from conservative.method import Grid, Method
+from conservative.scene import Scene
+
+from ..studies.case import Case, Done, attempt
+from ..studies.selection import tolerance_setting
+from .extrapolation import LOST, Amplification, Drift, Growth, drifts, growth
+
+SAFETY = 0.5
+"""Share of the wanted error that settings are chosen for."""
+RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
+"""Longest run of a short and of a long probe, s of wall time: with a short step it covers less of the motion."""
+LONG_SAMPLES = 256
+LEAST_SAMPLES = 4
+STEPS = 8
+"""Least number of steps in a short window."""
+MUCH_LONGER = 4
+"""How much longer than a run at a finer setting one at a coarser setting has to be for its law to be taken."""
+
+_ROUND = sorted({2**a * 5**b for a in range(44) for b in range(19) if 2**a * 5**b <= 10**13})
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One run.
+
+    Attributes
+    ----------
+    method, dt
+        What ran; dt in s, of an adaptive method the distance of samples.
+    length, error
+        Of the run, s, and its largest attitude error against the truth, rad; nan where it failed.
+    expected, law
+        Largest error to expect over the whole duration, rad, infinite where the attitude is lost; in words how that follows.
+    holds
+        For how long the wanted error may be expected to hold, s.
+    growth
+        The law; None where the run failed.
+    drifts
+        Of the invariants.
+    cost
+        Wall time per simulated second of this one run, s/s, to plan with; nan where it failed. Not interleaved.
+    status
+        "ok", or what failed.
+    """
+
+    method: Method
+    dt: float
+    length: float
+    error: float
+    expected: float
+    law: str
+    holds: float
+    growth: Growth | None
+    drifts: tuple[Drift, ...]
+    cost: float
+    status: str
+
+    @property
+    def setting(self) -> float:
+        """The tolerance of an adaptive method, else the step, s."""
+        name = tolerance_setting(self.method)
+        return self.dt if name is None else float(getattr(self.method, name))
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What all probes of a scene have in common.
+
+    Attributes
+    ----------
+    scene, error, duration
+        What is asked: the largest attitude error, rad, over s.
+    cost_limit
+        Wall time per simulated second, s/s, that a setting may cost.
+    spacing, samples
+        Distance of samples, s, and their number in a short window.
+    truth
+        From a grid to true attitudes (n, 3, 3).
+    truth_until
+        End of the truth, s.
+    rate
+        Largest angular speed, rad/s.
+    amplification
+        What becomes of a disturbance.
+    """
+
+    scene: Scene
+    error: float
+    duration: float
+    cost_limit: float
+    spacing: float
+    samples: int
+    truth: Callable[[Grid], Array]
+    truth_until: float
+    rate: float
+    amplification: Amplification
+
+    @property
+    def short(self) -> float:
+        """Length of a short window, s."""
+        return self.samples * self.spacing
+
+    @property
+    def target(self) -> float:
+        """Error that settings are chosen for, rad."""
+        return SAFETY * self.error
+
+    def step_at_most(self, dt: float) -> float:
+        """Return the longest round step, s, of at most dt."""
+        if dt >= self.spacing:
+            return self.spacing * float(_ROUND[bisect.bisect_right(_ROUND, dt / self.spacing * (1 + 1e-9)) - 1])
+        return self.spacing / float(_ROUND[bisect.bisect_left(_ROUND, self.spacing / dt * (1 - 1e-9))])
+
+    def step_at_least(self, dt: float) -> float:
+        """Return the shortest round step, s, of at least dt."""
+        if dt >= self.spacing:
+            return self.spacing * float(_ROUND[bisect.bisect_left(_ROUND, dt / self.spacing * (1 - 1e-9))])
+        return self.spacing / float(_ROUND[bisect.bisect_right(_ROUND, self.spacing / dt * (1 + 1e-9)) - 1])
+
+    def window(self, dt: float, cost: float, long: bool) -> Grid:
+        """Return the samples of a run whose steps are dt s long, or shorter, and cost `cost` s/s: as far as the limit goes.
+
+        A short window has the spacing's samples, a long one goes as far as there is truth to measure it by.
+        """
+        least = max(1, round(dt / self.spacing))
+        affordable = (LONG_RUN_LIMIT if long else RUN_LIMIT) / cost if cost > 0 else math.inf
+        length = min(self.duration, affordable, self.truth_until if long else self.short)
+        sampling = least * max(1, math.ceil(length / (LONG_SAMPLES * least * self.spacing) * (1 - 1e-9)))
+        n = max(LEAST_SAMPLES, math.ceil(length / (sampling * self.spacing) * (1 - 1e-9)))
+        return Grid(sampling * self.spacing, n)
+
+    def probe(self, method: Method, dt: float, cost: float, long: bool, before: Sequence[Probe] = ()) -> Probe:
+        """Return what a run of a method shows.
+
+        Parameters
+        ----------
+        method, dt
+            What runs; dt in s, without a meaning for an adaptive method.
+        cost
+            What it is expected to cost, s/s; nan where nobody knows.
+        long
+            Which window.
+        before
+            Probes at longer steps.
+        """
+        adaptive = tolerance_setting(method) is not None
+        samples = self.window(self.spacing if adaptive else dt, cost, long)
+        each = 1 if adaptive else round(samples.dt / dt)
+        grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
+        outcome = attempt(Case("recommendation", self.scene, method, grid))
+        length = samples.dt * samples.n_steps
+        if not isinstance(outcome, Done):
+            reason = f"{outcome.status}: {outcome.detail}" if outcome.detail else outcome.status
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, reason)
+        return self._measured(method, grid, samples, outcome, before)
+
+    def _measured(self, method: Method, grid: Grid, samples: Grid, outcome: Done, before: Sequence[Probe]) -> Probe:
+        trajectory = outcome.trajectory
+        error = angle_between(self.truth(samples), trajectory.R_WB)
+        found = drifts(trajectory, self.duration)
+        length, largest = float(trajectory.t[-1]), float(error.max())
+        # A steady change of energy or momentum is one of the speed at which the body goes round.
+        phase = self.rate * max((abs(drift.slope) for drift in found if drift.secular), default=0.0)
+        law = growth(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
+        law = self._carried(method, grid.dt, length, before) or law
+        exceeded = error > self.error
+        holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.holds(self.error))
+        expected, cost = law.at(self.duration), outcome.cost.first_call / length
+        return Probe(
+            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, trajectory.status
+        )
+
+    def _carried(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> Growth | None:
+        """Return the law of the coarser setting that ran longest, carried to a finer one by the method's order.
+
+        A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. None
+        where the finer run is about as long itself.
+        """
+        whole = [probe for probe in before if self.tells(probe)]
+        if not whole or ((name := tolerance_setting(method)) is None and method.order is None):
+            return None
+        base = max(whole, key=lambda probe: (probe.length, -probe.setting))
+        enough = min(base.length / MUCH_LONGER, self.duration)
+        if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
+            return None
+        assert base.growth is not None  # or it would tell nothing
+        if name is not None:
+            factor, how = (
+                getattr(method, name) / base.setting,
+                f" at {name} = {base.setting:g}, carried here in proportion to it",
+            )
+        else:
+            order = method.order or 0
+            factor, how = (dt / base.dt) ** order, f" at dt = {base.dt:.3g} s, carried here by order {order}"
+        carried = base.growth.finer(factor, how)
+        # What rounding leaves: a random walk of the rate, a rounding unit a step.
+        rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
+        return replace(carried, linear=carried.linear + rounding)
+
+    def tells(self, probe: Probe) -> bool:
+        """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
+        whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
+        return whole and probe.growth is not None and not probe.growth.scaled and probe.error < LOST

@@ -1,0 +1,1 @@
+"""Studies: which rows to make, from scenes x methods x steps."""

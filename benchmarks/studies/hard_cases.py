@@ -1,0 +1,77 @@
+"""The study of the hard cases: every registered scene with every method, one or two settings of each.
+
+Rows are errors of attitude and rates, drifts of all that the scene conserves, and a status, over `TURN` rad of the motion at
+the scene's own step. Nothing is left out because a method looks bad on it; what a method cannot do has rows that say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from conservative import registry
+from conservative.method import Grid, Method, grid_for
+from conservative.scene import Scene
+
+from ..measures import errors
+from ..measures.measurement import Measurement
+from .case import Case, Failed, attempt
+from .paper import measured
+from .stability import TIMEOUT
+from .time_limit import TooLong, within
+
+if TYPE_CHECKING:
+    from .studies import Progress, Study
+
+TURN = 60.0
+"""Part of the motion that is looked at, rad turned by the body at its first rate: multi-precision truth costs seconds."""
+LIMIT = 20.0
+"""Time, s, that a run is waited for; compilation is in it."""
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Return every registered scene with its default parameters, by group."""
+    return tuple(sorted(map(registry.scene, registry.registered(registry.SCENES)), key=lambda scene: scene.group))
+
+
+def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
+    """Return one or two settings of each family: of ours the first and the last one listed, of an engine the first two."""
+    families: dict[str, list[Method]] = {}
+    for method in methods:
+        families.setdefault(method.name if method.family == "missing" else method.family, []).append(method)
+    found: list[Method] = []
+    for members in families.values():
+        if members[0].room != "truth":
+            second = members[-1] if members[0].room == "ours" else members[min(1, len(members) - 1)]
+            found += dict.fromkeys((members[0], second))
+    return tuple(found)
+
+
+def grid(scene: Scene) -> Grid:
+    """Return the steps of a scene: its own, over its duration or `TURN`, whichever is shorter."""
+    rate = float(np.linalg.norm(scene.w_WB_B0))
+    end = min(scene.t_end, TURN / rate) if rate else scene.t_end
+    return grid_for(scene, min(scene.dt, end), end)
+
+
+def hard_cases(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield all errors, drifts and work of every method on every scene."""
+    methods = [method for method in study.methods if method.room != "truth"]
+    total = len(study.scenes) * len(methods)
+    for i, scene in enumerate(study.scenes):
+        progress(i * len(methods), total, f"{scene.name}: truth")
+        steps = grid(scene)
+        truth = study.truth(scene, steps).trajectory
+        for j, method in enumerate(methods):
+            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+            case = Case(study.name, scene, method, steps)
+            try:
+                outcome = within(LIMIT, lambda case=case: attempt(case, study.skip_missing))  # type: ignore[misc]
+            except TooLong as late:
+                outcome = Failed(TIMEOUT, str(late))
+            if isinstance(outcome, Failed):
+                yield from case.blanks(errors.names(scene), outcome.status, outcome.detail)
+            else:
+                yield from measured(case, outcome, truth)

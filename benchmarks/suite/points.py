@@ -1,0 +1,157 @@
+"""The points of the suite behind `pytest --benchmark`, and everything about one of them that does not depend on the clock."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+
+from conservative import registry
+from conservative.attitude import rotation_about
+from conservative.method import Grid, Method, grid_for
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..gate import yardstick
+from ..measures import errors
+from ..measures.convergence_order import observed_order
+from ..studies import selection, step_ladder, studies
+from ..studies.case import Case, Done, attempt
+
+SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
+"""The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
+PAPER = SCENES[:2]
+"""Where orders are fitted and our kernels are timed against the yardstick."""
+SHORT = {
+    "gauss": ("gauss:stages=2", "gauss:stages=6"),
+    "moser_veselov": ("moser_veselov:order=2", "moser_veselov:order=exact"),
+    "reduced": ("reduced:order=2", "reduced:order=4", "reduced:order=6"),
+    "heyoka": ("heyoka:tol=1e-9", "heyoka:tol=1e-16"),
+    "mujoco": ("mujoco:Euler", "mujoco:RK4"),
+    "pinocchio": ("pinocchio:RK4",),
+    "scipy": ("scipy:rtol=1e-9",),
+}
+"""Settings that stand for families with many; every other registered family has its variants in the suite."""
+NUDGES = (-2, -1, 1, 2)
+"""Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
+PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
+"""Attitudes at which the energies of two potentials tell them apart."""
+RUNGS = 6
+"""Steps of the ladder that an observed order is fitted to; high orders need all of theirs, which are short."""
+
+
+@dataclass(frozen=True)
+class Gated:
+    """A value that should not change, and how much round-off alone changes it."""
+
+    value: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class Point:
+    """A scene, a method, and the scene's own step."""
+
+    scene: Scene
+    method: Method
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The steps, each with a sample."""
+        return grid_for(self.scene, self.scene.dt)
+
+    @property
+    def id(self) -> str:
+        """Such as `brick_flip-reduced_o4-dt0.01`."""
+        return selection.identifier(self.scene, self.method, self.scene.dt)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the time is gated: that of what is itself under test, in the paper's scenes."""
+        return self.method.room == "ours" and self.scene.name in PAPER
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What tells the row apart for the gate and for a reader; the version of an engine must stay, ours must not."""
+        label = self.method.label
+        engine = label if self.method.room == "engine" else ""
+        return {
+            "scene": self.scene.name,
+            "method": self.method.name,
+            "label": label,
+            "engine": engine,
+            "definition": self.definition,
+        }
+
+    @property
+    def definition(self) -> str:
+        """Hash of what is integrated, how, and over which steps: measures of two definitions cannot be compared."""
+        scene, body = self.scene, self.scene.body
+        energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
+        numbers = (body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, self.grid.dt, self.grid.n_steps], energies)
+        words = [scene.name, self.method.name, *(invariant.name for invariant in scene.invariants)]
+        text = json.dumps([words, [_digits(values) for values in numbers], yardstick.definition() if self.timed else ""])
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def points() -> Iterator[Point]:
+    """Yield the points: every registered method, those of other packages as well, on every scene of the suite."""
+    names = [name for family in registry.registered(registry.METHODS) for name in SHORT.get(family, (family,))]
+    methods = [method for method in selection.methods(names, skip_missing=True) if method.room != "truth"]
+    return (Point(scene, method) for scene in selection.scenes(SCENES) for method in methods)
+
+
+@cache
+def truth(scene: Scene, grid: Grid) -> Trajectory:
+    """Return the exact motion, kept for all methods."""
+    exact: Trajectory = studies.reference(scene, grid).trajectory
+    return exact
+
+
+def gated(point: Point) -> dict[str, Gated]:
+    """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
+    exact = truth(point.scene, point.grid)
+    runs = [point.scene, *(nudged(point.scene, nudge) for nudge in NUDGES)]
+    found = [_measured(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
+    values = {name: Gated(found[0][name], _range([each[name] for each in found])) for name in found[0]}
+    return values | (observed(point) if point.scene.name in PAPER else {})
+
+
+def nudged(scene: Scene, nudge: int) -> Scene:
+    """Return the scene with a start that differs by `nudge` units in the last place of its largest rate."""
+    pattern = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
+    return replace(scene, w_WB_B0=scene.w_WB_B0 + nudge * pattern)
+
+
+def _measured(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
+    """Return errors and drifts at their largest, and the method's counters."""
+    counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
+    return {name: value for name, value, _ in errors.measure(trajectory, exact) if name.endswith(" max")} | counters
+
+
+def observed(point: Point) -> dict[str, Gated]:
+    """Return the observed order of the attitude; nothing where a method has or shows none."""
+    scene, method = point.scene, point.method
+    if method.order is None:
+        return {}
+    exact = truth(scene, step_ladder.samples(scene, method))
+    grids = step_ladder.steps(scene, method)[: RUNGS if method.order < step_ladder.HIGH_ORDER else None]
+    found = [attempt(Case("order", scene, method, grid)) for grid in grids]
+    sizes = [errors.measure(each.trajectory, exact)[0][1] if isinstance(each, Done) else np.nan for each in found]
+    order = observed_order([grid.dt for grid in grids], sizes)
+    return {} if order.reason else {"observed order": Gated(order.slope, 0.0)}
+
+
+def _range(values: list[float]) -> float:
+    return float(max(values) - min(values))
+
+
+def _digits(values: object) -> list[float]:
+    """Return numbers without the last digits, in which two machines differ."""
+    flat = np.ravel(np.asarray(values, dtype=float))
+    scale = np.abs(flat).max(initial=0.0) or 1.0
+    return [float(f"{value:.9e}") + 0.0 for value in np.round(flat / scale, 10) * float(f"{scale:.10e}")]

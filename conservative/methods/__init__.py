@@ -1,0 +1,1 @@
+"""Our methods, one file each, and what several of them share."""

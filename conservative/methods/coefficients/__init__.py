@@ -1,0 +1,1 @@
+"""Coefficients of compositions, Gauss-Legendre collocation and explicit methods, which check themselves."""

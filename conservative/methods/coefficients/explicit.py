@@ -1,0 +1,109 @@
+"""Explicit Runge-Kutta coefficients as data that checks itself. Source: each carries its own."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...attitude import Array
+from ...errors import BadInput
+
+Row = tuple[float, ...]
+ROUND_OFF = 1e-13
+"""How far sums of coefficients of size 50, given to a float's precision, may be off."""
+
+
+@dataclass(frozen=True)
+class ExplicitTableau:
+    """An explicit Runge-Kutta method.
+
+    Attributes
+    ----------
+    source
+        Where it was published.
+    order
+        The order that it claims.
+    A
+        Row i has the i coefficients of the slopes that stage i is made of: the first row is empty.
+    b
+        Weights (stages,) of the slopes.
+
+    Raises
+    ------
+    BadInput
+        A row has another length, or the weights are not a quadrature of the order: sum b c^k = 1/(k+1) for k below it, and the
+        chains b A c^k with one A more. What more the order asks for shows as the observed order, in the tests.
+    """
+
+    source: str
+    order: int
+    A: tuple[Row, ...]
+    b: Row
+
+    def __post_init__(self) -> None:
+        if [len(row) for row in self.A] != list(range(len(self.b))):
+            raise BadInput("A", f"rows of {[len(row) for row in self.A]}", f"rows of 0 to {len(self.b) - 1} coefficients")
+        for k in range(self.order):
+            powers = tuple(c**k for c in self.c)
+            self._require(f"sum b c^{k}", powers, 1 / (k + 1))
+            if k + 1 < self.order:
+                once = tuple(math.fsum(a * p for a, p in zip(row, powers, strict=False)) for row in self.A)
+                self._require(f"sum b A c^{k}", once, 1 / ((k + 1) * (k + 2)))
+
+    def _require(self, name: str, values: Row, wanted: float) -> None:
+        got = math.fsum(b * value for b, value in zip(self.b, values, strict=True))
+        if abs(got - wanted) > ROUND_OFF:
+            raise BadInput("b", f"{name} = {got!r}", f"{wanted!r}, as order {self.order} asks for")
+
+    @cached_property
+    def packed(self) -> tuple[Array, Array, Array]:
+        """What is not zero of A and, last, of b: factors (n,), their columns (n,), and where in those each row starts."""
+        rows = [[(value, column) for column, value in enumerate(row) if value] for row in (*self.A, self.b)]
+        values, columns = zip(*itertools.chain(*rows), strict=True)
+        return np.array(values), np.array(columns), np.cumsum([0, *map(len, rows)])
+
+    @property
+    def c(self) -> Row:
+        """Times of the stages relative to the step: sums of the rows."""
+        return tuple(math.fsum(row) for row in self.A)
+
+
+DORMAND_PRINCE_8 = ExplicitTableau(
+    source="Dormand & Prince; Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, II.5 (DOP853)",
+    order=8,
+    A=(
+        (),
+        (0.05260015195876773,),
+        (0.0197250569845379, 0.0591751709536137),
+        (0.02958758547680685, 0.0, 0.08876275643042054),
+        (0.2413651341592667, 0.0, -0.8845494793282861, 0.924834003261792),
+        (0.037037037037037035, 0.0, 0.0, 0.17082860872947386, 0.12546768756682242),
+        (0.037109375, 0.0, 0.0, 0.17025221101954405, 0.06021653898045596, -0.017578125),
+        (0.03709200011850479, 0.0, 0.0, 0.17038392571223998, 0.10726203044637328, -0.015319437748624402, 0.008273789163814023),
+        (
+            *(0.6241109587160757, 0.0, 0.0, -3.3608926294469414, -0.868219346841726, 27.59209969944671),
+            *(20.154067550477894, -43.48988418106996),
+        ),
+        (
+            *(0.47766253643826434, 0.0, 0.0, -2.4881146199716677, -0.590290826836843, 21.230051448181193),
+            *(15.279233632882423, -33.28821096898486, -0.020331201708508627),
+        ),
+        (
+            *(-0.9371424300859873, 0.0, 0.0, 5.186372428844064, 1.0914373489967295, -8.149787010746927),
+            *(-18.52006565999696, 22.739487099350505, 2.4936055526796523, -3.0467644718982196),
+        ),
+        (
+            *(2.273310147516538, 0.0, 0.0, -10.53449546673725, -2.0008720582248625, -17.9589318631188, 27.94888452941996),
+            *(-2.8589982771350235, -8.87285693353063, 12.360567175794303, 0.6433927460157636),
+        ),
+    ),
+    b=(
+        *(0.054293734116568765, 0.0, 0.0, 0.0, 0.0, 4.450312892752409, 1.8915178993145003, -5.801203960010585),
+        *(0.3111643669578199, -0.1521609496625161, 0.20136540080403034, 0.04471061572777259),
+    ),
+)
+"""Twelve stages of order 8 with small error constants; made for steps of adaptive length, used here with constant ones."""

@@ -1,0 +1,114 @@
+"""The paper's integrator as it stands: convected base vectors and their momenta, implicit constraints, 18 unknowns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..attitude import Array
+from ..check import positive_number
+from ..errors import NotConverged
+from ..method import Grid, Method, Run
+from ..scene import Scene
+from ..trajectory import Counters, Trajectory
+
+MAX_ITERATIONS = 20
+Linearised = Callable[[Array, Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Convected(Method):
+    """Krenk & Nielsen's algorithm, Table 1, with its analytic tangent (29); read `kernels/convected.py` beside the paper.
+
+    Parameters
+    ----------
+    tol
+        The paper's eps: Newton stops where the norm of the residual (27) is at most this.
+
+    Raises
+    ------
+    BadInput
+        tol is not a number above 0.
+    """
+
+    tol: float = 1e-8
+
+    family: ClassVar[str] = "convected"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+
+    def __post_init__(self) -> None:
+        positive_number("tol", self.tol)
+
+    @property
+    def order(self) -> int:
+        return 2
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        from ..kernels.convected import G, conjugate_momentum
+
+        q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
+        u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
+        J_inverse = np.ascontiguousarray(scene.body.inverse)
+        linearised = _linearised(scene, grid.dt, J_inverse)
+
+        def run() -> Trajectory:
+            u, corrections, failure = _march(linearised, u0, grid, self.tol)
+            q, p = u[:, :9].copy(), u[:, 9:].copy()
+            L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
+            R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
+            done = grid.n_steps if failure is None else failure.step - 1
+            work = Counters(steps=done, stages=done, iterations=corrections)
+            return Trajectory(scene, grid.t[: len(u)], R_WB, L @ J_inverse, self.label, work, failure)
+
+        return run
+
+
+def _linearised(scene: Scene, dt: float, J_inverse: Array) -> Linearised:
+    """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
+    from ..kernels.convected import finite_gradient, residual_and_tangent
+
+    if scene.potential is None:
+        return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
+    field = scene.potential.kernel_field(np.eye(3))
+
+    def linearised(u0: Array, u1: Array) -> tuple[Array, Array]:
+        V_star, dV_star = finite_gradient(field, u0[:9], u1[:9])
+        return residual_and_tangent(dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
+
+    return linearised
+
+
+def _march(linearised: Linearised, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
+    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did."""
+    samples, total = [u], 0
+    for step in range(1, grid.n_steps + 1):
+        u, corrections, norm = _stepped(linearised, u, tol)
+        total += corrections
+        if not norm <= tol:
+            return np.array(samples), total, NotConverged(step, (step - 1) * grid.dt, norm)
+        if step % grid.every == 0 or step == grid.n_steps:
+            samples.append(u)
+    return np.array(samples), total, None
+
+
+def _stepped(linearised: Linearised, u0: Array, tol: float) -> tuple[Array, int, float]:
+    """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
+    u = u0  # 2) prediction: the state itself
+    for corrections in range(MAX_ITERATIONS + 1):
+        r, K = linearised(u0, u)  # 3)
+        norm = math.sqrt(r @ r)
+        if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
+            break
+        try:
+            u = u - np.linalg.solve(K, r)  # 4), (28)
+        except np.linalg.LinAlgError:  # steps of a radian and more can end up where the tangent is singular
+            break
+    return u, corrections, norm

@@ -1,0 +1,137 @@
+"""Gauss collocation: any even order, and every quadratic invariant kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from ..attitude import Array, from_quaternion, triple
+from ..check import choice, positive_integer
+from ..errors import BadInput, branch_ended
+from ..lazy_kernels import kernels
+from ..method import Grid, Method, Run
+from ..potentials.potential import UniformGravity
+from ..scene import Scene
+from ..trajectory import Counters, Trajectory
+from .coefficients.gauss_legendre import MOST_STAGES, tableau
+from .non_spinning import FRAMES, Frame, frame_unsupported, in_frame
+from .principal_axes import PrincipalStart, Quadruple, Triple, axes_about, principal_start, quadruple
+
+
+@dataclass(frozen=True)
+class Gauss(Method):
+    """Collocation at s Gauss points: order 2s; energy, momenta and orthonormality to round-off, whatever the step.
+
+    In the body momentum L and the vertical gamma = R' e_z (of a free body: the direction of the world momentum) the motion is a
+    closed system with quadratic invariants only, and collocation at Gauss points keeps all of those (Hairer, Lubich & Wanner,
+    IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
+    the implicit midpoint rule.
+
+    Steps of a radian and more are solved on the branch that leads to them continuously from a step of 0; where that ends
+    before, the run fails: `WrongBranch` if there is a solution elsewhere, else `NotConverged`.
+
+    Parameters
+    ----------
+    stages
+        s, 1 to 10.
+    frame
+        "body", "non_spinning" (the spin of a symmetric body is added in closed form), or "auto": non-spinning where it can be.
+
+    Raises
+    ------
+    BadInput
+        stages is not an integer of 1 to 10, or frame is none of the three.
+    """
+
+    stages: int = 6
+    frame: Frame = "auto"
+
+    family: ClassVar[str] = "gauss"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+
+    def __post_init__(self) -> None:
+        allowed = f"an integer of 1 to {MOST_STAGES}"
+        if positive_integer("stages", self.stages, allowed) > MOST_STAGES:
+            raise BadInput("stages", self.stages, allowed)
+        choice("frame", self.frame, FRAMES)
+
+    @property
+    def order(self) -> int:
+        return 2 * self.stages
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
+
+    def unsupported(self, scene: Scene) -> str | None:
+        if not isinstance(scene.potential, UniformGravity | None):
+            return "collocation keeps quadratic invariants, so a free body or uniform gravity"
+        return frame_unsupported(self.frame, scene)
+
+    @classmethod
+    def variants(cls) -> tuple[Gauss, ...]:
+        return tuple(cls(stages) for stages in (2, 4, 6, 8))
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        frame, label = in_frame(self, scene)
+        start = principal_start(scene, frame)
+        march, coefficients, system = kernels("gauss").march, padded(self.stages), closed_system(start)
+
+        def run() -> Trajectory:
+            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
+            done, work, size, elsewhere = march(self.stages, *coefficients, grid.dt, grid.n_steps, grid.every, *system, q, L)
+            failure = None if done == grid.n_steps else branch_ended(done + 1, done * grid.dt, size, elsewhere)
+            counters = Counters(steps=done, stages=done * self.stages, iterations=work)
+            return start.trajectory(label, grid, done, q, L, counters, failure)
+
+        return run
+
+
+@lru_cache(maxsize=MOST_STAGES)
+def padded(stages: int) -> tuple[Array, ...]:
+    """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
+    table = tableau(stages)
+    extra = (0, -len(table.b) % kernels("simd").LANES)
+    rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
+    return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
+
+
+class ClosedSystem(NamedTuple):
+    """Momentum and vertical as the kernel takes them, in its order: principal axes, momenta in units of `unit` kg m^2/s.
+
+    `q` is the attitude against axes whose third is the vertical, and `left` takes those to world axes.
+    """
+
+    unit: float
+    J_inverse: Triple
+    torque: Triple
+    L: Triple
+    gamma: Triple
+    q: Quadruple
+    left: Quadruple
+
+
+@lru_cache(maxsize=256)
+def closed_system(start: PrincipalStart) -> ClosedSystem:
+    """Return the closed system of a start; the vertical of a free body is the direction of its momentum."""
+    R_WP, L = from_quaternion(start.q), np.array(start.L)
+    size = math.hypot(*start.L)
+    falls = start.field is not None or size == 0
+    R_WV = np.eye(3) if falls else axes_about(R_WP @ L / size)
+    moment = np.zeros(3) if start.field is None else np.array(start.field)
+    # A power of two, so that scaling rounds nothing; a body at rest gets the size of what its field can make of it.
+    largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
+    unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
+    return ClosedSystem(
+        unit,
+        triple(unit * np.array(start.J_inverse)),
+        triple(moment / unit),
+        triple(L / unit),
+        triple(R_WP[2] if falls else L / size),
+        quadruple(R_WV.T @ R_WP),
+        quadruple(R_WV),
+    )

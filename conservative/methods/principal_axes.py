@@ -1,0 +1,113 @@
+"""To principal axes and back: the one conversion that all compiled methods share.
+
+Kernels see a diagonal inertia, the attitude `R_WP` as a quaternion (scalar first) and the momentum `L_P`. Their axes P can be
+those of the frame that does not spin (`conservative.methods.non_spinning`); the spin is put back on the way back. Source: definitions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array, to_quaternion, triple
+from ..attitude import Triple as Triple
+from ..errors import BadInput, Diverged, IntegrationFailed
+from ..invariants import axial_direction
+from ..lazy_kernels import kernels
+from ..method import Grid
+from ..scene import Scene
+from ..trajectory import Counters, Trajectory
+from .non_spinning import Resolved
+
+Quadruple = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalStart:
+    """A scene's start as kernels take it: floats in tuples, principal axes.
+
+    Attributes
+    ----------
+    scene
+        What is converted.
+    J, J_inverse
+        Moments of what the kernel moves, kg m^2, and their inverses.
+    q, L
+        Attitude, scalar first, and momentum, kg m^2/s, at the start.
+    R_BP
+        Rotation (3, 3) from the kernel's axes to those of the body; None where they are the same.
+    field
+        Parameters of the potential in the kernel's axes, None without one.
+    spin
+        Where the third axis is one of symmetry and its spin is left out: the rate of that, rad/s, and 1/J3. Else None.
+    """
+
+    scene: Scene
+    J: Triple
+    J_inverse: Triple
+    q: Quadruple
+    L: Triple
+    R_BP: Array | None
+    field: Any
+    spin: tuple[float, float] | None = None
+
+    def trajectory(
+        self, label: str, grid: Grid, done: int, q: Array, L: Array, work: Counters, failure: IntegrationFailed | None
+    ) -> Trajectory:
+        """Return samples in body axes from quaternions (n, 4) and momenta (n, 3) after `done` steps.
+
+        The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
+        """
+        kept, t = grid.kept(done), grid.t
+        R_WB, w_WB_B = np.empty((kept, 3, 3)), np.empty((kept, 3))
+        finite = kernels("samples").to_body_axes(t, q, L, self.J_inverse, self.spin, self.R_BP, R_WB, w_WB_B)
+        if finite < kept:
+            failure = Diverged(float(t[max(finite - 1, 0)]))
+        return Trajectory(self.scene, t[:finite], R_WB[:finite], w_WB_B[:finite], label, work, failure)
+
+
+@lru_cache(maxsize=256)
+def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
+    """Return the scene's start in principal axes, or in the frame that does not spin. It never changes: it is converted once.
+
+    Raises
+    ------
+    BadInput
+        frame is "non_spinning", and body and field are not symmetric about one axis.
+    """
+    if frame == "body":
+        return start_along(scene, scene.body.R_BP, scene.body.moments)
+    axis_B = axial_direction(scene.body, scene.potential)
+    if axis_B is None:
+        raise BadInput("frame", f"'non_spinning' for the scene {scene.name!r}", "a scene symmetric about one axis")
+    J3 = float(axis_B @ scene.body.inertia @ axis_B)
+    J1 = (float(np.trace(scene.body.inertia)) - J3) / 2
+    start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
+    upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis but for round-off
+    spin = ((J1 - J3) / (J1 * J3) * start.L[2], 1 / J3)
+    return replace(start, J=(J1, J1, J1), J_inverse=(1 / J1, 1 / J1, 1 / J1), field=upright, spin=spin)
+
+
+def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
+    """Return the start in axes (3, 3) along which the scene's body has these moments (3,), kg m^2."""
+    L = (scene.w_WB_B0 @ R_BP) * moments
+    field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
+    turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
+    return PrincipalStart(scene, triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
+
+
+def axes_about(axis: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,); of e_z no rotation at all."""
+    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3]
+    first = np.cross(other, axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first), axis], axis=1)
+
+
+def quadruple(R: Array) -> Quadruple:
+    """Return the quaternion of a rotation (3, 3) as the tuple of floats that kernels take."""
+    w, x, y, z = to_quaternion(R).tolist()
+    return w, x, y, z

@@ -1,0 +1,87 @@
+"""Substepping by name: another method with every step in as many equal parts as its equations need. Source: our own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+from .. import registry
+from ..check import positive_integer
+from ..errors import BadInput, NotConverged
+from ..method import Grid, Method, Run
+from ..scene import Scene
+from ..trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Substepped(Method):
+    """A method whose run, where the equations of a step have no solution, is made again with shorter steps.
+
+    ALL steps of the run are taken in 1, 2, 4, ... equal parts, up to `most`: parts that changed from step to step would cost a
+    symmetric method its long-time behaviour. `Counters.steps` counts parts, and the label of the trajectory says how many there
+    are in a step.
+
+    Parameters
+    ----------
+    method
+        Name of the method with its settings, those after the first separated by "/", as in `reduced:order=4/frame=auto`.
+    most
+        Parts of a step that are allowed.
+
+    Raises
+    ------
+    BadInput
+        The name or a setting is unknown, the method has no step or is itself of this kind, or `most` is not an integer of 1 or
+        more.
+    """
+
+    method: str = "reduced"
+    most: int = 64
+
+    family: ClassVar[str] = "substepped"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+
+    def __post_init__(self) -> None:
+        positive_integer("most", self.most)
+        allowed = "the name of a method of ours with a step, such as 'reduced:order=4'"
+        if not isinstance(self.method, str) or self.method.partition(":")[0] == self.family:
+            raise BadInput("method", repr(self.method), allowed)
+        if self.inner.order is None or self.inner.room != "ours":
+            raise BadInput("method", repr(self.method), allowed)
+
+    @property
+    def inner(self) -> Method:
+        """Return the method that takes the parts."""
+        return registry.method(self.method.replace("/", ","))
+
+    @property
+    def order(self) -> int | None:
+        return self.inner.order
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        return self.inner.conserves
+
+    def unsupported(self, scene: Scene) -> str | None:
+        return self.inner.unsupported(scene)
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        inner = self.inner
+        runs: dict[int, Run] = {}
+
+        def run() -> Trajectory:
+            parts = 1
+            while True:
+                if parts not in runs:
+                    runs[parts] = inner.prepare(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * parts))
+                found = runs[parts]()
+                if 2 * parts > self.most or not isinstance(found.failure, NotConverged):
+                    return self._seen(found, grid, parts)
+                parts *= 2
+
+        return run
+
+    def _seen(self, found: Trajectory, grid: Grid, parts: int) -> Trajectory:
+        """Return the trajectory at the times of the grid itself, under a label that says how many parts there are in a step."""
+        label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
+        return replace(found, t=grid.t[: len(found)], label=label)

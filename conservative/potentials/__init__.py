@@ -1,0 +1,1 @@
+"""Potentials: energy, gradient and finite derivative as functions of attitude."""

@@ -1,0 +1,87 @@
+"""The gradient of gravity, as a satellite feels it. Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import Array, triple
+from ..body import RigidBody
+from ..check import finite_array, positive_number
+from ..errors import BadInput
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class GravityGradient:
+    """The gradient of a far centre's gravity on a body turning about its centre of mass: V = rate^2/2 u'J u, u = R' e.
+
+    The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is rate^2
+    u x J u, body axes. e points to the centre and stays where it is in the world. V is quadratic in the base vectors, so its
+    finite derivative is its gradient at their mean.
+
+    Parameters
+    ----------
+    rate
+        sqrt(3 G M / r^3), 1/s, above 0: sqrt(3) times the rate of a circular orbit at that distance r.
+    inertia
+        That of the body: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
+    direction_W
+        Direction (3,) of the centre, world axes; its length does not matter, but must not be 0.
+
+    Raises
+    ------
+    BadInput
+        A parameter is not finite, of another shape, not above 0, or not an inertia.
+    """
+
+    rate: float
+    inertia: Array
+    direction_W: Array
+
+    def __init__(self, rate: float, inertia: ArrayLike, direction_W: ArrayLike = (0, 0, 1)) -> None:
+        allowed = "three finite numbers (3,), not all 0"
+        direction = finite_array("direction_W", direction_W, ((3,),), allowed)
+        size = np.linalg.norm(direction)
+        if size == 0:
+            raise BadInput("direction_W", direction.tolist(), allowed)
+        direction /= size
+        direction.flags.writeable = False
+        object.__setattr__(self, "rate", positive_number("rate", rate, "a finite rate above 0, 1/s"))
+        object.__setattr__(self, "inertia", RigidBody(inertia).inertia)
+        object.__setattr__(self, "direction_W", direction)
+
+    def _towards(self, R_WB: Array) -> Array:
+        """Return u = R' e, (..., 3)."""
+        return np.swapaxes(R_WB, -1, -2) @ self.direction_W
+
+    def energy(self, R_WB: Array) -> Array:
+        """Return V, (...), in J."""
+        u = self._towards(R_WB)
+        return self.rate**2 / 2 * np.sum(u @ self.inertia * u, axis=-1)
+
+    def gradient(self, R_WB: Array) -> Array:
+        """Return dV/dR = rate^2 e (J u)', (..., 3, 3), in J."""
+        return self.rate**2 * self.direction_W[:, None] * (self._towards(R_WB) @ self.inertia)[..., None, :]
+
+    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
+        """Return V*, (..., 3, 3), in J: the gradient at the mean, exact for a quadratic V."""
+        return self.gradient((R_0 + R_1) / 2)
+
+    def scale(self) -> float:
+        """Return the largest V, J."""
+        return self.rate**2 / 2 * float(np.linalg.eigvalsh(self.inertia)[-1])
+
+    @property
+    def axis_W(self) -> Array:
+        """Return the direction of the centre, (3,)."""
+        return self.direction_W
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return rate^2 J in principal axes, row by row, and the direction as the kernels want them."""
+        from ..kernels.gradient_field import Gradient
+
+        first, second, third = self.rate**2 * (R_BP.T @ self.inertia @ R_BP)
+        return Gradient(triple(first), triple(second), triple(third), triple(self.direction_W))

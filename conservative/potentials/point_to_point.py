@@ -1,0 +1,190 @@
+"""Potentials between a point of the body and a point of the world: a spring, and an attraction by 1/r.
+
+V = F(s) with s = |R b - A|^2, b in body and A in world axes. s is quadratic in the base vectors, so that
+
+    V* = (F(s1) - F(s0)) / (s1 - s0) 2 (Rbar b - A) b'        Rbar the mean of both attitudes
+
+is an exact finite derivative once the divided difference is written without cancellation. Source: our own, in the sense of the
+paper's (21).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import Array, Triple, triple
+from ..check import finite_array, finite_number, positive_number
+from ..errors import BadInput
+
+_POINT = "three finite numbers (3,), m"
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class PointPotential(ABC):
+    """What both kinds share: the points, and everything that follows from `energy_of` and `slope`.
+
+    Parameters
+    ----------
+    point_B
+        Point of the body (3,), m, body axes, from the fixed point.
+    anchor_W
+        Point of the world (3,), m, world axes, from the fixed point.
+
+    Raises
+    ------
+    BadInput
+        A point is not finite or of another shape.
+    """
+
+    point_B: Array
+    anchor_W: Array
+
+    def __init__(self, point_B: ArrayLike, anchor_W: ArrayLike) -> None:
+        for name, value in (("point_B", point_B), ("anchor_W", anchor_W)):
+            array = finite_array(name, value, ((3,),), _POINT)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @abstractmethod
+    def energy_of(self, distance: Array) -> Array:
+        """Return V, (...), in J at distances (...) in m."""
+
+    @abstractmethod
+    def slope(self, distance_0: Array, distance_1: Array) -> Array:
+        """Return the divided difference of V by the squared distance, (...), N/m, between distances (...), m."""
+
+    def _from_anchor(self, R_WB: Array) -> Array:
+        return R_WB @ self.point_B - self.anchor_W
+
+    def distance(self, R_WB: Array) -> Array:
+        """Return how far apart the points are, (...), m, at attitudes (..., 3, 3)."""
+        return np.linalg.norm(self._from_anchor(R_WB), axis=-1)
+
+    def energy(self, R_WB: Array) -> Array:
+        """Return V, (...), in J, at attitudes (..., 3, 3)."""
+        return self.energy_of(self.distance(R_WB))
+
+    def gradient(self, R_WB: Array) -> Array:
+        """Return dV/dR, (..., 3, 3), in J, at matrices (..., 3, 3)."""
+        return self.finite_derivative(R_WB, R_WB)
+
+    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
+        """Return V*, (..., 3, 3), in J: exact for attitudes (..., 3, 3) at any distance."""
+        slope = self.slope(self.distance(R_0), self.distance(R_1))
+        mean = self._from_anchor((R_0 + R_1) / 2)
+        return 2 * slope[..., None, None] * mean[..., :, None] * self.point_B
+
+    @property
+    def axis_W(self) -> Array | None:
+        """Return the direction (3,) of the world point; None where it is the pivot, and the field does nothing."""
+        size = np.linalg.norm(self.anchor_W)
+        return self.anchor_W / size if size > 0 else None
+
+    def _points(self, R_BP: Array) -> tuple[Triple, Triple]:
+        return triple(self.point_B @ R_BP), triple(self.anchor_W)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class LinearSpring(PointPotential):
+    """A spring between a body point and a world point: V = stiffness/2 (distance - rest_length)^2.
+
+    Parameters
+    ----------
+    stiffness
+        N/m, above 0.
+    point_B
+        Where it holds the body (3,), m, body axes, from the fixed point.
+    anchor_W
+        Where it is fastened (3,), m, world axes, from the fixed point.
+    rest_length
+        m, 0 or more. With 0 the potential is quadratic in the base vectors.
+
+    Raises
+    ------
+    BadInput
+        A parameter is not finite, of another shape or out of its range.
+    """
+
+    stiffness: float
+    rest_length: float
+
+    def __init__(self, stiffness: float, point_B: ArrayLike, anchor_W: ArrayLike, rest_length: float = 0.0) -> None:
+        object.__setattr__(self, "stiffness", positive_number("stiffness", stiffness, "a finite number above 0, N/m"))
+        super().__init__(point_B, anchor_W)
+        if finite_number("rest_length", rest_length, "a finite length of 0 or more, m") < 0:
+            raise BadInput("rest_length", rest_length, "a finite length of 0 or more, m")
+        object.__setattr__(self, "rest_length", float(rest_length))
+
+    def energy_of(self, distance: Array) -> Array:
+        """Return V, (...), in J at distances (...) in m."""
+        return self.stiffness / 2 * (distance - self.rest_length) ** 2
+
+    def slope(self, distance_0: Array, distance_1: Array) -> Array:
+        """Return the divided difference of V by the squared distance, (...), N/m."""
+        if self.rest_length == 0:
+            return np.full(np.shape(distance_0), self.stiffness / 2)
+        return self.stiffness / 2 * (1 - 2 * self.rest_length / (distance_0 + distance_1))
+
+    def scale(self) -> float:
+        """Return the energy with the points as far apart as they get and no rest length, J."""
+        return self.stiffness / 2 * float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W)) ** 2
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return points, stiffness and rest length as the kernels want them."""
+        from ..kernels.point_fields import Spring
+
+        return Spring(*self._points(R_BP), self.stiffness, self.rest_length)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class PointAttraction(PointPotential):
+    """Gravity or electricity between a point of the body and a point of the world: V = -strength / distance.
+
+    Parameters
+    ----------
+    strength
+        G m M of two masses, or -q Q / (4 pi epsilon0) of two charges, J m; not 0, and below 0 where they repel.
+    point_B
+        The body's point (3,), m, body axes, from the fixed point.
+    anchor_W
+        The world's point (3,), m, world axes, from the fixed point.
+
+    Raises
+    ------
+    BadInput
+        A parameter is not finite, of another shape, or 0 where it must not be; or both points are the fixed point.
+    """
+
+    strength: float
+
+    def __init__(self, strength: float, point_B: ArrayLike, anchor_W: ArrayLike) -> None:
+        allowed = "a finite number other than 0, J m"
+        if finite_number("strength", strength, allowed) == 0:
+            raise BadInput("strength", strength, allowed)
+        object.__setattr__(self, "strength", float(strength))
+        super().__init__(point_B, anchor_W)
+        if not np.any(self.point_B) and not np.any(self.anchor_W):
+            raise BadInput("anchor_W", "the fixed point, as point_B is", "a point that the body's does not always lie on")
+
+    def energy_of(self, distance: Array) -> Array:
+        """Return V, (...), in J at distances (...) in m."""
+        return -self.strength / distance
+
+    def slope(self, distance_0: Array, distance_1: Array) -> Array:
+        """Return the divided difference of V by the squared distance, (...), N/m."""
+        return self.strength / ((distance_0 + distance_1) * distance_0 * distance_1)
+
+    def scale(self) -> float:
+        """Return the size of V where the points' directions from the pivot are at right angles, J."""
+        return abs(self.strength) / float(np.hypot(np.linalg.norm(self.point_B), np.linalg.norm(self.anchor_W)))
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return points and strength as the kernels want them."""
+        from ..kernels.point_fields import Attraction
+
+        return Attraction(*self._points(R_BP), self.strength)

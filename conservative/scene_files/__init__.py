@@ -1,0 +1,1 @@
+"""Scene files: a body, a potential and a start in TOML."""

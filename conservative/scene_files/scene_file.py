@@ -1,0 +1,193 @@
+"""Scenes from TOML files: a person's own body without a line of Python. Nothing in a file is ever executed.
+
+`conservative new > my_body.toml` writes a file with every key explained; a command takes `my_body.toml` where it takes the
+name of a scene. Units are SI: m, kg, s, rad. Keys are checked strictly, and every complaint has its line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import registry
+from ..attitude import Array, from_quaternion, rotation_about
+from ..body import RigidBody
+from ..check import finite_array, finite_number, rotation
+from ..errors import BadInput
+from ..potentials.gravity_gradient import GravityGradient
+from ..potentials.point_to_point import LinearSpring, PointAttraction
+from ..potentials.potential import Potential, UniformGravity
+from ..scene import Scene
+from ..shapes import SHAPES, MassDistribution
+from .toml_reader import Table, keys_of, read
+
+_TOP = ("name", "t_end", "dt", "body", "potential", "start")
+# The keys of a potential or a shape are the parameters of what builds it, so there is no second list to keep.
+_POTENTIALS: dict[str, Callable[..., Potential]] = {
+    "uniform_gravity": UniformGravity,
+    "linear_spring": LinearSpring,
+    "point_attraction": PointAttraction,
+    "gravity_gradient": GravityGradient,
+}
+_PLACED = ("com_B", "R_BS")
+
+
+def template() -> str:
+    """Return a scene file with every key explained, which loads as it is."""
+    return files(__package__).joinpath("template.toml").read_text(encoding="utf-8")
+
+
+def choices() -> dict[str, dict[str, list[str]]]:
+    """Return what can stand under `shape` and `kind`, and the forms of an attitude, each with the keys that go with it."""
+    potentials = {name: keys_of(build) for name, build in _POTENTIALS.items()}
+    potentials["uniform_gravity"].append("g")
+    potentials["gravity_gradient"].remove("inertia")  # the body's
+    return {
+        "shape": {name: keys_of(build) for name, build in SHAPES.items()},
+        "kind": potentials,
+        "R_WB": {name: keys_of(build) for name, build in _ATTITUDES.items()},
+    }
+
+
+def load(path: str | Path) -> Scene:
+    """Return the scene in a TOML file.
+
+    Parameters
+    ----------
+    path
+        The file; paths in it are relative to its folder. `template` shows the format.
+
+    Raises
+    ------
+    BadFile
+        The file cannot be read or a key or value in it cannot be used; a `BadInput` with the line.
+    MissingEngine
+        The body stands in another file whose engine is not installed.
+    """
+    top = read(Path(path))
+    top.only(_TOP)
+    t_end = top.value("t_end", "a finite duration above 0, s")
+    body, mass = _body(top.table("body", "inertia, a shape or another file; see `conservative new`"))
+    potential = _potential(top.table("potential", "kind and what it takes"), body, mass) if "potential" in top else None
+    R_WB0, w_WB_B0 = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
+    name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
+    dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
+    with top.blamed():
+        return Scene(name, body, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path))
+
+
+def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
+    """Return the body and, where the file says so much, its mass and centre of mass."""
+    sources = ("inertia", "shape", *registry.registered(registry.BODY_FILES))
+    given = [key for key in table.values if key in sources]
+    if not given:
+        table.only({*sources, "name", *_PLACED, *(key for shape in SHAPES.values() for key in keys_of(shape))})
+        raise table.bad("inertia", "nothing: the body is missing", "one of " + ", ".join(sources))
+    if len(given) > 1:
+        raise table.bad(given[1], f"{given[1]} beside {given[0]}", "one of " + ", ".join(sources))
+    if given == ["inertia"]:
+        table.only(("inertia",))
+        return table.call(RigidBody), None
+    mass = _shape(table) if given == ["shape"] else _from_file(table, given[0])
+    if "com_B" in table:
+        mass = table.call(mass.about)
+    with table.blamed(inertia=given[0]):
+        return mass.body, mass
+
+
+def _shape(table: Table) -> MassDistribution:
+    name = table.choice("shape", SHAPES)
+    table.only(("shape", *keys_of(SHAPES[name]), *_PLACED))
+    return table.call(SHAPES[name]).turned(_attitude(table, "R_BS"))
+
+
+def _from_file(table: Table, kind: str) -> MassDistribution:
+    table.only((kind, "name", "com_B"))
+    path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
+    name = table.text("name", f"the name of the body in {path}")
+    with table.blamed(path=kind):
+        found: MassDistribution = registry.body_file(kind)(path, name)
+    return found
+
+
+def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:
+    kind = table.choice("kind", _POTENTIALS)
+    known = {"kind", *keys_of(_POTENTIALS[kind])}
+    if kind == "uniform_gravity":
+        table.only({*known, "g"})
+        return _gravity_on(table, mass) if "g" in table else table.call(UniformGravity)
+    if kind == "gravity_gradient":
+        table.only(known - {"inertia"})
+        return table.call(GravityGradient, inertia=body.inertia)
+    table.only(known)
+    return table.call(_POTENTIALS[kind])
+
+
+def _gravity_on(table: Table, mass: MassDistribution | None) -> UniformGravity:
+    if mass is None:
+        raise table.bad("g", "an acceleration, but of the body only the inertia is known", "weight, N, and com_B, m, instead")
+    if "weight" in table or "com_B" in table:
+        raise table.bad(
+            "g", "g beside weight or com_B", "g alone, as the body's mass and centre are known, or both of the others"
+        )
+    return table.call(mass.gravity)
+
+
+def _start(table: Table) -> tuple[Array, Array]:
+    """Return attitude (3, 3) and rates (3,)."""
+    table.only(("R_WB", "w_WB_B"))
+    allowed = "three finite rates (3,), rad/s"
+    with table.blamed():
+        rates = finite_array("w_WB_B", table.value("w_WB_B", allowed), ((3,),), allowed)
+    return _attitude(table, "R_WB"), rates
+
+
+def _attitude(table: Table, key: str) -> Array:
+    """Return the rotation (3, 3) under `key`: a matrix, or a table with another form of it; none is the identity."""
+    if key not in table:
+        return np.eye(3)
+    if not isinstance(table.values[key], dict):
+        with table.blamed():
+            return rotation(key, table.value(key, "a rotation matrix (3, 3)"))
+    forms = table.table(key, "one form of a rotation")
+    forms.only({*_ATTITUDES, "angle"})
+    given = {"axis" if form == "angle" else form for form in forms.values}
+    if len(given) != 1:
+        got = " beside ".join(forms.values) or "an empty table"
+        raise table.bad(key, got, "a matrix, or one of: quaternion_wxyz; rotation_vector; axis and angle")
+    return forms.call(_ATTITUDES[given.pop()])
+
+
+def _quaternion(quaternion_wxyz: ArrayLike) -> Array:
+    q = _direction("quaternion_wxyz", quaternion_wxyz, 4, "four finite numbers (4,), scalar first, not all 0")
+    return from_quaternion(q / np.linalg.norm(q))
+
+
+def _vector(rotation_vector: ArrayLike) -> Array:
+    allowed = "three finite numbers (3,): unit axis times angle, rad"
+    v = finite_array("rotation_vector", rotation_vector, ((3,),), allowed)
+    angle = float(np.linalg.norm(v))
+    return rotation_about(v, angle) if angle > 0 else np.eye(3)
+
+
+def _axis_angle(axis: ArrayLike, angle: float) -> Array:
+    direction = _direction("axis", axis, 3, "three finite numbers (3,), not all 0; their length does not matter")
+    return rotation_about(direction, finite_number("angle", angle, "a finite angle, rad"))
+
+
+def _direction(argument: str, value: ArrayLike, size: int, allowed: str) -> Array:
+    found = finite_array(argument, value, ((size,),), allowed)
+    if not found.any():
+        raise BadInput(argument, repr(value), allowed)
+    return found / np.abs(found).max()
+
+
+_ATTITUDES: dict[str, Callable[..., Array]] = {
+    "quaternion_wxyz": _quaternion,
+    "rotation_vector": _vector,
+    "axis": _axis_angle,
+}

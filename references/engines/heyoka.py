@@ -1,0 +1,117 @@
+"""heyoka: Taylor integration at any tolerance, on the formulation that suits it. Source: Biscani & Izzo (2021)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.check import choice, finite_number
+from conservative.errors import BadInput
+from conservative.method import Grid, Method, Run
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory
+
+from ..engine import gravity_or_free, symmetric_axes, version
+from ..heyoka_equations import forms, formulations
+
+FRAMES = ("body", "non_spinning", "lean")
+
+# Up to here it is cheaper (5 to 20 %) not to keep the polynomials of the steps for evaluation between their ends.
+_FEW_SAMPLES = 8
+
+
+@dataclass(frozen=True)
+class Heyoka(Method):
+    """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
+
+    Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy;
+    `fast_math` gains nothing and is left off). Samples are Taylor polynomials of the steps, so they cost no accuracy.
+
+    Parameters
+    ----------
+    tol
+        Relative error of a step, above 0 and below 1. Values below 2.2e-16 are round-off with a term or two more.
+    frame
+        "body": quaternion and body rates in principal axes, which is what anybody would write. "non_spinning", for a body
+        symmetric about an axis, free or in a field along it: quaternion of the frame that turns with l/J1, and world momentum
+        l; spin in closed form afterwards. "lean": the fewest products an evaluation that we found, the strongest opponent:
+        rates and one angle (asymmetric free body); axis, momentum and one angle (symmetric top that stays away from one of
+        the poles); otherwise the non-spinning frame where there is one, and "body" where not.
+
+    Raises
+    ------
+    BadInput
+        tol is out of range or the frame is unknown.
+    MissingEngine
+        heyoka is not installed.
+    """
+
+    tol: float = 1e-16
+    frame: str = "body"
+
+    family: ClassVar[str] = "heyoka"
+    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+
+    def __post_init__(self) -> None:
+        if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
+            raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
+        choice("frame", self.frame, FRAMES)
+        version("heyoka", "heyoka")
+
+    @property
+    def label(self) -> str:
+        return f"heyoka=={version('heyoka', 'heyoka')}/tol={self.tol:g},{self.frame}"
+
+    @property
+    def order(self) -> None:
+        return None
+
+    def unsupported(self, scene: Scene) -> str | None:
+        reason = gravity_or_free(scene)
+        if reason is None and self.frame == "non_spinning" and symmetric_axes(scene) is None:
+            return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"
+        return reason
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        problem = getattr(formulations, self.frame)(scene)
+        integrator, label = forms.compiled(problem.form, self.tol), self.label
+        propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
+
+        def run() -> Trajectory:
+            # The integrator is shared by all scenes of its form, and holds what the last run left.
+            integrator.time = 0.0
+            integrator.state[:] = problem.start
+            # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
+            integrator.pars[:] = problem.parameters[: len(integrator.pars)]
+            states, steps, outcome = propagate(integrator, grid.t)
+            R_WF, w = problem.readout(grid.t[: len(states)], states)
+            return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), f"heyoka: {outcome.name}")
+
+        return run
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        tols = (1e-6, 1e-9, 1e-12, 1e-16)
+        return (*(cls(tol) for tol in tols), *(cls(tol, "non_spinning") for tol in tols), *(cls(tol, "lean") for tol in tols))
+
+
+def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, Any]:
+    """Return states (n, m), number of steps and outcome of one call that evaluates the steps' polynomials at the samples."""
+    outcome, _, _, steps, _, states = integrator.propagate_grid(t)
+    return states, int(steps), outcome
+
+
+def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, Any]:
+    """Return the same, with steps cut at the samples."""
+    states, steps, outcome = np.full((len(t), len(integrator.state)), np.nan), 0, None
+    states[0] = integrator.state
+    for sample, time in enumerate(t[1:], start=1):
+        outcome, _, _, taken, *_ = integrator.propagate_until(time)
+        steps += int(taken)
+        if not np.isfinite(integrator.state).all():
+            break
+        states[sample] = integrator.state
+    return states, steps, outcome

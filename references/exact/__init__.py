@@ -1,0 +1,1 @@
+"""Closed forms of the free body and the Lagrange top."""

@@ -1,0 +1,158 @@
+"""The motion of a free rigid body in closed form (Jacobi 1849; Whittaker, Analytical Dynamics, 69; van Zon & Schofield 2007).
+
+In principal axes, ordered so that 2 is the middle one and the momentum never leaves the side of +3,
+
+    L = (L1max cn v, L2max sn v, L3max dn v),     v = v0 + Omega t.
+
+With m = L/|L| the attitude against the fixed momentum is R = Rz(2 chi) P(m), where P is the smallest rotation that takes m to
+e_z; m3 > 0 keeps it away from its singularity. Then
+
+    2 chi' = |L|/J3 + (2T/|L| - |L|/J3) / (1 + m3),
+
+whose pole at 1 + m3 = 0, dn v = -|L|/L3max, makes exp(i chi) the phase of exp(i mu t) theta_4(v - i y) with quarter periods
+(K, 2 K') and dc(y, 1 - m) = |L|/L3max.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from conservative.attitude import Array
+
+from .clock import Clock, rotation_clock
+from .start import Matrix, Start, Vector, as_array, cross, from_halves, norm, rounded_halves, turned
+from .theta import Lattice, Number, Points, Quotient, Theta, jacobi, mp, theta
+
+
+@dataclass(frozen=True, eq=False)
+class Polhode:
+    """Moments and momentum in axes 1, 2, 3 as above, and what follows from them by sums of terms of one sign.
+
+    `R_BP` has the axes as columns, turned so that L1 and L3 are not negative.
+    """
+
+    J: Vector
+    L: Vector
+    R_BP: Matrix
+
+    def gap(self, i: int, j: int) -> Number:
+        """Return 1/J_i - 1/J_j; gaps of rising indices have one sign."""
+        return (self.J[j] - self.J[i]) / (self.J[i] * self.J[j])
+
+    @property
+    def size(self) -> Number:
+        """|L|."""
+        return norm(self.L)
+
+    @property
+    def excess(self) -> Number:
+        """2T - |L|^2/J3, of the sign of the gaps."""
+        return self.L[0] ** 2 * self.gap(0, 2) + self.L[1] ** 2 * self.gap(1, 2)
+
+    @property
+    def largest(self) -> Vector:
+        """L1max, L2max, L3max."""
+        third = (self.L[1] ** 2 * self.gap(0, 1) + self.L[2] ** 2 * self.gap(0, 2)) / self.gap(0, 2)
+        return [mp.sqrt(self.excess / self.gap(0, 2)), mp.sqrt(self.excess / self.gap(1, 2)), mp.sqrt(third)]
+
+    @property
+    def lattice(self) -> Lattice:
+        """Periods of L in v; 1 - m = (L3min/L3max)^2 is 0 on the separatrix."""
+        L2max, L3max = self.largest[1:]
+        m = (L2max / L3max) ** 2 * self.gap(0, 1) / self.gap(0, 2)
+        # L3min^2 is the one difference. Without a division it is exact, so that the separatrix itself gives 0.
+        (J1, J2, J3), (L1, _, L3) = self.J, self.L
+        least = (J1 * (J3 - J2) * L3**2 - J3 * (J2 - J1) * L1**2) / (J1 * (J3 - J2))
+        return Lattice.of(m, max(least / L3max**2, mp.mpf(0)))
+
+
+def polhode(start: Start) -> Polhode:
+    """Return the start in ordered axes. The sign of |L|^2 - 2 T J2 says which of the outer axes the momentum goes around."""
+    J, axes = start.principal
+    w = start.rates(axes)
+    a, b, c = sorted(range(3), key=lambda i: J[i])
+    around_small = w[a] ** 2 * J[a] * (J[b] - J[a]) > w[c] ** 2 * J[c] * (J[c] - J[b])
+    order = (c, b, a) if around_small else (a, b, c)
+    signs = [mp.mpf(-1 if w[i] < 0 else 1) for i in order]
+    columns = [[axes[row, i] * sign for row in range(3)] for i, sign in zip(order, signs, strict=True)]
+    columns[1] = cross(columns[2], columns[0])
+    R_BP = mp.matrix(columns).T
+    moments = [J[i] for i in order]
+    return Polhode(moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """A free motion ready to be evaluated: shape of the polhode, clocks and theta functions."""
+
+    size: Number
+    largest: Array
+    inverse_J: Array
+    lattice: Lattice
+    argument: Clock
+    turn: Clock
+    parts: tuple[Quotient, Quotient, Quotient]
+    phase: Theta
+    R_BP: Array
+    q_PB: tuple[complex, complex]
+    q_Wl: tuple[complex, complex]
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
+        v, odd = self.argument.reduced(t)
+        points = Points(self.lattice, v)
+        sn, cn, dn = (points.quotient(part).real for part in self.parts)
+        flip = 1 - 2 * odd
+        m = np.stack([flip * cn, flip * sn, dn], axis=-1) * self.largest
+        chi = self.turn.turned(t) * Points(self.phase.lattice, v).theta(self.phase)
+        q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
+        R_WB = from_halves(*turned(turned(self.q_Wl, q_lP), self.q_PB))
+        return R_WB, (m * (float(self.size) * self.inverse_J)) @ self.R_BP.T
+
+
+def free_motion(start: Start) -> FreeMotion:
+    """Return the motion from a start that is not steady."""
+    axes = polhode(start)
+    J, L, size, largest, lattice = axes.J, axes.L, axes.size, axes.largest, axes.lattice
+    omega = axes.gap(0, 2) * largest[0] * largest[2] / largest[1]
+    cn, sn, dn = (a / b for a, b in zip(L, largest, strict=True))
+    v0 = sn * mp.elliprf(cn**2, dn**2, 1)
+    phase = pole_phase(axes, lattice)
+    value, slope = phase.value_and_slope(mp.mpf(0))
+    excess = axes.excess / size
+    mu = (size / J[2] + excess / (1 + largest[2] / size)) / 2 - omega * (slope / value).imag
+    R_lP0 = smallest_rotation([x / size for x in L])
+    return FreeMotion(
+        size,
+        np.array([float(x / size) for x in largest]),
+        np.array([float(1 / x) for x in J]),
+        lattice,
+        Clock(v0, omega, 2 * lattice.K),
+        rotation_clock(-mp.arg(phase.value_and_slope(v0)[0]), mu),
+        jacobi(lattice),
+        phase,
+        as_array(axes.R_BP),
+        rounded_halves(axes.R_BP.T),
+        rounded_halves(start.attitude * axes.R_BP * R_lP0.T),
+    )
+
+
+def pole_phase(axes: Polhode, lattice: Lattice) -> Theta:
+    """Return theta_4(v - i y) with quarter periods (K, 2 K').
+
+    K' - y = A F(1 - A^2, 1 - A^2 (1 - m), 1) with Carlson's F and A = L3max/|L|, which also holds where K' is infinite.
+    """
+    L1max, L2max, L3max = (x / axes.size for x in axes.largest)
+    m_part = L2max**2 * axes.gap(0, 1) / axes.gap(0, 2)  # A^2 m
+    rest = L3max * mp.elliprf(L1max**2, L1max**2 + m_part, 1)
+    y = lattice.K_prime - rest
+    return theta(Lattice(lattice.K, 2 * lattice.K_prime), 4, y, lattice.K_prime + rest)
+
+
+def smallest_rotation(m: Vector) -> Matrix:
+    """Return the smallest rotation that takes the unit vector m, m3 > -1, to e_z."""
+    x, y, z = m
+    k = 1 / (1 + z)
+    return mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])

@@ -1,0 +1,246 @@
+"""The Lagrange top in closed form (Klein & Sommerfeld, Theorie des Kreisels, VI; Whittaker, Analytical Dynamics, 72).
+
+Axis 3 is the body's, on the side of the centre of mass; R = Rz(phi) Rx(theta) Rz(psi), u = cos theta. With k = m g l/J1,
+b_z = L_z/J1, b3 = L3/J1, w = w1 + i w2, u_E = u + |w|^2/(2 k) (constant)
+
+    u'^2 = 2 k (u_E - u)(1 - u^2) - (b_z - b3 u)^2 = 2 k (u - u1)(u2 - u)(u3 - u)
+    u = u1 + (u2 - u1) sn^2 v,     v = v0 + Omega t,     Omega^2 = k (u3 - u1)/2
+
+Euler's angles are singular at the poles u = -1 and 1. The Cayley-Klein parameters and the transverse rate are not. Each of
+
+    alpha = cos(theta/2) exp(i (phi + psi)/2)     alpha'/alpha = ( u' + i (b_z + b3)) / (2 (u + 1)) + i (w3 - b3)/2
+    beta  = sin(theta/2) exp(i (phi - psi)/2)     beta'/beta   = (-u' + i (b_z - b3)) / (2 (1 - u)) - i (w3 - b3)/2
+    w                                             w'/w         = (-u' - i (b_z - b3 u_E)) / (2 (u_E - u)) - i (w3 - b3/2)
+
+is a constant times exp(i mu t) theta_j(v - i y)/theta_4(v), with j = 1 for alpha and 2 for the others: it vanishes where u, as
+a function of complex time, is -1, 1 or u_E. A passage next to a pole, or through it, is a theta function next to its zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from conservative.attitude import Array
+
+from .clock import Clock, rotation_clock
+from .start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, root, rounded_halves, turned, unit
+from .theta import ComplexArray, Lattice, Number, Points, Quotient, jacobi, mp, quotient
+
+_SAME = mp.mpf(10) ** -60
+"""Roots of the cubic closer than this are one: its double roots come out with half of the 150 digits."""
+
+_UPRIGHT = mp.mpf(10) ** -24
+"""A tilt or a swing, rad, below which the axis is taken as vertical for good; the digits of the cubic end there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Top:
+    """A top at its start, in many digits; symbols as above, `spin` is w3, `R_BP` has the top's axes as columns."""
+
+    k: Number
+    b3: Number
+    spin: Number
+    w: Number
+    alpha: Number
+    beta: Number
+    R_BP: Matrix
+
+    @cached_property
+    def across(self) -> Number:
+        """gamma1 + i gamma2 of the vertical gamma = R' e_z."""
+        return mp.mpc(0, 2) * mp.conj(self.alpha) * self.beta
+
+    @cached_property
+    def u(self) -> Number:
+        """gamma3."""
+        return abs(self.alpha) ** 2 - abs(self.beta) ** 2
+
+    @cached_property
+    def b_z(self) -> Number:
+        """Vertical momentum over J1."""
+        return (mp.conj(self.across) * self.w).real + self.b3 * self.u
+
+    @property
+    def u_E(self) -> Number:
+        """Where the transverse rate would vanish."""
+        return self.u + abs(self.w) ** 2 / (2 * self.k)
+
+    @property
+    def rising(self) -> bool:
+        """Whether u' >= 0."""
+        return bool((mp.conj(self.across) * self.w).imag >= 0)
+
+    @property
+    def upright(self) -> bool:
+        """Whether it stands or hangs without moving its axis."""
+        return bool(abs(self.across) < _UPRIGHT and abs(self.w) < _UPRIGHT * mp.sqrt(self.k))
+
+    @property
+    def slopes(self) -> tuple[Number, Number, Number]:
+        """Derivatives of alpha, beta and w."""
+        alpha, beta, w, i = self.alpha, self.beta, self.w, mp.mpc(0, 1)
+        return (
+            (i * self.spin * alpha - beta * mp.conj(w)) / 2,
+            (alpha * w - i * self.spin * beta) / 2,
+            -i * (self.spin - self.b3) * w - i * self.k * self.across,
+        )
+
+
+def top(start: Start, moment_B: Array, axis_B: Array) -> Top:
+    """Return the top of a body symmetric about `axis_B`, to which the moment m g c is parallel."""
+    moments, axes = start.principal
+    moment = mp.matrix([mp.mpf(float(x)) for x in moment_B])
+    third = max(range(3), key=lambda i: abs(sum(axes[row, i] * float(axis_B[row]) for row in range(3))))
+    J3, J1 = moments[third], (moments[third - 1] + moments[third - 2]) / 2
+    axis = axes[:, third]
+    if spherical(start):  # every axis is one of symmetry: take the one through the centre of mass
+        J1 = J3 = sum(moments) / 3
+        axis = moment / mp.norm(moment)
+    lever = (axis.T * moment)[0]
+    R_BP = frame(axis * mp.sign(lever), axes[:, third - 2])
+    w1, w2, w3 = start.rates(R_BP)
+    alpha, beta = halves(start.attitude * R_BP)
+    return Top(abs(lever) / J1, J3 * w3 / J1, w3, mp.mpc(w1, w2), alpha, beta, R_BP)
+
+
+def spherical(start: Start) -> bool:
+    """Whether the three moments differ by no more than rounding."""
+    moments = start.principal[0]
+    return bool(max(moments) - min(moments) <= SYMMETRIC * max(moments))
+
+
+def frame(axis: Matrix, near: Matrix) -> Matrix:
+    """Return the rotation whose third column is a unit vector and whose first is as `near` another one as can be."""
+    helpers = [near, *(mp.eye(3)[:, i] for i in range(3))]
+    first = next(rest for rest in (x - axis * (axis.T * x)[0] for x in helpers) if mp.norm(rest) > 0.5)
+    first = first / mp.norm(first)
+    second = mp.matrix(cross(list(axis), list(first)))
+    return mp.matrix([list(first), list(second), list(axis)]).T
+
+
+@dataclass(frozen=True, eq=False)
+class Nutation:
+    """The roots u1 <= u2 <= 1 <= u3 and what the theta functions need of them."""
+
+    u1: Number
+    u2: Number
+    u3: Number
+    lattice: Lattice
+
+    def below(self, a: Number) -> tuple[Number, Number]:
+        """Return (y, K' - y) with u = a <= u1 at v = i y."""
+        rest = mp.sqrt(self.u3 - self.u1) * mp.elliprf(self.u1 - a, self.u2 - a, self.u3 - a)
+        return self.lattice.K_prime - rest, rest
+
+    def above(self, a: Number) -> tuple[Number, Number]:
+        """Return (y, K' - y) with u = a, u2 <= a <= u3, at v = K + i y."""
+        if self.u3 == self.u2:
+            return mp.mpf(0), self.lattice.K_prime
+        rest = root((self.u3 - a) / (self.u3 - self.u2)) * mp.elliprf(
+            (a - self.u2) / (self.u3 - self.u2), (a - self.u1) / (self.u3 - self.u1), 1
+        )
+        return self.lattice.K_prime - rest, rest
+
+    def start(self, u: Number, rising: bool) -> Number:
+        """Return v, |v| <= K, at a value of u."""
+        if self.u1 == self.u2:
+            return mp.mpf(0)
+        size = self.u2 - self.u1
+        sn = root(unit((u - self.u1) / size))
+        v = sn * mp.elliprf(unit((self.u2 - u) / size), unit((self.u3 - u) / (self.u3 - self.u1)), 1)
+        return v if rising else -v
+
+
+def nutation(start: Top) -> Nutation:
+    """Return the roots of the cubic, by Viete's formula, and the periods."""
+    u_E, b3, b_z, k = start.u_E, start.b3, start.b_z, start.k
+    square, linear, constant = -(u_E + b3**2 / (2 * k)), b_z * b3 / k - 1, u_E - b_z**2 / (2 * k)
+    p = square**2 / 9 - linear / 3
+    q = (linear * square - 3 * constant) / 6 - square**3 / 27
+    angle = mp.acos(max(min(q / mp.sqrt(p) ** 3, mp.mpf(1)), mp.mpf(-1))) / 3 if p > 0 else mp.mpf(0)
+    u3, u2, u1 = (2 * root(p) * mp.cos(angle + turn * 2 * mp.pi / 3) - square / 3 for turn in (0, -1, 1))
+    u1, u2, u3 = (merged(u, (start.u, mp.mpf(1), mp.mpf(-1))) for u in (u1, u2, u3))
+    u1, u2, u3 = max(min(u1, start.u), mp.mpf(-1)), min(max(u2, start.u), mp.mpf(1)), max(u3, mp.mpf(1))
+    return Nutation(u1, u2, u3, Lattice.of((u2 - u1) / (u3 - u1), (u3 - u2) / (u3 - u1)))
+
+
+def merged(u: Number, marks: tuple[Number, ...]) -> Number:
+    """Return the mark that a root equals up to rounding, or the root."""
+    return next((mark for mark in marks if abs(u - mark) < _SAME), u)
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """exp(i mu t) times a quotient of theta functions."""
+
+    clock: Clock
+    shape: Quotient
+
+    def at(self, t: Array, points: Points) -> ComplexArray:
+        """Return the factor (n,)."""
+        return self.clock.turned(t) * points.quotient(self.shape)
+
+
+def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, start: Number, slope: Number) -> Factor:
+    """Return the factor whose phase turns at `rate` where the argument is v, and that starts at v0 with a value and a slope.
+
+    The constant is taken from the larger of the two: a factor may start next to its zero.
+    """
+    value, derivative = shape.value_and_slope(v)
+    mu = rate - omega * (derivative / value).imag
+    value, derivative = shape.value_and_slope(v0)
+    scale = start / value if abs(omega * start) > abs(slope) else slope / (omega * derivative + mp.mpc(0, mu) * value)
+    return Factor(rotation_clock(mp.mpf(0), mu), shape.scaled(scale))
+
+
+@dataclass(frozen=True, eq=False)
+class TopMotion:
+    """A motion ready to be evaluated."""
+
+    argument: Clock
+    lattice: Lattice
+    alpha: Factor
+    beta: Factor
+    w: Factor
+    w_scale: float
+    spin: float
+    R_BP: Array
+    q_PB: tuple[complex, complex]
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
+        v, odd = self.argument.reduced(t)
+        points = Points(self.lattice, v)
+        R_WB = from_halves(*turned((self.alpha.at(t, points), self.beta.at(t, points)), self.q_PB))
+        w = self.w_scale * (1 - 2 * odd) * self.w.at(t, points)
+        w_P = np.stack([w.real, w.imag, np.full_like(w.real, self.spin)], axis=-1)
+        return R_WB, w_P @ self.R_BP.T
+
+
+def top_motion(start: Top) -> TopMotion:
+    """Return the motion from a start that is not upright."""
+    roots = nutation(start)
+    lattice, u_E = roots.lattice, max(min(start.u_E, roots.u3), roots.u2)
+    omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
+    v0 = roots.start(start.u, start.rising)
+    v = mp.mpf(1)  # anywhere that no factor vanishes, |v| < K
+    u = roots.u1 + (roots.u2 - roots.u1) * jacobi(lattice)[0].value_and_slope(v)[0].real ** 2
+    plus, minus, across = start.b_z + start.b3, start.b_z - start.b3, start.b3 * u_E - start.b_z
+    slip = (start.spin - start.b3) / 2
+    rates = (plus / (2 * (1 + u)) + slip, minus / (2 * (1 - u)) - slip, across / (2 * (u_E - u)) - start.spin + start.b3 / 2)
+    shapes = (
+        quotient(lattice, 1, *roots.below(mp.mpf(-1)), mirrored=bool(plus < 0)),
+        quotient(lattice, 2, *roots.above(mp.mpf(1)), mirrored=bool(minus < 0)),
+        quotient(lattice, 2, *roots.above(u_E), mirrored=bool(across < 0)),
+    )
+    w_scale = mp.sqrt(2 * start.k * (u_E - roots.u1))
+    values = (start.alpha, start.beta, start.w / w_scale)
+    slopes = (*start.slopes[:2], start.slopes[2] / w_scale)
+    parts = zip(shapes, rates, values, slopes, strict=True)
+    alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
+    R_BP = as_array(start.R_BP)
+    argument = Clock(v0, omega, 2 * lattice.K)
+    return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, rounded_halves(start.R_BP.T))

@@ -1,0 +1,198 @@
+"""A scene in the forms of `conservative.references.heyoka_equations.forms`: which axes, which numbers, and how states become attitudes and rates.
+
+Source: our own, measured against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from conservative.attitude import Array, from_quaternion, hat
+from conservative.scene import Scene
+
+from ..engine import Axes, principal_axes, symmetric_axes
+from . import forms
+
+_SMALLEST_POLE_DISTANCE = 0.7
+"""Least 1 + n_z at which axis and angle are still taken; nearer to the pole they take more steps than they save products."""
+
+_DOWN = np.diag([1.0, -1.0, -1.0])
+"""Turns the world over, for tops that swing below the fixed point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Formulation:
+    """A scene as heyoka integrates it.
+
+    Attributes
+    ----------
+    axes
+        Axes F in which it is written.
+    form, parameters, start
+        Equations, values of their parameters, state at t = 0.
+    readout
+        Attitudes (n, 3, 3) and rates (n, 3) in F from times (n,) and states (n, m).
+    """
+
+    axes: Axes
+    form: forms.Form
+    parameters: list[float]
+    start: Array
+    readout: Callable[[Array, Array], tuple[Array, Array]]
+
+
+def body(scene: Scene) -> Formulation:
+    """Return quaternion and rates in principal axes."""
+    axes = principal_axes(scene)
+    form, parameters = forms.form_of(forms.body, _euler(axes))
+
+    def readout(_: Array, states: Array) -> tuple[Array, Array]:
+        return from_quaternion(states[:, :4]), states[:, 4:]
+
+    return Formulation(axes, form, parameters, np.concatenate([axes.q0, axes.w0]), readout)
+
+
+def non_spinning(scene: Scene) -> Formulation:
+    """Return quaternion and momentum of the frame that turns with l/J1; the spin of a symmetric body is in closed form."""
+    axes = _symmetric(scene)
+    u0, spin = _slow_rates(axes)
+    form, parameters = forms.form_of(forms.non_spinning, [axes.moment[2] / axes.J[0], u0[2]])
+
+    def readout(t: Array, states: Array) -> tuple[Array, Array]:
+        R_WF = from_quaternion(states[:, :4]) @ _about_3(spin * t)
+        return R_WF, _body_rates(axes, R_WF, states[:, 4:6], u0[2])
+
+    return Formulation(axes, form, parameters, np.concatenate([axes.q0, u0[:2]]), readout)
+
+
+def lean(scene: Scene) -> Formulation:
+    """Return the form with the fewest products that does the scene."""
+    axes = symmetric_axes(scene)
+    if axes is None:
+        # A body at rest has no momentum to turn about.
+        return _free_rates_and_angle(scene) if scene.free and scene.kinetic_energy0 > 0 else body(scene)
+    lowest, highest = _heights(axes)
+    if scene.free or max(1 + lowest, 1 - highest) < _SMALLEST_POLE_DISTANCE:
+        return non_spinning(scene)
+    return _axis_and_angle(axes, np.eye(3) if lowest > -highest else _DOWN)
+
+
+def _free_rates_and_angle(scene: Scene) -> Formulation:
+    axes = _circulating(principal_axes(scene))
+    L0 = axes.J * axes.w0
+    momentum = float(np.linalg.norm(L0))
+    slope = momentum / axes.J[2]
+    numerator = (L0 @ axes.w0 - momentum * slope) / axes.J[2]
+    form, parameters = forms.form_of(forms.free_rates_and_angle, [*_gyroscopic(axes), slope, numerator])
+    base = axes.R_WF0 @ _least(L0[None] / momentum)[0]
+
+    def readout(t: Array, states: Array) -> tuple[Array, Array]:
+        w = states[:, :3]
+        L = w * axes.J
+        direction = L / np.sqrt(np.einsum("ni,ni->n", L, L))[:, None]
+        to_momentum = np.swapaxes(_least(direction), 1, 2)
+        return base @ _about_3(slope * t + states[:, 3]) @ to_momentum, w
+
+    return Formulation(axes, form, parameters, np.append(axes.w0, 0.0), readout)
+
+
+def _axis_and_angle(axes: Axes, world: Array) -> Formulation:
+    R0 = world @ axes.R_WF0
+    u0, spin = _slow_rates(axes)
+    u0, n0, k = world @ u0, R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
+    form, parameters = forms.form_of(forms.axis_and_angle, [k, u0[2], u0 @ n0 + u0[2]])
+    turned = _least(n0[None])[0].T @ R0
+    p0 = float(np.arctan2(turned[1, 0], turned[0, 0]))
+
+    def readout(t: Array, states: Array) -> tuple[Array, Array]:
+        n = states[:, :3]
+        R = _least(n / np.sqrt(np.einsum("ni,ni->n", n, n))[:, None]) @ _about_3(states[:, 5] + spin * t)
+        return world @ R, _body_rates(axes, R, states[:, 3:5], u0[2])
+
+    return Formulation(axes, form, parameters, np.array([*n0, *u0[:2], p0]), readout)
+
+
+def _gyroscopic(axes: Axes) -> list[float]:
+    J1, J2, J3 = axes.J.tolist()
+    return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
+
+
+def _euler(axes: Axes) -> list[float]:
+    """Return the parameters of Euler's equations; the torque is g x m, with g the vertical and m the moment of the weight."""
+    return [*_gyroscopic(axes), *(-hat(axes.moment) / axes.J[:, None]).ravel().tolist()]
+
+
+def _symmetric(scene: Scene) -> Axes:
+    axes = symmetric_axes(scene)
+    assert axes is not None  # `Heyoka.unsupported` has seen to it
+    return axes
+
+
+def _slow_rates(axes: Axes) -> tuple[Array, float]:
+    """Return the rates l/J1 of the slow frame, world axes, and the rate of the body in it, about its axis."""
+    J1, _, J3 = axes.J.tolist()
+    return axes.R_WF0 @ (axes.J * axes.w0) / J1, (1 - J3 / J1) * float(axes.w0[2])
+
+
+def _body_rates(axes: Axes, R_WF: Array, u12: Array, u3: float) -> Array:
+    """Return body rates (n, 3) from u = l/J1, of which the third component is constant."""
+    u = np.empty((len(u12), 1, 3))
+    u[:, 0, :2], u[:, 0, 2] = u12, u3
+    return (u @ R_WF)[:, 0] * (axes.J[0] / axes.J)
+
+
+def _heights(axes: Axes) -> tuple[float, float]:
+    """Return the lowest and highest n_z of a symmetric top: the roots, about the start, of the cubic that is J1^2 n_z'^2."""
+    (J1, _, J3), M = axes.J.tolist(), float(axes.moment[2])
+    n = float(axes.R_WF0[2, 2])
+    l3, L3 = float(axes.R_WF0[2] @ (axes.J * axes.w0)), J3 * float(axes.w0[2])
+    energy = J1 * float(axes.w0[:2] @ axes.w0[:2]) / 2 + M * n
+    cubic = np.polysub(2 * J1 * np.polymul([-1, 0, 1], [-M, energy]), np.polymul([-L3, l3], [-L3, l3]))
+    roots = np.roots(cubic)
+    turning = np.sort(roots[(np.abs(roots.imag) < 1e-6) & (np.abs(roots) < 1)].real)
+    ends = np.concatenate([[-1.0], turning, [1.0]])
+    # Where the start is a turning point itself, the motion is on the side on which the cubic is positive; on none if it stays.
+    reached = [
+        (low, high)
+        for low, high in pairwise(ends)
+        if low - 1e-6 <= n <= high + 1e-6 and np.polyval(cubic, (low + high) / 2) > 0
+    ]
+    return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
+
+
+def _circulating(axes: Axes) -> Axes:
+    """Return principal axes in another order: the third is one about which a free body's momentum circulates, and L3 > 0.
+
+    It is the axis of the largest moment where l^2 > 2 T J_middle, that of the smallest otherwise.
+    """
+    L0 = axes.J * axes.w0
+    order = np.argsort(axes.J)
+    third = order[2] if L0 @ axes.w0 * axes.J[order[1]] < L0 @ L0 else order[0]
+    turn = np.roll(np.eye(3), third - 2, axis=1)
+    if L0[third] < 0:
+        turn = turn @ _DOWN
+    return Axes(axes.scene, axes.R_BF @ turn, axes.J @ np.abs(turn))
+
+
+def _least(n: Array) -> Array:
+    """Return the least rotations (k, 3, 3) that take e_3 to unit vectors (k, 3), none of them -e_3."""
+    x, y, z = n.T
+    out = np.empty((len(n), 3, 3))
+    out[:, 0, 0], out[:, 1, 1] = 1 - x * x / (1 + z), 1 - y * y / (1 + z)
+    out[:, 0, 1] = out[:, 1, 0] = -x * y / (1 + z)
+    out[:, :, 2], out[:, 2, 0], out[:, 2, 1] = n, -x, -y
+    return out
+
+
+def _about_3(angle: Array) -> Array:
+    """Return rotations (n, 3, 3) about the third axis by angles (n,), rad."""
+    out = np.zeros((len(angle), 3, 3))
+    out[:, 0, 0] = out[:, 1, 1] = np.cos(angle)
+    out[:, 1, 0] = np.sin(angle)
+    out[:, 0, 1] = -out[:, 1, 0]
+    out[:, 2, 2] = 1
+    return out

@@ -1,0 +1,1 @@
+"""Charts, the same for page and picture."""

@@ -1,0 +1,89 @@
+"""The picture of a recommendation: error to expect against step and against tolerance, and the cost of what was found."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import altair as alt
+import pandas as pd
+import vl_convert
+
+from conservative.benchmarks.recommendation.recommend import Recommendation
+from conservative.benchmarks.studies.selection import tolerance_setting
+
+from ..cli.recommend import called, setting
+from .figures import log_channel
+from .style import BLACK, HEIGHT, WIDTH, colour_scale, series_order, shape_scale, styled
+
+STEP, TOLERANCE = "step, s", "tolerance"
+
+
+def points(found: Recommendation) -> pd.DataFrame:
+    """Return a row for each probe: method, kind and value of the setting, error to expect, rad, number."""
+    rows = [
+        {
+            "method": called(advice),
+            "kind": STEP if tolerance_setting(probe.method) is None else TOLERANCE,
+            "setting": probe.setting,
+            "expected": min(probe.expected, math.pi),
+            "run": number,
+            "recommended": probe is advice.best and advice.reached,
+        }
+        for advice in found.advice
+        for number, probe in enumerate(advice.probes)
+    ]
+    return pd.DataFrame(rows)
+
+
+def costs(found: Recommendation) -> pd.DataFrame:
+    """Return a row for each method that reaches the error: method, setting, cost in µs per simulated second."""
+    reaching = [advice for advice in found.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
+    rows = [{"method": called(a), "setting": setting(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
+    return pd.DataFrame(rows, columns=["method", "setting", "cost"])
+
+
+def picture(found: Recommendation) -> Any:
+    """Return the chart."""
+    data, prices = points(found), costs(found)
+    names = series_order(data["method"])
+    panels = [_probes(part, str(kind), names, found.bench.error) for kind, part in data.groupby("kind", sort=True)]
+    rows: list[Any] = [alt.hconcat(*panels)]
+    if len(prices):
+        rows.append(_costs(prices, names))
+    title = f"{found.bench.scene.name}: {found.bench.error:g} rad over {found.bench.duration:g} s"
+    subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
+    return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
+
+
+def svg(found: Recommendation) -> str:
+    """Return the picture as SVG."""
+    return str(vl_convert.vegalite_to_svg(picture(found).to_dict()))
+
+
+def _probes(data: pd.DataFrame, kind: str, names: list[str], error: float) -> Any:
+    reach = pd.concat([data["expected"], pd.Series([error])])
+    x, y = (
+        alt.X(**log_channel("setting", kind, data["setting"])),
+        alt.Y(**log_channel("expected", "error to expect, rad", reach)),
+    )
+    look = {
+        "color": alt.Color("method:N", scale=colour_scale(names), sort=names, legend=alt.Legend(title="method", columns=1)),
+        "shape": alt.Shape("method:N", scale=shape_scale(names), sort=names),
+    }
+    base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x, y=y)
+    lines = base.mark_line(strokeWidth=1.2).encode(color=look["color"], detail="method:N", order="run:Q")
+    marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
+    rings = base.transform_filter("datum.recommended").mark_point(size=200, color=BLACK, strokeWidth=1.5)
+    wanted = alt.Chart(pd.DataFrame({"expected": [error]})).mark_rule(strokeDash=[6, 3], color=BLACK).encode(y=y)
+    return wanted + lines + marks + rings
+
+
+def _costs(data: pd.DataFrame, names: list[str]) -> Any:
+    x = alt.X(**log_channel("cost", "wall time per simulated second, µs", data["cost"]))
+    y = alt.Y("method:N", sort=alt.EncodingSortField("cost"), title=None, axis=alt.Axis(labelLimit=320))
+    base = alt.Chart(data, width=WIDTH, height=alt.Step(22), title="cost of what reaches it").encode(x=x, y=y)
+    colour = alt.Color("method:N", scale=colour_scale(names), sort=names)
+    return base.mark_point(filled=True, size=90, opacity=1).encode(color=colour) + base.mark_text(
+        align="left", dx=9, fontSize=11
+    ).encode(text="setting:N")

@@ -1,0 +1,117 @@
+"""One look for every picture: colours by family, marks by setting, sizes, and a number format.
+
+The colours are those of Okabe and Ito (2008), then of Tol's muted scheme: colour-blind readers tell them apart. A setting is
+told by its mark and dash.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import altair as alt
+
+from ..labels import family
+
+BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, TEAL = (
+    "#0072B2",
+    "#56B4E9",
+    "#009E73",
+    "#D55E00",
+    "#E69F00",
+    "#CC79A7",
+    "#000000",
+    "#7F7F7F",
+    "#332288",
+    "#882255",
+    "#999933",
+    "#44AA99",
+)
+
+FAMILY_COLOURS = {
+    "reduced": BLUE,
+    "convected": SKY,
+    "gauss": INDIGO,
+    "moser_veselov": WINE,
+    "lame": OLIVE,
+    "projected": TEAL,
+    "heyoka": GREEN,
+    "mujoco": VERMILION,
+    "scipy": ORANGE,
+    "pinocchio": PURPLE,
+    "exact": BLACK,
+    "precise": GREY,
+}
+_OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
+"""For families registered by other packages, in the order of their names (Tol's muted scheme)."""
+
+SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-left", "triangle-right")
+DASHES = ([1, 0], [6, 3], [2, 2], [8, 3, 2, 3], [4, 4], [10, 4], [1, 3], [6, 2, 1, 2])
+
+WIDTH, HEIGHT = 420, 260
+
+
+def series_order(names: Iterable[str]) -> list[str]:
+    """Return different names in the order of legends: families in the order of their colours, numbers by value."""
+    families = list(FAMILY_COLOURS)
+    rank = {name: families.index(family(name)) if family(name) in families else len(families) for name in names}
+    return sorted(rank, key=lambda name: (rank[name], _by_value(name)))
+
+
+def _by_value(name: str) -> list[tuple[float, str]]:
+    """Return a name as a key by which order=4 comes before order=10."""
+    parts = filter(None, re.split(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?)", name))
+    return [(float(part), "") if part[0].isdigit() else (math.inf, part) for part in parts]
+
+
+def colours(series: list[str]) -> dict[str, str]:
+    """Return a colour for each name of a series: that of its family, the same in every picture."""
+    strangers = sorted({family(name) for name in series} - FAMILY_COLOURS.keys())
+    known = FAMILY_COLOURS | {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(strangers)}
+    return {name: known[family(name)] for name in series}
+
+
+def within_family(series: list[str]) -> dict[str, int]:
+    """Return the number of each name among those of its family, from 0."""
+    counts: dict[str, int] = {}
+    numbers = {}
+    for name in series:
+        numbers[name] = counts.get(family(name), 0)
+        counts[family(name)] = numbers[name] + 1
+    return numbers
+
+
+def colour_scale(series: list[str]) -> alt.Scale:
+    """Return the scale that gives each name its colour."""
+    return alt.Scale(domain=series, range=list(colours(series).values()))
+
+
+def shape_scale(series: list[str]) -> alt.Scale:
+    """Return the scale that gives each setting of a family its own mark."""
+    return alt.Scale(domain=series, range=[SHAPES[number % len(SHAPES)] for number in within_family(series).values()])
+
+
+def dash_scale(series: list[str]) -> alt.Scale:
+    """Return the scale that gives each setting of a family its own dash."""
+    return alt.Scale(domain=series, range=[DASHES[number % len(DASHES)] for number in within_family(series).values()])
+
+
+def power_axis(title: str, low: float, high: float) -> alt.Axis:
+    """Return a logarithmic axis with a label at each whole power of ten, or at every second or third where they are many."""
+    first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
+    every = 1 + (last - first) // 12
+    powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
+    return alt.Axis(title=title, format="~e", values=powers if len(powers) > 1 else alt.Undefined)
+
+
+def styled(chart: Any) -> Any:
+    """Return a whole picture with the common fonts, on white, so that it reads the same on any page."""
+    return (
+        chart.configure(background="white", padding=12, font="sans-serif")
+        .configure_axis(labelFontSize=11, titleFontSize=12, titleFontWeight="normal", gridColor="#E6E6E6", domainColor=GREY)
+        .configure_view(stroke=None)
+        .configure_legend(labelFontSize=11, titleFontSize=12, labelLimit=320, symbolStrokeWidth=2, symbolSize=80)
+        .configure_title(fontSize=13, fontWeight="bold", anchor="start", offset=8)
+    )

@@ -1,0 +1,69 @@
+"""Pages for every public name, made from the docstrings by pdoc: `python -m conservative.reports.documentation.api` writes them into the folder api/.
+
+They open from disk without a network. What stands here is pdoc's settings: docstrings are NumPy's, and formulas are plain text.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from conservative.errors import MissingEngine
+from conservative.version import VERSION
+
+MODULES = (
+    "conservative",
+    "conservative.attitude",
+    "conservative.methods.automatic",
+    "conservative.methods.coefficients.compositions",
+    "conservative.methods.non_spinning",
+    "conservative.invariants",
+    "conservative.methods.lame",
+    "conservative.registry",
+    "conservative.scene_files.scene_file",
+    "conservative.references",
+    "!conservative.references.exact.",
+    "conservative.references.exact.method",
+)
+"""What a user's program imports, as pdoc has it: packages with all that is public in them; an exclamation mark leaves out."""
+ALIASES = {"Array": "A NumPy array of float64.", "ArrayLike": "What NumPy makes an array of."}
+"""Names in signatures, in whose place pdoc would write half a line of NumPy's types, and what they stand for."""
+
+
+def write(folder: Path) -> Path:
+    """Write the pages into a folder, over earlier ones, and return the first of them; needs a process of its own.
+
+    Raises
+    ------
+    MissingEngine
+        pdoc is not installed.
+    """
+    try:
+        import pdoc
+    except ImportError as error:
+        raise MissingEngine("pdoc", "pdoc") from error
+    tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
+    _name_aliases()
+    pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")
+    pdoc.pdoc(*MODULES, output_directory=folder)
+    return folder / "conservative.html"
+
+
+def _name_aliases() -> None:
+    """Put classes that have nothing but a name in place of the aliases, in all that is imported of ours."""
+    shown = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
+    ours = [module for name, module in sys.modules.items() if name.partition(".")[0] == "conservative"]
+    for module in ours:
+        vars(module).update({name: shown[name] for name in ALIASES if name in vars(module)})
+
+
+def main() -> None:
+    """Write the pages, and print where they begin."""
+    parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.api", description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("api"), help="[default: api]")
+    print(write(parser.parse_args().folder))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Where an engine beats us, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby, pairwise
+
+from .work_precision import Contest
+
+
+def lines(found: list[Contest]) -> list[str]:
+    """Return, for each scene, where an engine is faster than anything of ours, or alone, and where ours is."""
+    out = [line for scene, contests in groupby(found, key=lambda c: c.scene) for line in _scene(scene, list(contests))]
+    return out or ["No engine and no method of ours was measured on error against time."]
+
+
+def _scene(scene: str, contests: list[Contest]) -> Iterator[str]:
+    lost = [c for c in contests if c.lost]
+    if not any(c.theirs for c in contests):
+        yield f"**{scene}**: no engine was measured."
+    elif lost:
+        yield from (_lost(scene, engine, members) for engine, members in _by_engine(lost))
+    else:
+        yield f"**{scene}**: no engine beats us at any error that it reaches."
+    won = [c for c in contests if not c.lost and c.theirs]
+    if won:
+        yield f"**{scene}**: ours is faster at {_errors(won)}, by {_range([c.ratio for c in won])}."
+    alone = [c for c in contests if c.theirs is None]
+    if alone and any(c.theirs for c in contests):
+        yield f"**{scene}**: only ours reaches {_errors(alone)}."
+
+
+def _by_engine(lost: list[Contest]) -> Iterator[tuple[str, list[Contest]]]:
+    engines = dict.fromkeys(c.theirs.series for c in lost if c.theirs)
+    return ((engine, [c for c in lost if c.theirs and c.theirs.series == engine]) for engine in engines)
+
+
+def _lost(scene: str, engine: str, members: list[Contest]) -> str:
+    parts = []
+    slower = [c for c in members if c.ours]
+    if slower:
+        parts.append(f"is faster than anything of ours at {_errors(slower)}, by {_range([1 / c.ratio for c in slower])}")
+    alone = [c for c in members if not c.ours]
+    if alone:
+        parts.append(f"reaches {_errors(alone)}, which nothing of ours was measured to reach")
+    return f"**{scene}**: {engine} beats us: it {', and '.join(parts)}."
+
+
+def _errors(contests: list[Contest]) -> str:
+    """Return the errors, every decade in between left out where they are neighbours."""
+    errors = [c.error for c in contests]
+    neighbours = all(1 < a / b < 11 for a, b in pairwise(errors))
+    shown = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
+    return f"{shown} rad"
+
+
+def _range(factors: list[float]) -> str:
+    low, high = f"{min(factors):.2g}", f"{max(factors):.2g}"
+    return f"{low} times" if low == high else f"{low} to {high} times"

@@ -1,0 +1,115 @@
+"""Error against time: what each side needs to reach an error, and where it is beaten.
+
+The cost of an error, on a line of measured points, is that of the cheapest of two: a measured point with this error or a
+smaller one; and the log-log interpolation between two neighbouring points of the line, one above and one below. Nothing is
+extrapolated: where no point reaches an error, there is no cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import pandas as pd
+
+from ..labels import shown, without_tolerance
+
+ERROR, TIME, AGREEMENT = "attitude error max", "time per simulated second", "truth agreement"
+DECADES = tuple(10.0**-k for k in range(1, 14))
+
+
+@dataclass(frozen=True)
+class Cost:
+    """The cheapest way to an error: the line it is on and its time, s per simulated second."""
+
+    series: str
+    time: float
+
+
+@dataclass(frozen=True)
+class Contest:
+    """An error, and the cheapest way there of either side; None where a side does not get there."""
+
+    scene: str
+    error: float
+    ours: Cost | None
+    theirs: Cost | None
+
+    @property
+    def ratio(self) -> float:
+        """How many times faster ours is; below 1 where theirs is; nan where a side does not get there."""
+        return self.theirs.time / self.ours.time if self.ours and self.theirs else math.nan
+
+    @property
+    def lost(self) -> bool:
+        """Whether an engine gets there faster, or alone."""
+        return self.theirs is not None and (self.ours is None or self.ratio < 1)
+
+
+def points(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the measured points of the work-precision study.
+
+    Columns scene, series, method, label, room, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
+    error below what the truth is known to is raised to that.
+    """
+    rows = table[(table["study"] == "work_precision") & (table["status"] == "ok") & table["measure"].isin([ERROR, TIME])]
+    keys = ["scene", "detail", "method", "label", "room", "dt"]
+    wide = rows.pivot_table(index=keys, columns="measure", values="value").reset_index()
+    wide = rows[keys].drop_duplicates().merge(wide, how="left", on=keys)  # pivot_table orders rows by the values of the keys
+    wide = wide.reindex(columns=[*keys, ERROR, TIME]).rename(columns={ERROR: "error", TIME: "time"})
+    wide["error"] = wide["error"].clip(lower=wide["scene"].map(confirmed(table)).fillna(0.0))
+    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).drop(columns="detail").reset_index(drop=True)
+
+
+def confirmed(table: pd.DataFrame) -> dict[str, float]:
+    """Return, for scenes whose truth is no closed form and not multi-precision, how far two of its kind agree, rad."""
+    rows = table[(table["measure"] == AGREEMENT) & table["label"].str.startswith("scipy")]
+    return {str(scene): float(value) for scene, value in rows.groupby("scene")["value"].max().items()}
+
+
+def _line_names(found: pd.DataFrame) -> list[str]:
+    """Return the name of each point's line; points with one `detail` are one line."""
+    settings = found.groupby("detail")["method"].transform("nunique")
+    names = [shown(method, label) for method, label in zip(found["method"], found["label"], strict=True)]
+    return [without_tolerance(name) if count > 1 else name for name, count in zip(names, settings, strict=True)]
+
+
+def front(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the points of one scene that no other beats in both error and time, cheap to dear."""
+    ordered = found.sort_values(["time", "error"])
+    best_before = ordered["error"].cummin().shift(fill_value=math.inf)
+    return ordered[ordered["error"] < best_before]
+
+
+def cost(line: pd.DataFrame, error: float) -> float:
+    """Return the time at which a line, points coarse to fine, gets to an error; nan where it does not."""
+    errors, times = line["error"].tolist(), line["time"].tolist()
+    reached = [time for e, time in zip(errors, times, strict=True) if e <= error]
+    crossings = [
+        _between(error, errors[i : i + 2], times[i : i + 2])
+        for i in range(len(errors) - 1)
+        if min(errors[i : i + 2]) < error < max(errors[i : i + 2]) and min(errors[i : i + 2]) > 0
+    ]
+    return min([*reached, *crossings], default=math.nan)
+
+
+def _between(error: float, errors: list[float], times: list[float]) -> float:
+    share = math.log(error / errors[0]) / math.log(errors[1] / errors[0])
+    return float(times[0] * (times[1] / times[0]) ** share)
+
+
+def contests(found: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Contest]:
+    """Return the contest at each decade that at least one side reaches, for each scene."""
+    out = []
+    for scene, members in found.groupby("scene", sort=False):
+        for error in decades:
+            ours, theirs = (_cheapest(members[members["room"] == room], error) for room in ("ours", "engine"))
+            if ours or theirs:
+                out.append(Contest(str(scene), error, ours, theirs))
+    return out
+
+
+def _cheapest(members: pd.DataFrame, error: float) -> Cost | None:
+    costs = [Cost(str(series), cost(line, error)) for series, line in members.groupby("series", sort=False)]
+    return min((c for c in costs if not math.isnan(c.time)), key=lambda c: c.time, default=None)
