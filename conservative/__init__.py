@@ -21,7 +21,7 @@ from .errors import (
     WrongBranch,
 )
 from .invariants import Invariant
-from .method import Grid, Method, integrate
+from .method import Grid, Method, Role, integrate
 from .methods.convected import Convected
 from .methods.gauss import Gauss
 from .methods.lame import Lame
@@ -29,6 +29,7 @@ from .methods.moser_veselov import MoserVeselov
 from .methods.projected import Projected
 from .methods.reduced import Reduced
 from .methods.substepped import Substepped
+from .outcome import Outcome, OutcomeKind
 from .potentials.gravity_gradient import GravityGradient
 from .potentials.point_to_point import LinearSpring, PointAttraction
 from .potentials.potential import Potential, UniformGravity
@@ -56,12 +57,15 @@ __all__ = [
     "MissingEngine",
     "MoserVeselov",
     "NotConverged",
+    "Outcome",
+    "OutcomeKind",
     "PointAttraction",
     "Potential",
     "PotentialFailed",
     "Projected",
     "Reduced",
     "RigidBody",
+    "Role",
     "Scene",
     "Substepped",
     "Trajectory",

@@ -5,6 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import ClassVar
+
+from .outcome import Outcome, OutcomeKind
 
 
 class BadInput(ValueError):
@@ -37,9 +40,9 @@ class MissingEngine(ImportError):
 
 
 class IntegrationFailed(ArithmeticError):
-    """A run did not reach its end. `status` is the short text that trajectories and tables carry."""
+    """A run did not reach its end. Attribute: `outcome`, which trajectories and tables carry."""
 
-    status: str
+    outcome: Outcome
 
 
 class NotConverged(IntegrationFailed):
@@ -49,14 +52,13 @@ class NotConverged(IntegrationFailed):
     residual, or of the correction relative to the unknown) and `reason` (more about it; may be empty).
     """
 
-    kind = "not converged"
+    kind: ClassVar[OutcomeKind] = OutcomeKind.NOT_CONVERGED
 
     def __init__(self, step: int, time: float, residual: float, reason: str = "") -> None:
         self.step, self.time, self.residual, self.reason = step, time, residual, reason
-        why = f"{reason}; residual" if reason else "residual"
-        self.status = f"{self.kind} in step {step} at t = {time:g} s ({why} {residual:.3g})"
+        self.outcome = Outcome(self.kind, reason, step, time, residual)
         super().__init__(
-            f"dt: got a step whose equations have no solution within reach: {self.status}; "
+            f"dt: got a step whose equations have no solution within reach: {self.outcome}; "
             "allowed: a shorter step, or on_failure='return' to keep what was reached"
         )
 
@@ -64,7 +66,7 @@ class NotConverged(IntegrationFailed):
 class WrongBranch(NotConverged):
     """The equations of a step have solutions, none of which is the one that the state leads to continuously."""
 
-    kind = "wrong branch"
+    kind = OutcomeKind.WRONG_BRANCH
 
 
 def branch_ended(step: int, time: float, residual: float, elsewhere: bool) -> NotConverged:
@@ -88,9 +90,9 @@ class Diverged(IntegrationFailed):
 
     def __init__(self, time: float, reason: str = "the state is not finite") -> None:
         self.time, self.reason = time, reason
-        self.status = f"diverged after t = {time:g} s ({reason})"
+        self.outcome = Outcome(OutcomeKind.DIVERGED, reason, time=time)
         super().__init__(
-            f"dt: got a run that {self.status}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
+            f"dt: got a run that {self.outcome}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
         )
 
 

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from enum import StrEnum
 from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
@@ -19,6 +20,18 @@ from .trajectory import Trajectory
 from .version import VERSION
 
 Run = Callable[[], Trajectory]
+
+
+class Role(StrEnum):
+    """Which side a method is on."""
+
+    OURS = "ours"
+    """Compared with the engines in verdicts; its time is gated."""
+    ENGINE = "engine"
+    """Somebody else's code."""
+    TRUTH = "truth"
+    """Measured against, never a competitor."""
+
 
 DEFAULT_DT = 0.01
 """Step, s, where nobody names one: the paper's."""
@@ -76,11 +89,11 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
 class Method(ABC):
     """A way to integrate any scene it supports: a frozen value, one file, one line of registration.
 
-    Class attributes: `family` (its registered name) and `room` ("ours", "engine" or "truth").
+    Class attributes: `family` (its registered name) and `role`.
     """
 
     family: ClassVar[str]
-    room: ClassVar[Literal["ours", "engine", "truth"]]
+    role: ClassVar[Role]
 
     @property
     def name(self) -> str:

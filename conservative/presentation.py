@@ -42,7 +42,7 @@ def samples(trajectory: Trajectory) -> Array:
 
 
 def table(trajectory: Trajectory) -> pandas.DataFrame:
-    """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and status.
+    """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and outcome.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def table(trajectory: Trajectory) -> pandas.DataFrame:
     except ImportError:
         raise MissingEngine("pandas", "pandas") from None
     frame = pd.DataFrame(samples(trajectory), columns=list(COLUMNS))
-    frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "status": trajectory.status}
+    frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "outcome": str(trajectory.outcome)}
     return frame
 
 
@@ -78,7 +78,7 @@ def picture(trajectory: Trajectory) -> altair.VConcatChart:
     drifts = {
         invariant.name: np.maximum(sizes(trajectory.drift(invariant)), LEAST_DRAWN) for invariant in trajectory.scene.invariants
     }
-    title = alt.Title(trajectory.scene.name, subtitle=[trajectory.label, trajectory.status])
+    title = alt.Title(trajectory.scene.name, subtitle=[trajectory.label, str(trajectory.outcome)])
     rows = [
         _lines(trajectory, rates, "body rate, rad/s", "linear"),
         _lines(trajectory, drifts, "relative drift", "log"),
@@ -122,7 +122,7 @@ def card(trajectory: Trajectory) -> str:
     rows = [
         ("scene", trajectory.scene.name),
         ("method", trajectory.label),
-        ("status", trajectory.status),
+        ("outcome", str(trajectory.outcome)),
         ("samples", f"{len(trajectory)} to {end}"),
         ("work", ", ".join(work)),
         *(

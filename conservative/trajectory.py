@@ -11,6 +11,7 @@ import numpy as np
 from . import invariants
 from .attitude import Array
 from .errors import IntegrationFailed
+from .outcome import OK, Outcome
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
     from .invariants import Invariant
     from .methods.automatic import Choice
-
-OK = "ok"
 
 
 @dataclass(frozen=True)
@@ -70,9 +69,9 @@ class Trajectory:
     choice: Choice | None = None
 
     @property
-    def status(self) -> str:
-        """Return "ok", or what failed and when."""
-        return OK if self.failure is None else self.failure.status
+    def outcome(self) -> Outcome:
+        """How the run ended: ok, or what failed and when."""
+        return OK if self.failure is None else self.failure.outcome
 
     @property
     def ok(self) -> bool:
@@ -133,7 +132,7 @@ class Trajectory:
 
     def __repr__(self) -> str:
         end = f"{self.t[-1]:g} s" if len(self.t) else "nothing"
-        return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {end}, status={self.status!r})"
+        return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {end}, outcome={str(self.outcome)!r})"
 
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import positive_integer
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.potential import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -54,7 +54,7 @@ class Precise(Method):
     bits: int = 256
 
     family: ClassVar[str] = "precise"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "truth"
+    role: ClassVar[Role] = Role.TRUTH
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)

@@ -11,9 +11,8 @@ from typing import Any
 import pandas as pd
 
 from conservative.benchmarks.studies import long_runs, paper_figures
-from conservative.benchmarks.studies.case import MISSING, SKIPPED, UNSUPPORTED
+from conservative.benchmarks.studies.case import MISSING, OK, SKIPPED, UNSUPPORTED
 from conservative.scene import Scene
-from conservative.trajectory import OK
 
 from .charts import figures, paper
 from .page import page
@@ -157,7 +156,7 @@ def failed(measured: Measured) -> list[str]:
     """Return what of ours failed at the steps of the paper: one line each."""
     rows = measured.table
     bad = rows[
-        (rows["study"] == "paper") & (rows["room"] == "ours") & ~rows["status"].isin([OK, UNSUPPORTED, MISSING, SKIPPED])
+        (rows["study"] == "paper") & (rows["role"] == "ours") & ~rows["status"].isin([OK, UNSUPPORTED, MISSING, SKIPPED])
     ]
     found = zip(bad["method"], bad["scene"], bad["dt"], bad["status"], strict=True)
     return list(dict.fromkeys(f"{method} on {scene}, dt = {dt:g} s: {status}" for method, scene, dt, status in found))

@@ -31,7 +31,7 @@ class NoGyroscopicTerm(cv.Method):
     """A negative control: the body keeps its rates."""
 
     family: ClassVar[str] = "control"
-    room: ClassVar[str] = "ours"
+    role: ClassVar[str] = "ours"
 
     @property
     def order(self):

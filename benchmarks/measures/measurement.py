@@ -22,7 +22,7 @@ class Measurement:
         Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
-    room
+    role
         "ours", "engine" or "truth".
     dt
         Step, s, or distance of samples of an adaptive method; nan for what belongs to no single step.
@@ -38,7 +38,7 @@ class Measurement:
     scene: str
     method: str
     label: str
-    room: str
+    role: str
     dt: float
     measure: str
     value: float

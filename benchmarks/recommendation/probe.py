@@ -183,7 +183,7 @@ class Bench:
         holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.holds(self.error))
         expected, cost = law.at(self.duration), outcome.cost.first_call / length
         return Probe(
-            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, trajectory.status
+            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, str(trajectory.outcome)
         )
 
     def _carried(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> Growth | None:

@@ -14,12 +14,12 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from conservative.benchmarks.studies.case import OK
 from conservative.check import positive_number
 from conservative.errors import BadInput, nearest
-from conservative.method import Grid, Method
+from conservative.method import Grid, Method, Role
 from conservative.references.truth import Truth
 from conservative.scene import Scene
-from conservative.trajectory import OK
 
 from ..measures.convergence_order import Order, observed_order
 from ..measures.timing import interleaved
@@ -65,7 +65,7 @@ class Advice:
     """
 
     line: str
-    room: str
+    role: str
     best: Probe | None
     reached: bool
     cost: float
@@ -110,7 +110,7 @@ def engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     MissingEngine
         An engine that is named is not installed.
     """
-    everything = [method for method in selection.methods(skip_missing=True) if method.room == "engine"]
+    everything = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
     if names is None:
         wanted: Iterable[Method] = everything
     else:
@@ -191,16 +191,16 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     progress(0.0, "the motion and its truth")
     bench, truth = prepared(asked.scene, asked.error, asked.duration, asked.cost_limit)
     own, step = our_choice(bench, bench.target * min(1.0, bench.short / bench.duration))
-    rooms: dict[str, str] = {}
+    roles: dict[str, str] = {}
     climbs: dict[str, Climb | str] = {}
     for i, method in enumerate((own, *asked.methods)):
         line = selection.series(method)
         progress(0.2 + 0.7 * i / (1 + len(asked.methods)), f"probing {line}")
-        rooms[line] = method.room
+        roles[line] = method.role
         climbs[line] = method.unsupported(asked.scene) or climbed(bench, *start(bench, method, step))
     progress(0.9, "timing what was found")
     costs = timed(bench, climbs)
-    advised = tuple(advice(bench, line, rooms[line], climb, costs.get(line)) for line, climb in climbs.items())
+    advised = tuple(advice(bench, line, roles[line], climb, costs.get(line)) for line, climb in climbs.items())
     return Recommendation(bench, truth, advised, asked.missing)
 
 
@@ -211,7 +211,7 @@ def start(bench: Bench, method: Method, step: float) -> tuple[Method, float]:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, bench.error)))
         return selection.at_tolerance(method, setting, float(f"{loosest:.0e}")), bench.spacing
     longest = bench.step_at_most(bench.short / STEPS)
-    if method.room != "ours":
+    if method.role != Role.OURS:
         return method, min(longest, bench.step_at_most(step_ladder.RADIANS / bench.rate))
     return method, step if method.order is None else min(COARSER_START * step, longest)
 
@@ -234,15 +234,15 @@ def timed(bench: Bench, climbs: dict[str, Climb | str]) -> dict[str, float]:
     return {line: timing.minimum / lengths[line] for line, timing in found.items()}
 
 
-def advice(bench: Bench, line: str, room: str, climb: Climb | str, cost: float | None) -> Advice:
+def advice(bench: Bench, line: str, role: str, climb: Climb | str, cost: float | None) -> Advice:
     """Return what to say about one line of settings; a text instead of probes is why there are none."""
     if isinstance(climb, str):
-        return Advice(line, room, None, False, math.nan, None, (), climb)
+        return Advice(line, role, None, False, math.nan, None, (), climb)
     probe = climb.best(bench.target)
     reached = probe.expected <= bench.error
     order = None if probe.method.order is None else observed_order(*climb.converging())
     reason = "" if reached else shortfall(bench, climb, probe)
-    return Advice(line, room, probe, reached, math.nan if cost is None else cost, order, climb.probes, reason)
+    return Advice(line, role, probe, reached, math.nan if cost is None else cost, order, climb.probes, reason)
 
 
 def shortfall(bench: Bench, climb: Climb, probe: Probe) -> str:

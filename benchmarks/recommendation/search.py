@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.benchmarks.studies.case import OK
 from conservative.errors import BadInput
 from conservative.method import Method
-from conservative.trajectory import OK
 
 from ..measures.convergence_order import MIN_POINTS
 from ..studies.selection import at_tolerance, tolerance_setting

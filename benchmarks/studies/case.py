@@ -6,13 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
-from conservative.trajectory import OK, Trajectory
+from conservative.trajectory import Trajectory
 
 from ..measures.measurement import Measurement
 from ..measures.timing import Preparation, prepared
 
+OK = "ok"
 MISSING, UNSUPPORTED, ENGINE_ERROR = "missing", "unsupported", "engine error"
 SKIPPED, NO_ORDER = "skipped", "no order"
 
@@ -34,7 +35,7 @@ class Case:
             self.scene.name,
             method.name,
             who,
-            method.room,
+            method.role,
             self.grid.dt,
             measure,
             float(value),
@@ -101,9 +102,9 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     except BadInput as error:  # a step that the method does not have
         return Failed(UNSUPPORTED, str(error))
     except IntegrationFailed as failure:
-        return Failed(failure.status)
+        return Failed(str(failure.outcome))
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
-        if case.method.room != "engine":
+        if case.method.role != Role.ENGINE:
             raise
         return Failed(ENGINE_ERROR, f"{type(error).__name__}: {error}")
-    return done if done.trajectory.ok else Failed(done.trajectory.status)
+    return done if done.trajectory.ok else Failed(str(done.trajectory.outcome))

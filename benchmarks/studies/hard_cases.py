@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from conservative import registry
-from conservative.method import Grid, Method, grid_for
+from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
 
 from ..measures import errors
@@ -43,8 +43,8 @@ def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
         families.setdefault(method.name if method.family == "missing" else method.family, []).append(method)
     found: list[Method] = []
     for members in families.values():
-        if members[0].room != "truth":
-            second = members[-1] if members[0].room == "ours" else members[min(1, len(members) - 1)]
+        if members[0].role != Role.TRUTH:
+            second = members[-1] if members[0].role == Role.OURS else members[min(1, len(members) - 1)]
             found += dict.fromkeys((members[0], second))
     return tuple(found)
 
@@ -58,7 +58,7 @@ def grid(scene: Scene) -> Grid:
 
 def hard_cases(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield all errors, drifts and work of every method on every scene."""
-    methods = [method for method in study.methods if method.room != "truth"]
+    methods = [method for method in study.methods if method.role != Role.TRUTH]
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
         progress(i * len(methods), total, f"{scene.name}: truth")

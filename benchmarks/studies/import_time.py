@@ -17,7 +17,7 @@ class ImportCost:
     """Seconds of an import, the smallest of some rounds; nan where the module cannot be imported."""
 
     module: str
-    room: str
+    role: str
     seconds: float
 
 
@@ -27,7 +27,7 @@ def costs(rounds: int = ROUNDS) -> list[ImportCost]:
     for _ in range(rounds):
         for name in found:
             found[name] = min(found[name], _seconds(name))
-    return [ImportCost(name, room, _above(found[""], found[name])) for name, room in MODULES.items()]
+    return [ImportCost(name, role, _above(found[""], found[name])) for name, role in MODULES.items()]
 
 
 def _above(bare: float, seconds: float) -> float:

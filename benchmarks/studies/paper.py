@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from conservative.method import Method, grid_for
+from conservative.benchmarks.studies.case import OK
+from conservative.method import Method, Role, grid_for
 from conservative.scene import Scene
-from conservative.trajectory import OK, Counters, Trajectory
+from conservative.trajectory import Counters, Trajectory
 
 from ..measures import errors
 from ..measures.convergence_order import observed_order
@@ -69,7 +70,7 @@ def work(counters: Counters) -> list[errors.Value]:
 
 def convergence(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield errors over a ladder of steps, and the observed order, of every method that has a step."""
-    methods = [method for method in study.methods if method.room != "truth"]
+    methods = [method for method in study.methods if method.role != Role.TRUTH]
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
         for j, method in enumerate(methods):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 from conservative import registry
 from conservative.errors import MissingEngine, NotLoadable
-from conservative.method import Grid, Method
+from conservative.method import Grid, Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
@@ -29,7 +29,7 @@ class Missing(Method):
     package: str
 
     family: ClassVar[str] = "missing"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     @property
     def name(self) -> str:
@@ -79,7 +79,7 @@ def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> t
     found: dict[Method, None] = {}
     for name in wanted:
         found.update(dict.fromkeys(_named(name, skip_missing)))
-    return tuple(sorted(found, key=lambda method: ROOMS.index(method.room)))
+    return tuple(sorted(found, key=lambda method: ROOMS.index(method.role)))
 
 
 def _named(name: str, skip_missing: bool) -> tuple[Method, ...]:

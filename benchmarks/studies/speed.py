@@ -8,7 +8,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from conservative.method import Grid, Method, grid_for
+from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -78,7 +78,7 @@ class Timed:
 
 def speed(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield wall times at the scene's own step: each method in its own loop, all interleaved, sampled at the end only."""
-    methods = [method for method in study.methods if method.room != "truth"]
+    methods = [method for method in study.methods if method.role != Role.TRUTH]
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
         grid = end_only(grid_for(scene, scene.dt))
@@ -135,7 +135,7 @@ def work_precision(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 def series_of(study: Study) -> list[Method]:
     """Return one method for each line of the picture: variants that differ in tolerance alone are one line."""
-    lines = {series(method): method for method in study.methods if method.room != "truth"}
+    lines = {series(method): method for method in study.methods if method.role != Role.TRUTH}
     return list(lines.values())
 
 

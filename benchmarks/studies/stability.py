@@ -25,10 +25,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from conservative.attitude import Array, angle_between
+from conservative.benchmarks.studies.case import OK
 from conservative.errors import Diverged, NotConverged, WrongBranch
 from conservative.method import Grid, Method
 from conservative.scene import Scene
-from conservative.trajectory import OK, Trajectory
+from conservative.trajectory import Trajectory
 
 from ..measures.measurement import Measurement
 from .case import ENGINE_ERROR, UNSUPPORTED, Case, Done, Failed, at_no_step, attempt
@@ -148,7 +149,9 @@ def diverged(done: Done) -> Failed | None:
         off = ~(np.abs(trajectory.drift(energy)) <= 1.0)
     if not off.any():
         return None
-    return Failed(Diverged(float(trajectory.t[int(np.argmax(off))]), "energy").status.replace("diverged after t", DIVERGED))
+    return Failed(
+        Diverged(float(trajectory.t[int(np.argmax(off))]), "energy").outcome.__str__().replace("diverged after t", DIVERGED)
+    )
 
 
 def jumped(trajectory: Trajectory, known: Known, rung: int) -> Failed | None:

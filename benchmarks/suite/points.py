@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import rotation_about
-from conservative.method import Grid, Method, grid_for
+from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -72,13 +72,13 @@ class Point:
     @property
     def timed(self) -> bool:
         """Whether the time is gated: that of what is itself under test, in the paper's scenes."""
-        return self.method.room == "ours" and self.scene.name in PAPER
+        return self.method.role == Role.OURS and self.scene.name in PAPER
 
     @property
     def labels(self) -> dict[str, str]:
         """What tells the row apart for the gate and for a reader; the version of an engine must stay, ours must not."""
         label = self.method.label
-        engine = label if self.method.room == "engine" else ""
+        engine = label if self.method.role == Role.ENGINE else ""
         return {
             "scene": self.scene.name,
             "method": self.method.name,
@@ -101,7 +101,7 @@ class Point:
 def points() -> Iterator[Point]:
     """Yield the points: every registered method, those of other packages as well, on every scene of the suite."""
     names = [name for family in registry.registered(registry.METHODS) for name in SHORT.get(family, (family,))]
-    methods = [method for method in selection.methods(names, skip_missing=True) if method.room != "truth"]
+    methods = [method for method in selection.methods(names, skip_missing=True) if method.role != Role.TRUTH]
     return (Point(scene, method) for scene in selection.scenes(SCENES) for method in methods)
 
 

@@ -14,7 +14,7 @@ from conservative.benchmarks.studies.speed import end_only, stretched
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.lazy_kernels import kernels
-from conservative.method import Method, grid_for, integrate
+from conservative.method import Method, Role, grid_for, integrate
 from conservative.registry import method as named
 from conservative.registry import scene as registered
 from conservative.scene import Scene
@@ -35,7 +35,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
         pytest.skip(reason)
     benchmark.group = scene.name
     run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
-    if method.room == "engine" and not last.ok:
+    if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.status}")  # a finding, which the studies report, and no time to compare
     assert last.status == "ok"
     gated = points.gated(point)

@@ -15,9 +15,9 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.registry import method as named
 from conservative.registry import scene
 from conservative.scene import Scene
@@ -39,7 +39,7 @@ class Slower(Method):
     factor: float
 
     family: ClassVar[str] = "slower"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     @property
     def name(self) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
 from ..attitude import Array
 from ..check import positive_number
 from ..errors import NotConverged
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 
@@ -38,7 +38,7 @@ class Convected(Method):
     tol: float = 1e-8
 
     family: ClassVar[str] = "convected"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..attitude import Array, from_quaternion, triple
 from ..check import choice, positive_integer
 from ..errors import BadInput, branch_ended
 from ..lazy_kernels import kernels
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..potentials.potential import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
@@ -51,7 +51,7 @@ class Gauss(Method):
     frame: Frame = "auto"
 
     family: ClassVar[str] = "gauss"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"

@@ -32,12 +32,12 @@ rotations and kicks have a truncation error and bound the energy only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
 from ..lazy_kernels import kernels
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..potentials.potential import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
@@ -58,7 +58,7 @@ class Lame(Method):
     """
 
     family: ClassVar[str] = "lame"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     @property
     def order(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ..attitude import Array
 from ..errors import BadInput
 from ..lazy_kernels import kernels
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart, start_along
@@ -57,7 +57,7 @@ class MoserVeselov(Method):
     order: int | None = None
 
     family: ClassVar[str] = "moser_veselov"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     def __init__(self, order: int | Literal["exact"] = "exact") -> None:
         if isinstance(order, bool) or order not in ORDERS:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..attitude import triple
 from ..errors import NotConverged
 from ..lazy_kernels import kernels
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .coefficients.explicit import DORMAND_PRINCE_8
@@ -36,7 +36,7 @@ class Projected(Method):
     """
 
     family: ClassVar[str] = "projected"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     @property
     def order(self) -> int:

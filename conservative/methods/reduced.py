@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..attitude import Array
 from ..check import choice, positive_number
 from ..errors import branch_ended
 from ..lazy_kernels import kernels
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .coefficients.compositions import BEST, composition_of
@@ -61,7 +61,7 @@ class Reduced(Method):
     frame: Frame = "body"
 
     family: ClassVar[str] = "reduced"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     def __post_init__(self) -> None:
         composition_of(self.order, self.composition)

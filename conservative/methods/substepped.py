@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from .. import registry
 from ..check import positive_integer
 from ..errors import BadInput, NotConverged
-from ..method import Grid, Method, Run
+from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -39,14 +39,14 @@ class Substepped(Method):
     most: int = 64
 
     family: ClassVar[str] = "substepped"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[Role] = Role.OURS
 
     def __post_init__(self) -> None:
         positive_integer("most", self.most)
         allowed = "the name of a method of ours with a step, such as 'reduced:order=4'"
         if not isinstance(self.method, str) or self.method.partition(":")[0] == self.family:
             raise BadInput("method", repr(self.method), allowed)
-        if self.inner.order is None or self.inner.room != "ours":
+        if self.inner.order is None or self.inner.role != Role.OURS:
             raise BadInput("method", repr(self.method), allowed)
 
     @property

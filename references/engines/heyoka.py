@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from conservative.attitude import Array
 from conservative.check import choice, finite_number
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -53,7 +53,7 @@ class Heyoka(Method):
     frame: str = "body"
 
     family: ClassVar[str] = "heyoka"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:

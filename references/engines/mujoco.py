@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -64,7 +64,7 @@ class MuJoCo(Method):
     integrator: str = "RK4"
 
     family: ClassVar[str] = "mujoco"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
 from conservative.check import choice
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -45,7 +45,7 @@ class Pinocchio(Method):
     scheme: str = "RK4"
 
     family: ClassVar[str] = "pinocchio"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     def __post_init__(self) -> None:
         choice("scheme", self.scheme, SCHEMES)

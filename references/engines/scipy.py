@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
 from conservative.check import choice, finite_number
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.potential import UniformGravity, torque_W
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -49,7 +49,7 @@ class SciPy(Method):
     rtol: float = 1e-12
 
     family: ClassVar[str] = "scipy"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)

@@ -9,7 +9,7 @@ Jacobi for the free body, Klein & Sommerfeld for the top; see the functions.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from conservative.body import RigidBody
 from conservative.check import finite_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
-from conservative.method import Grid, Method, Run
+from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.potential import Potential, UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -121,7 +121,7 @@ class Exact(Method):
     """
 
     family: ClassVar[str] = "exact"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "truth"
+    role: ClassVar[Role] = Role.TRUTH
 
     @property
     def label(self) -> str:

@@ -10,7 +10,7 @@ import pandas as pd
 from conservative.attitude import Array
 from conservative.benchmarks.studies.case import Failed, attempt
 from conservative.benchmarks.studies.long_runs import case_for
-from conservative.method import Method
+from conservative.method import Method, Role
 from conservative.potentials.potential import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -39,7 +39,7 @@ TURN, TILT = 35, 25
 def chosen(methods: Sequence[Method]) -> list[Method]:
     """Return the methods that are drawn: the preferred ones, and the first of every family that has none there; no truth."""
     preferred = [method for method in methods if method.name in PREFERRED]
-    firsts = {method.family: method for method in reversed(methods) if method.room != "truth"}
+    firsts = {method.family: method for method in reversed(methods) if method.role != Role.TRUTH}
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 
 
@@ -61,7 +61,7 @@ def curves(scenes: Sequence[Scene], methods: Sequence[Method]) -> pd.DataFrame:
 
 
 def _truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
-    return [method for method in methods if method.room == "truth" and method.unsupported(scene) is None][:1]
+    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
 
 
 def _found(scene: Scene, methods: Sequence[Method]) -> Iterator[pd.DataFrame]:

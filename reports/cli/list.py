@@ -29,7 +29,7 @@ class MethodEntry:
     """A method as the list shows it. Without its engine, `available` is False and `reason` says how to get it."""
 
     name: str
-    room: str
+    role: str
     label: str
     order: int | None
     conserves: tuple[str, ...]
@@ -52,7 +52,7 @@ def _scene(name: str) -> SceneEntry:
 def methods() -> list[MethodEntry]:
     """Return every variant of every registered method, ours first, then engines, then truths."""
     found = [entry for name in registry.registered(registry.METHODS) for entry in _variants(name)]
-    return sorted(found, key=lambda entry: ("ours", "engine", "truth", "").index(entry.room))
+    return sorted(found, key=lambda entry: ("ours", "engine", "truth", "").index(entry.role))
 
 
 def _variants(name: str) -> list[MethodEntry]:
@@ -68,7 +68,7 @@ def _method(method: Method) -> MethodEntry:
         label, reason = method.label, ""
     except MissingEngine as missing:
         label, reason = "", str(missing)
-    return MethodEntry(method.name, method.room, label, method.order, tuple(sorted(method.conserves)), not reason, reason)
+    return MethodEntry(method.name, method.role, label, method.order, tuple(sorted(method.conserves)), not reason, reason)
 
 
 def as_json() -> str:
@@ -85,9 +85,9 @@ def show() -> None:
     for group, members in groupby(scenes(), key=lambda entry: entry.group):
         rows = [(e.name, f"{e.t_end:.4g}", f"{e.dt:.4g}", ", ".join(e.invariants), e.source) for e in members]
         console.print(_table(f"Scenes: {group}", ("name", "t_end, s", "dt, s", "conserved by the motion", "source"), rows))
-    for room, found in groupby(methods(), key=lambda entry: entry.room):
+    for role, found in groupby(methods(), key=lambda entry: entry.role):
         lines = [(e.name, _order(e), ", ".join(e.conserves) or "-", e.label or e.reason) for e in found]
-        title = f"Methods: {room or 'not available'}"
+        title = f"Methods: {role or 'not available'}"
         console.print(_table(title, ("name", "order", "conserves", "version, or why it cannot run"), lines))
 
 

@@ -13,9 +13,9 @@ from conservative import registry
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation, question, recommend
+from conservative.benchmarks.studies.case import OK
 from conservative.benchmarks.studies.selection import tolerance_setting
 from conservative.errors import BadInput
-from conservative.trajectory import OK
 
 from ..labels import shown
 from ..terminal.atomic_files import text_file
@@ -122,7 +122,7 @@ def _advice(advice: Advice) -> dict[str, Any]:
     return {
         "name": advice.line,
         "called": called(advice),
-        "room": advice.room,
+        "role": advice.role,
         "reached": advice.reached,
         "reason": advice.reason,
         "cost": finite(advice.cost),

@@ -96,7 +96,7 @@ def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, A
         "label": trajectory.label,
         "dt": dt,
         "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,
-        "status": trajectory.status,
+        "status": str(trajectory.outcome),
         "counters": asdict(trajectory.counters),
         "drift": {invariant.name: _drift(trajectory, invariant) for invariant in scene.invariants},
         "orthonormality": float(orthonormality(trajectory.R_WB).max(initial=0.0)),

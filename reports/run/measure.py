@@ -10,6 +10,7 @@ import pandas as pd
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.studies import long_runs, studies
+from conservative.method import Role
 
 from ..terminal.progress import Step
 from .checkpoint import Partial
@@ -55,7 +56,7 @@ def _within(step: Step, name: str, span: tuple[float, float]) -> Report:
 
 def _long_runs(made: Plan, report: Report) -> tuple[list[Measurement], list[list[object]]]:
     """Return the rows of the long runs, and the samples of their picture under `long_runs.COLUMNS`."""
-    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.room != "truth"]
+    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.role != Role.TRUTH]
     rows, samples = [], []
     for k, (scene, method) in enumerate(pairs):
         report(k, len(pairs), f"{scene.name}: {method.name}")

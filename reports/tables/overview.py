@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from conservative.benchmarks.studies import long_runs
-from conservative.benchmarks.studies.case import MISSING, NO_ORDER, SKIPPED, UNSUPPORTED
+from conservative.benchmarks.studies.case import MISSING, NO_ORDER, OK, SKIPPED, UNSUPPORTED
 from conservative.benchmarks.studies.import_time import ImportCost
 from conservative.benchmarks.studies.stability import LARGEST
-from conservative.trajectory import OK
 
 from ..labels import shown
 from . import work_precision
@@ -159,12 +158,12 @@ def ended(status: str) -> Cell:
 
 def hard_cases(table: pd.DataFrame) -> Cells | None:
     """Return the matrix of hard cases, a row a method and a column a case; None where the report has no such study."""
-    return _matrix(table[(table["study"] == HARD) & (table["room"] != "truth")], _case)
+    return _matrix(table[(table["study"] == HARD) & (table["role"] != "truth")], _case)
 
 
 def stability(table: pd.DataFrame) -> Cells | None:
     """Return the matrix of the longest steps, as angles, and what ends them; None where the report has no such study."""
-    return _matrix(table[(table["study"] == STABILITY) & (table["room"] != "truth")], _longest)
+    return _matrix(table[(table["study"] == STABILITY) & (table["role"] != "truth")], _longest)
 
 
 def _matrix(rows: pd.DataFrame, cell: Callable[[pd.DataFrame], Cell]) -> Cells | None:
@@ -226,4 +225,4 @@ def _once(row: pd.Series[float]) -> list[str]:
 
 def imports(costs: Sequence[ImportCost]) -> Table:
     """Return what importing each library costs."""
-    return ["library", "room", "import, ms"], [[c.module, c.room, number(c.seconds * 1e3, 3)] for c in costs]
+    return ["library", "role", "import, ms"], [[c.module, c.role, number(c.seconds * 1e3, 3)] for c in costs]

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
-from conservative.benchmarks.studies.case import MISSING, NO_ORDER, UNSUPPORTED
+from conservative.benchmarks.studies.case import MISSING, NO_ORDER, OK, UNSUPPORTED
 from conservative.benchmarks.studies.studies import HARD
-from conservative.trajectory import OK
 
 from ..labels import shown
 from . import orders, work_precision

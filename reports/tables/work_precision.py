@@ -50,11 +50,11 @@ class Contest:
 def points(table: pd.DataFrame) -> pd.DataFrame:
     """Return the measured points of the work-precision study.
 
-    Columns scene, series, method, label, room, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
+    Columns scene, series, method, label, role, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
     error below what the truth is known to is raised to that.
     """
     rows = table[(table["study"] == "work_precision") & (table["status"] == "ok") & table["measure"].isin([ERROR, TIME])]
-    keys = ["scene", "detail", "method", "label", "room", "dt"]
+    keys = ["scene", "detail", "method", "label", "role", "dt"]
     wide = rows.pivot_table(index=keys, columns="measure", values="value").reset_index()
     wide = rows[keys].drop_duplicates().merge(wide, how="left", on=keys)  # pivot_table orders rows by the values of the keys
     wide = wide.reindex(columns=[*keys, ERROR, TIME]).rename(columns={ERROR: "error", TIME: "time"})
@@ -104,7 +104,7 @@ def contests(found: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Co
     out = []
     for scene, members in found.groupby("scene", sort=False):
         for error in decades:
-            ours, theirs = (_cheapest(members[members["room"] == room], error) for room in ("ours", "engine"))
+            ours, theirs = (_cheapest(members[members["role"] == role], error) for role in ("ours", "engine"))
             if ours or theirs:
                 out.append(Contest(str(scene), error, ours, theirs))
     return out

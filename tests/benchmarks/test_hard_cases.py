@@ -8,6 +8,7 @@ import conservative as cv
 from conservative import registry
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.studies import hard_cases, selection, studies
+from conservative.method import Role
 from conservative.references.exact.method import Exact
 
 METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
@@ -62,7 +63,7 @@ def test_every_scene_and_every_engine_takes_part():
     study = studies.hard(methods)[1]
     assert {scene.name for scene in study.scenes} == set(registry.registered(registry.SCENES))
     chosen = study.methods
-    families = {method.family for method in methods if method.room != "truth"}
+    families = {method.family for method in methods if method.role != Role.TRUTH}
     assert {method.family for method in chosen} == families
     assert max(sum(method.family == family for method in chosen) for family in families) == 2
     assert registry.method("mujoco:RK4") in chosen

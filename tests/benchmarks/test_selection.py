@@ -23,7 +23,7 @@ def test_a_family_stands_for_its_variants_and_a_name_with_settings_for_one():
 
 def test_ours_come_first_and_nothing_comes_twice():
     found = methods(["scipy", "reduced:order=2", "scipy:rtol=1e-9", "convected"])
-    assert [method.room for method in found] == ["ours", "ours", "engine", "engine"]
+    assert [method.role for method in found] == ["ours", "ours", "engine", "engine"]
     assert len(set(found)) == len(found)
 
 
@@ -51,7 +51,7 @@ def test_a_missing_engine_is_an_error_unless_skipped():
     ours, missing = methods(["reduced:order=2", "mujoco"], skip_missing=True)
     assert ours == Reduced()
     assert missing == Missing("mujoco", "MuJoCo", "mujoco")
-    assert (missing.name, missing.label, missing.room, missing.order) == ("mujoco", "mujoco", "engine", None)
+    assert (missing.name, missing.label, missing.role, missing.order) == ("mujoco", "mujoco", "engine", None)
     with pytest.raises(MissingEngine, match="pip install mujoco"):
         missing.prepare(BRICK, Grid(0.01, 1))
 

@@ -33,7 +33,7 @@ class Staged(cv.Method):
 
     how: ClassVar[str]
     family: ClassVar[str] = "staged"
-    room: ClassVar[str] = "engine"
+    role: ClassVar[str] = "engine"
 
     @property
     def name(self):

@@ -30,7 +30,7 @@ class Broken(cv.Method):
 
     how: str
     family: ClassVar[str] = "broken"
-    room: ClassVar[str] = "engine"
+    role: ClassVar[str] = "engine"
 
     @property
     def order(self):
@@ -88,7 +88,7 @@ def test_paper_measures_every_method_at_three_steps():
 
 def test_paper_says_how_well_the_truths_agree():
     row = table("paper")["truth", 0.02, "truth agreement"]
-    assert (row.value, row.unit, row.room, row.detail) == (2e-15, "rad", "truth", "exact and other")
+    assert (row.value, row.unit, row.role, row.detail) == (2e-15, "rad", "truth", "exact and other")
 
 
 def test_paper_errors_are_those_of_the_run():
@@ -157,7 +157,7 @@ def test_a_missing_engine_is_an_error_unless_skipped(name):
 
 def test_a_bug_of_our_own_is_not_a_status():
     class Ours(Broken):
-        room = "ours"
+        role = "ours"
 
     with pytest.raises(RuntimeError, match="planted"):
         rows("paper", Ours("raises"))

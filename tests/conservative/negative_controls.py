@@ -28,7 +28,7 @@ class Control(cv.Method):
     states: Callable[[cv.Scene, float], States]
 
     family: ClassVar[str] = "control"
-    room: ClassVar[str] = "ours"
+    role: ClassVar[str] = "ours"
 
     @property
     def name(self):

@@ -98,7 +98,7 @@ def test_collocation_says_where_its_branch_ends() -> None:
     assert collocated(scene, 2, 4.0) is None
     run = cv.Gauss(2).run(scene, 4.0, 12.0)
     assert isinstance(run.failure, cv.WrongBranch)
-    assert run.status.startswith("wrong branch in step 1 at t = 0 s (no continuous solution; residual ")
+    assert str(run.outcome).startswith("wrong branch in step 1 at t = 0 s (no continuous solution; residual ")
     assert cv.Gauss(2).run(scene, 2.0, 12.0).ok
 
 
@@ -130,7 +130,7 @@ def test_a_branch_that_ends_is_said_so() -> None:
     run = cv.Reduced().run(scene, 6.0, 18.0)
     assert isinstance(run.failure, cv.WrongBranch)
     assert isinstance(run.failure, cv.NotConverged)
-    assert run.status.startswith("wrong branch in step 1 at t = 0 s (no continuous solution; residual ")
+    assert str(run.outcome).startswith("wrong branch in step 1 at t = 0 s (no continuous solution; residual ")
     assert 0.1 < run.failure.residual < 1  # measured 0.31: the right side is that much longer than the branch reaches
     with pytest.raises(cv.WrongBranch, match="allowed: a shorter step"):
         cv.integrate(scene, 6.0, t_end=18.0)

@@ -56,7 +56,7 @@ def test_a_step_without_solution_is_an_error_that_says_where():
 
 def test_what_was_reached_before_a_failure_can_be_had():
     trajectory = cv.integrate(BRICK, dt=0.5, method=cv.Convected(tol=1e-30), on_failure="return")
-    assert trajectory.status.startswith("not converged in step 1 at t = 0")
+    assert str(trajectory.outcome).startswith("not converged in step 1 at t = 0")
     assert len(trajectory) == 1
     assert not trajectory.ok
     np.testing.assert_allclose(trajectory.w_WB_B[0], BRICK.w_WB_B0, rtol=1e-15)

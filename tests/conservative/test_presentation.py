@@ -32,7 +32,7 @@ def test_a_table_has_every_sample_and_every_digit(trajectory):
     np.testing.assert_array_equal(frame["w_WB_B_3"], trajectory.w_WB_B[:, 2])
     np.testing.assert_array_equal(frame["energy"], trajectory.energy)
     np.testing.assert_array_equal(frame["momentum_W_1"], trajectory.momentum_W[:, 0])
-    assert frame.attrs == {"scene": "a <b>body</b>", "method": trajectory.label, "status": "ok"}
+    assert frame.attrs == {"scene": "a <b>body</b>", "method": trajectory.label, "outcome": "ok"}
 
 
 def test_a_picture_draws_rates_and_drifts(trajectory):

@@ -79,8 +79,8 @@ def test_a_body_at_rest_in_equilibrium_stays() -> None:
 
 def test_a_step_that_cannot_be_projected_says_so() -> None:
     trajectory = cv.integrate(scene("gravity"), 2.0, cv.Projected(), on_failure="return")
-    assert trajectory.status.startswith("not converged in step 1")
-    assert "too far from the invariants" in trajectory.status
+    assert str(trajectory.outcome).startswith("not converged in step 1")
+    assert "too far from the invariants" in str(trajectory.outcome)
     assert len(trajectory) == 1
 
 

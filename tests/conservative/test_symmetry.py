@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, rotation_about
+from conservative.method import Role
 from conservative.scenes.turned_frame import in_body_frame
 
 STEPS, DT = 40, 0.04
@@ -131,7 +132,7 @@ def ours():
         if not entry.value.startswith("conservative."):
             continue
         for method in entry.load().variants():
-            if method.room == "ours":
+            if method.role == Role.OURS:
                 found.append(replace(method, tol=1e-13) if isinstance(method, cv.Convected) else method)
     return found
 

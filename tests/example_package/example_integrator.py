@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ class Example(cv.Method):
     """The step, for free bodies only."""
 
     family: ClassVar[str] = "example"
-    room: ClassVar[Literal["ours", "engine", "truth"]] = "ours"
+    role: ClassVar[cv.Role] = cv.Role.OURS
 
     @property
     def order(self) -> int:

@@ -74,7 +74,7 @@ def test_a_run_that_ends_early_says_so_and_writes_no_file(method, every, tmp_pat
     with np.errstate(over="ignore", invalid="ignore"):
         scene = cv.Scene("hopeless", cv.RigidBody((1, 2, 2.5)), np.eye(3), (1e200, 1e200, 1e200), 2.0, dt=0.1)
         found = method.run(scene, 0.01, sample_every=every)
-    assert found.status.startswith("diverged after t = 0 s")
+    assert str(found.outcome).startswith("diverged after t = 0 s")
     assert len(found) <= 1
     assert isinstance(found.failure, cv.Diverged)
     assert not list(tmp_path.iterdir())
@@ -82,6 +82,6 @@ def test_a_run_that_ends_early_says_so_and_writes_no_file(method, every, tmp_pat
 
 def test_explicit_steps_that_are_too_long_diverge():
     found = MuJoCo("Euler").run(cv.scenes.brick_flip(), 1.0, t_end=2000, sample_every=1)
-    assert "MuJoCo warned of" in found.status
+    assert "MuJoCo warned of" in str(found.outcome)
     assert 0 < found.t[-1] < 2000
     assert np.isfinite(found.energy).all()

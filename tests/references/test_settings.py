@@ -40,7 +40,7 @@ def test_labels_have_version_and_setting(method, package, setting):
 
 
 def test_rooms_and_orders():
-    assert {method.room for method in EVERYTHING} == {"engine", "truth"}
+    assert {method.role for method in EVERYTHING} == {"engine", "truth"}
     assert [method.order for method in MuJoCo.variants()] == [1, 4, 1, 1, 1]
     assert [method.order for method in Pinocchio.variants()] == [1, 4]
     assert all(cls().order is None for cls in (Heyoka, SciPy, Precise))

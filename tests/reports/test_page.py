@@ -23,8 +23,8 @@ from conservative.reports.tables.work_precision import points
 from .rows import point
 
 
-def row(study, method, measure, value, dt=0.1, scene="brick_flip", status="ok", room="ours"):
-    return Measurement(study, scene, method, method, room, dt, measure, value, "1", status)
+def row(study, method, measure, value, dt=0.1, scene="brick_flip", status="ok", role="ours"):
+    return Measurement(study, scene, method, method, role, dt, measure, value, "1", status)
 
 
 def ladder(method, order, scene="brick_flip"):
@@ -42,7 +42,7 @@ def made_up():
     lines += [*point("scipy:DOP853", "engine", 1e-3, 1e-4, scene="brick_flip")]
     drift = [
         row("drift", "reduced", "energy drift max", 2e-15),
-        row("drift", "mujoco", "energy drift max", 3e-2, room="engine"),
+        row("drift", "mujoco", "energy drift max", 3e-2, role="engine"),
     ]
     return frame([*lines, *drift, *ladder("reduced", 2), row("speed", "reduced", "first call time", 0.25)])
 
@@ -196,7 +196,7 @@ def test_hard_cases_are_a_matrix():
     rows = [
         row("hard_cases", "reduced", "energy drift max", 1e-15, scene="needle"),
         row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", status="not converged in step 3"),
-        row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", room="engine"),
+        row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", role="engine"),
     ]
     header, body = overview.hard_cases(frame(rows))
     assert header == ["method", "needle", "falling_top"]
@@ -229,10 +229,10 @@ def test_audit_of_one_map_in_two_programs(error, verdict):
 @pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, claims.HOLDS), (0.5, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
     rows = [
-        row("paper", "mujoco", "energy drift max", coarse, 0.01, room="engine"),
-        row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, room="engine"),
-        row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, room="engine"),
-        row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, room="engine"),
+        row("paper", "mujoco", "energy drift max", coarse, 0.01, role="engine"),
+        row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, role="engine"),
+        row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, role="engine"),
+        row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, role="engine"),
     ]
     found = verdicts(rows)
     assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict

@@ -151,7 +151,7 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
 def test_failure_of_ours_is_told(monkeypatch):
     from conservative.benchmarks.measures.measurement import Measurement, frame
 
-    status = NotConverged(3, 0.02, 1.0).status
+    status = str(NotConverged(3, 0.02, 1.0).outcome)
     common = (
         "paper",
         "brick_flip",

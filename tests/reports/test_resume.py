@@ -98,7 +98,7 @@ def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(r
     timed = found["unit"].isin(TIMES)
     assert timed.any()
     pd.testing.assert_frame_equal(found[~timed], whole[~timed], check_exact=True)
-    same = ["study", "scene", "method", "label", "room", "dt", "measure", "unit", "status"]
+    same = ["study", "scene", "method", "label", "role", "dt", "measure", "unit", "status"]
     pd.testing.assert_frame_equal(found.loc[timed, same], whole.loc[timed, same], check_exact=True)
 
 

@@ -1,0 +1,63 @@
+"""How a run ended: a kind out of a fixed list, and the fields that belong to it. Text is made of it only where it is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class OutcomeKind(StrEnum):
+    """The ways in which a run can end, or not begin."""
+
+    OK = "ok"
+    NOT_CONVERGED = "not converged"
+    WRONG_BRANCH = "wrong branch"
+    DIVERGED = "diverged"
+    TIMEOUT = "timeout"
+    CRASHED = "crashed"
+    UNSUPPORTED = "unsupported"
+    MISSING = "missing"
+    SKIPPED = "skipped"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes
+    ----------
+    kind
+        Which way.
+    reason
+        More about it, in words; may be empty.
+    step
+        Number of the step that failed, from 1.
+    time
+        Time of the last good state, s.
+    residual
+        Last size of the residual of a step's equations, or of the correction relative to the unknown; dimensionless.
+    """
+
+    kind: OutcomeKind
+    reason: str = ""
+    step: int | None = None
+    time: float | None = None
+    residual: float | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end."""
+        return self.kind is OutcomeKind.OK
+
+    def __str__(self) -> str:
+        """Return the outcome as people read it, such as `not converged in step 3 at t = 0.02 s (residual 0.1)`."""
+        where = (f" in step {self.step}" if self.step is not None else "") + (
+            f" {'at' if self.step is not None else 'after'} t = {self.time:g} s" if self.time is not None else ""
+        )
+        residual = "" if self.residual is None else f"residual {self.residual:.3g}"
+        why = "; ".join(filter(None, (self.reason, residual)))
+        return f"{self.kind}{where}" + (f" ({why})" if why else "")
+
+
+OK = Outcome(OutcomeKind.OK)
+"""The outcome of every run that reaches its end."""
