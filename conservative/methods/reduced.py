@@ -83,7 +83,7 @@ class Reduced(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         frame, label = in_frame(self, scene)
         start = principal_start(scene, frame)
-        march, stages = kernels("march").march, stage_lengths(self.order, self.composition, grid.dt)
+        march, stages = kernels("reduced").march, stage_lengths(self.order, self.composition, grid.dt)
 
         def run() -> Trajectory:
             q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
