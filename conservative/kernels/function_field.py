@@ -6,15 +6,16 @@ The loop writes what it asks about into one array and finds the answer in anothe
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from ..errors import PotentialFailed
-from . import kernel
-from .fields import body_torque, energy, finite_derivative, finite_torque, is_field
+from . import COMPILED, kernel
+from .fields import body_torque, energy, finite_derivative, finite_torque, implements
 
 BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
 FAILED = 1
@@ -33,7 +34,7 @@ class Function(NamedTuple):
 
 
 @intrinsic
-def _call(typingctx, address, what):
+def _call_compiled(typingctx, address, what):
     """Call the C function at `address` with the int64 `what`."""
 
     def code(context, builder, signature, arguments):
@@ -41,6 +42,13 @@ def _call(typingctx, address, what):
         return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), [arguments[1]])
 
     return types.int64(types.int64, types.int64), code
+
+
+def _call_plain(address, what):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(what)
+
+
+_call = _call_compiled if COMPILED else _call_plain
 
 
 @kernel
@@ -54,55 +62,31 @@ def _triple(v, i):
     return (v[i], v[i + 1], v[i + 2])
 
 
-@overload(energy)
+@implements(energy, Function)
 def _energy_function(field, q):
-    if not is_field(field, Function):
-        return None
-
-    def of_function(field, q):
-        field.given[0], field.given[1], field.given[2], field.given[3] = q
-        _ask(field, ENERGY)
-        return field.answer[0]
-
-    return of_function
+    field.given[0], field.given[1], field.given[2], field.given[3] = q
+    _ask(field, ENERGY)
+    return field.answer[0]
 
 
-@overload(body_torque)
+@implements(body_torque, Function)
 def _body_torque_function(field, q):
-    if not is_field(field, Function):
-        return None
-
-    def torque(field, q):
-        field.given[0], field.given[1], field.given[2], field.given[3] = q
-        _ask(field, BODY_TORQUE)
-        return _triple(field.answer, 0)
-
-    return torque
+    field.given[0], field.given[1], field.given[2], field.given[3] = q
+    _ask(field, BODY_TORQUE)
+    return _triple(field.answer, 0)
 
 
-@overload(finite_torque)
+@implements(finite_torque, Function)
 def _finite_torque_function(field, q, a):
-    if not is_field(field, Function):
-        return None
-
-    def torque(field, q, a):
-        field.given[0], field.given[1], field.given[2], field.given[3] = q
-        field.given[4], field.given[5], field.given[6] = a
-        _ask(field, FINITE_TORQUE)
-        v = field.answer
-        return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
-
-    return torque
+    field.given[0], field.given[1], field.given[2], field.given[3] = q
+    field.given[4], field.given[5], field.given[6] = a
+    _ask(field, FINITE_TORQUE)
+    v = field.answer
+    return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
 
 
-@overload(finite_derivative)
+@implements(finite_derivative, Function)
 def _finite_derivative_function(field, q0, q1):
-    if not is_field(field, Function):
-        return None
-
-    def derivative(field, q0, q1):
-        field.given[:9], field.given[9:] = q0, q1
-        _ask(field, FINITE_DERIVATIVE)
-        return field.answer[:9].copy(), field.answer[9:].copy().reshape(9, 9)
-
-    return derivative
+    field.given[:9], field.given[9:] = q0, q1
+    _ask(field, FINITE_DERIVATIVE)
+    return field.answer[:9].copy(), field.answer[9:].copy().reshape(9, 9)
