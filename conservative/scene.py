@@ -140,12 +140,12 @@ class Scene:
 
     def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
         """Return `function(self, *settings)`, found once for each scene, thread and settings, which have to be hashable."""
-        derivations, key = self._derivations, (function, *settings)
+        key = (function, settings)
         try:
-            found: T = derivations.entries[key]
+            return self._derivations.entries[key]  # type: ignore[no-any-return]
         except KeyError:
             found = function(self, *settings)
-            derivations.add(key, found)
+            self._derivations.add(key, found)
         return found
 
     def forget(self) -> None:

@@ -216,13 +216,16 @@ def march(model, coefficients, workspace):
     """
     J, J_inverse, field = model.J, model.J_inverse, model.field
     lengths = coefficients.lengths
+    n_steps, every, q_out, L_out = workspace.n_steps, workspace.every, workspace.q, workspace.L
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
     workspace.q[0, :] = model.q
     workspace.L[0, :] = model.L
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
     at, row, corrections = (1, 0), 0, 0
     while True:
-        at, row, more, size, state = take_steps(lengths, tolerance, J, J_inverse, field, workspace, at, row, state)
+        at, row, more, size, state = take_steps(
+            lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out
+        )
         corrections += more
         step, stage = at
         if step > workspace.n_steps:
@@ -246,12 +249,11 @@ def enter(*loose):
 
 
 @kernel
-def take_steps(lengths, tolerance, J, J_inverse, field, workspace, at, row, state):
+def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out):
     """Take steps from a step and stage on, to the end or to a stage whose solution is not trusted; return where that is.
 
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
     """
-    n_steps, every, q_out, L_out = workspace.n_steps, workspace.every, workspace.q, workspace.L
     first_step, first = at
     q, q_carry, L, L_carry = state
     corrections, size = 0, 0.0

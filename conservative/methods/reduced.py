@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array
 from ..check import choice, positive_number
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
@@ -81,9 +80,9 @@ class Reduced(Method):
         return tuple(cls(order) for order in BEST)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (label, start, model) = kernels("reduced"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(stage_lengths(self.order, self.composition, grid.dt), self.tol)
-        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        label, start, model = scene.derive(convert, self)
+        coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)
+        return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
 
 
 def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
@@ -94,6 +93,6 @@ def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
 
 
 @lru_cache(maxsize=256)
-def stage_lengths(order: int, composition: str | None, dt: float) -> Array:
-    """Return the lengths (stages,), s, of the stages of a step dt."""
-    return np.array(composition_of(order, composition).lengths(dt))
+def find_coefficients(order: int, composition: str | None, tol: float, dt: float) -> Any:
+    """Return the kernel's coefficients of a step dt, s."""
+    return kernels("reduced").Coefficients(np.array(composition_of(order, composition).lengths(dt)), tol)

@@ -20,35 +20,30 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     `start` is what its samples, in principal axes, are turned back with.
     """
-    protocol, enter, n = kernels("protocol"), kernel.enter, grid.n_samples
+    enter, n, n_steps, every = kernel.enter, grid.n_samples, grid.n_steps, grid.every
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        result = protocol.Result(*enter(*model, *coefficients, grid.n_steps, grid.every, q, L))
-        work = Counters(result.done, result.stages, result.corrections, result.evaluations)
-        t, R_WB, w_WB_B, failure = _turn_back(start, grid, result.done, q, L)
-        if failure is None and result.done < grid.n_steps:
-            failure = _failure_of(kernel, grid, result)
-        return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
+        done, *work, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
+        t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
+        if failure is None and done < n_steps:
+            kind = WrongBranch if elsewhere else NotConverged
+            failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
+        return Trajectory(scene, t, R_WB, w_WB_B, label, Counters(done, *work), failure)
 
     return run
 
 
-def _turn_back(
-    start: PrincipalStart, grid: Grid, done: int, q: Array, L: Array
+def turn_back(
+    start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
 ) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times, attitudes and rates, body axes, of the samples of `done` steps, and the failure if they end in no numbers.
+    """Return times, attitudes and rates, body axes, of the first n samples; and the failure, if some are not finite.
 
     The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
     """
-    n, t = grid.kept(done), grid.t
-    R_WB, w_WB_B = np.empty((n, 3, 3)), np.empty((n, 3))
+    t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))
     finite = kernels("samples").to_body_axes(t, q, L, start.J_inverse, start.spin, start.R_BP, R_WB, w_WB_B)
+    if finite == len(t):
+        return t, R_WB, w_WB_B, None
     failure = None if finite == n else Diverged(float(t[max(finite - 1, 0)]))
     return t[:finite], R_WB[:finite], w_WB_B[:finite], failure
-
-
-def _failure_of(kernel: Any, grid: Grid, result: Any) -> NotConverged:
-    """Return why the step after the last one done failed."""
-    kind = WrongBranch if result.elsewhere else NotConverged
-    return kind(result.done + 1, result.done * grid.dt, result.size, kernel.FAILURE)

@@ -20,7 +20,7 @@ PACKAGE = Path(cv.__file__).parent
 def python(arguments: list[str], **environment: str) -> str:
     """What Python prints with these variables changed; an empty one is removed."""
     known = {**os.environ, **environment}
-    command = [sys.executable, "-W", "error", *arguments]
+    command = [sys.executable, "-P", "-W", "error", *arguments]
     return subprocess.run(
         command, env={k: v for k, v in known.items() if v}, stdout=subprocess.PIPE, text=True, check=True
     ).stdout.strip()
@@ -35,7 +35,8 @@ def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> 
         assert set(ours) == set(theirs)
         assert len(ours.files) > 100
         for name in ours:
-            np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=1e-13, err_msg=name)
+            bound = 1e-13 if name.endswith(", 1") else 1e-9  # measured 7e-15; 1.2e-10 with steps of radians on a separatrix
+            np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=bound, err_msg=name)
 
 
 TURN = """
