@@ -215,11 +215,11 @@ def march(model, coefficients, workspace):
     continuous branch; the size then is the residual where the branch ends.
     """
     J, J_inverse, field = model.J, model.J_inverse, model.field
+    n_steps, every, q_out, L_out = workspace
     lengths = coefficients.lengths
-    n_steps, every, q_out, L_out = workspace.n_steps, workspace.every, workspace.q, workspace.L
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
-    workspace.q[0, :] = model.q
-    workspace.L[0, :] = model.L
+    q_out[0, :] = model.q
+    L_out[0, :] = model.L
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
     at, row, corrections = (1, 0), 0, 0
     while True:
@@ -228,8 +228,8 @@ def march(model, coefficients, workspace):
         )
         corrections += more
         step, stage = at
-        if step > workspace.n_steps:
-            return Result(workspace.n_steps, workspace.n_steps * len(lengths), corrections, None, size, False)
+        if step > n_steps:
+            return Result(n_steps, n_steps * len(lengths), corrections, None, size, False)
         q, q_carry, L, L_carry = state
         h = lengths[stage]
         a, gain, more, size, found = continue_branch(h, J, J_inverse, field, q, L, L_carry, tolerance)
