@@ -144,7 +144,7 @@ class Method(ABC):
 
     @property
     def cost(self) -> Cost:
-        """What its work costs, by which the automatic choice compares methods; by default that of an explicit step of order 8."""
+        """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
         return Cost(step=340.0)
 
     def unsupported(self, scene: Scene) -> str | None:
