@@ -20,8 +20,9 @@ from .errors import (
     Unsupported,
     WrongBranch,
 )
+from .integration import integrate
 from .invariants import Invariant
-from .method import Grid, Method, Role, integrate
+from .method import Grid, Method, Role
 from .methods.convected import Convected
 from .methods.gauss import Gauss
 from .methods.lame import Lame

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import pandas
 
     from .invariants import Invariant
-    from .methods.automatic import Choice
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,34 @@ class Counters:
     stages: int | None = None
     iterations: int | None = None
     evaluations: int | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `integrate(scene, error=...)` chose.
+
+    Attributes
+    ----------
+    method, dt
+        The `Method` that made the trajectory, and its step, s.
+    error
+        Attitude error asked for over the run, rad.
+    estimate
+        Estimated attitude error over the run, rad, from the same run at twice the step.
+    attempts
+        Steps tried on the whole run, s, with the estimate of each, rad.
+    """
+
+    method: Any  # a `Method`; that file imports this one
+    dt: float
+    error: float
+    estimate: float
+    attempts: tuple[tuple[float, float], ...]
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimate is within what was asked for."""
+        return self.estimate <= self.error
 
 
 @dataclass(frozen=True, eq=False)

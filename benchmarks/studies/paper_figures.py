@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.method import integrate
+from conservative.integration import integrate
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

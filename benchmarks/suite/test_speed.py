@@ -13,8 +13,9 @@ from conservative.benchmarks.studies.case import Case, Done, attempt
 from conservative.benchmarks.studies.speed import end_only, stretched
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
+from conservative.integration import integrate
 from conservative.lazy_kernels import kernels
-from conservative.method import Method, Role, grid_for, integrate
+from conservative.method import Method, Role, grid_for
 from conservative.registry import method as named
 from conservative.registry import scene as registered
 from conservative.scene import Scene

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..attitude import angle_between
 from ..errors import AccuracyNotReached, IntegrationFailed, Unsupported
 from ..method import Grid, Method
 from ..scene import Scene
-from ..trajectory import Trajectory
+from ..trajectory import Choice, Trajectory
 from .gauss import Gauss
 from .lame import Lame
 from .moser_veselov import MoserVeselov
@@ -39,34 +39,6 @@ PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
 
 
-@dataclass(frozen=True)
-class Choice:
-    """What `integrate(scene, error=...)` settled on.
-
-    Attributes
-    ----------
-    method, dt
-        What made the trajectory, and its step, s.
-    error
-        What was asked for: attitude error over the run, rad.
-    estimate
-        Estimated attitude error over the run, rad, from the same run at twice the step.
-    attempts
-        Steps tried on the whole run, s, with the estimate of each, rad.
-    """
-
-    method: Method
-    dt: float
-    error: float
-    estimate: float
-    attempts: tuple[tuple[float, float], ...]
-
-    @property
-    def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
-        return self.estimate <= self.error
-
-
 def candidates(scene: Scene) -> tuple[Method, ...]:
     """Return the methods worth probing on a scene: those on the frontier of time against error for its kind."""
     for method in (MoserVeselov(), Lame()):  # no truncation error
@@ -78,7 +50,7 @@ def candidates(scene: Scene) -> tuple[Method, ...]:
     return Projected(), *(Reduced(order=order) for order in (2, 4, 6, 8))
 
 
-def chosen(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
+def integrate_to_error(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
     """Return the trajectory with the cheapest method and step found for an attitude error, rad; its `choice` says which.
 
     With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th
