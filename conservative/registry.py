@@ -90,6 +90,20 @@ def method(text: str) -> Method:
     return family(**_arguments(f"method {name}", family, settings))
 
 
+def families() -> dict[str, type[Method]]:
+    """Return the registered classes of methods by name; what cannot be loaded, or is no method of that name, is left out."""
+    found = {name: _load_or_none(name) for name in registered(METHODS)}
+    return {name: family for name, family in found.items() if getattr(family, "family", None) == name}
+
+
+def _load_or_none(name: str) -> type[Method] | None:
+    try:
+        family = _load(METHODS, "method", name)
+    except (MissingEngine, NotLoadable):
+        return None
+    return family if isinstance(family, type) and issubclass(family, Method) else None
+
+
 def body_file(kind: str) -> Callable[[Path, str], MassDistribution]:
     """Return the function that reads a named body out of a file of a kind such as `mjcf` or `urdf`.
 
