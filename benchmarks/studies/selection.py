@@ -75,7 +75,7 @@ def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> t
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    wanted = registry.registered(registry.METHODS) if names is None else names
+    wanted = registry.list_methods() if names is None else names
     found: dict[Method, None] = {}
     for name in wanted:
         found.update(dict.fromkeys(_named(name, skip_missing)))

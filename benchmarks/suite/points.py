@@ -100,7 +100,7 @@ class Point:
 
 def points() -> Iterator[Point]:
     """Yield the points: every registered method, those of other packages as well, on every scene of the suite."""
-    names = [name for family in registry.registered(registry.METHODS) for name in SHORT.get(family, (family,))]
+    names = [name for family in registry.list_methods() for name in SHORT.get(family, (family,))]
     methods = [method for method in selection.methods(names, skip_missing=True) if method.role != Role.TRUTH]
     return (Point(scene, method) for scene in selection.scenes(SCENES) for method in methods)
 
