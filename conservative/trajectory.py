@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import invariants
+from . import invariants, presentation
 from .attitude import Array
 from .errors import IntegrationFailed
+from .invariants import Invariant
 from .outcome import OK, Outcome
 from .scene import Scene
 
 if TYPE_CHECKING:
     import altair
     import pandas
-
-    from .invariants import Invariant
 
 
 @dataclass(frozen=True)
@@ -115,6 +114,11 @@ class Trajectory:
         """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
 
+    @property
+    def work(self) -> dict[str, int]:
+        """Counts of work by their names, those that the method has."""
+        return {name: count for name, count in vars(self.counters).items() if count is not None}
+
     def drift(self, invariant: Invariant) -> Array:
         """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
 
@@ -131,9 +135,7 @@ class Trajectory:
         MissingEngine
             pandas is not installed.
         """
-        from .presentation import table
-
-        return table(self)
+        return presentation.table(self)
 
     def plot(self) -> altair.VConcatChart:
         """Return a chart of the body rates and of the drift of every invariant over time.
@@ -145,14 +147,10 @@ class Trajectory:
         MissingEngine
             Altair or pandas is not installed.
         """
-        from .presentation import picture
-
-        return picture(self)
+        return presentation.picture(self)
 
     def _repr_html_(self) -> str:
-        from .presentation import card
-
-        return card(self)
+        return presentation.card(self)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -57,7 +57,7 @@ def candidates(scene: Scene) -> tuple[Method, ...]:
 
 def _ranked_families() -> list[tuple[type[Method], Candidacy]]:
     """Return the families of ours that are candidates, in the order of their ranks."""
-    ours = [family for family in registry.families().values() if family.role == Role.OURS]
+    ours = [family for family in registry.list_families().values() if family.role == Role.OURS]
     found = [(family, family.candidacy) for family in ours if family.candidacy is not None]
     return sorted(found, key=lambda entry: entry[1].rank)
 

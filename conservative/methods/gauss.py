@@ -15,7 +15,7 @@ from ..declarations import README, Candidacy, Claims, Cost
 from ..errors import BadInput, branch_ended
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .coefficients.gauss_legendre import MOST_STAGES, tableau

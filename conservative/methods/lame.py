@@ -39,7 +39,7 @@ import numpy as np
 from ..declarations import README, Candidacy, Claims
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .non_spinning import frame_unsupported

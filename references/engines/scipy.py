@@ -12,7 +12,8 @@ from conservative.attitude import Array, from_quaternion
 from conservative.check import choice, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import UniformGravity, torque_W
+from conservative.potentials.potential import torque_W
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 

@@ -11,7 +11,7 @@ from conservative.attitude import Array
 from conservative.benchmarks.studies.case import Failed, attempt
 from conservative.benchmarks.studies.long_runs import case_for
 from conservative.method import Method, Role
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
