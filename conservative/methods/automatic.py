@@ -43,7 +43,7 @@ Attempts = list[tuple[float, float]]
 
 
 def candidates(scene: Scene) -> tuple[Method, ...]:
-    """Return the methods worth probing on a scene: an exact family alone where one supports it, else the first of each group."""
+    """Return the methods worth probing on a scene: an exact family alone where one supports it, else one family of each group."""
     found: dict[str, tuple[Method, ...]] = {}
     for family, candidacy in _ranked_families():
         settings = family.candidate_settings()
@@ -127,7 +127,7 @@ def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int
 
 
 def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
-    """Return the estimated error, rad, and the trajectory of a run, from the same run at twice the step; inf where one fails."""
+    """Return the estimated error, rad, inf where a run fails, and the trajectory of a run, from one more at twice the step."""
     fine = method.prepare(scene, grid)()
     # Half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
     stride = 1 + grid.every % 2
