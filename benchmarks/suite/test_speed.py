@@ -10,7 +10,7 @@ from conservative.benchmarks.gate.pytest_plugin import REPEAT
 from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
 from conservative.benchmarks.measures.timing import interleaved, prepared
 from conservative.benchmarks.studies.case import Case, Done, attempt
-from conservative.benchmarks.studies.speed import end_only, stretched
+from conservative.benchmarks.studies.speed import end_only, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.integration import integrate
@@ -114,4 +114,4 @@ def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
     case = Case("ratios", scene, method, end_only(grid_for(scene, scene.dt)))
     done = attempt(case)
     assert isinstance(done, Done), done
-    return stretched(case, done)
+    return lengthen(case, done)

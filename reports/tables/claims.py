@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import paper_figures
-from conservative.benchmarks.studies.case import UNSUPPORTED
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from . import orders
 from .overview import Cell, Cells
-from .tables import number
+from .tables import keyed, number
 
 HOLDS, FAILS, OPEN = Cell("✓ holds", "good"), Cell("✗ does not hold", "bad"), Cell("– not measured here", "none")
 ENERGY = "energy drift max"
@@ -64,7 +64,7 @@ def findings(table: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
     """Return every claim that the report can say something about."""
     by_name = {scene.name: scene for scene in scenes}
     of_tables = [*_orders(table), *_exact(table), *_same_map(table)]
-    return [*_kept(table, by_name), *of_tables, *_mujoco(table, by_name), *_factor_four(by_name)]
+    return [*_kept(table, by_name), *of_tables, *_mujoco(table, by_name), *_factor_four(table)]
 
 
 def as_cells(found: list[Finding]) -> Cells:
@@ -77,8 +77,8 @@ def _judged(holds: bool) -> Cell:
 
 
 def _paper_rows(table: pd.DataFrame, method: str, measure: str) -> pd.DataFrame:
-    rows = table[(table["study"] == "paper") & (table["method"] == method) & (table["measure"] == measure)]
-    return rows[rows["status"] != UNSUPPORTED]
+    rows = keyed(table[(table["study"] == "paper") & (table["method"] == method)])
+    return rows[(rows["measure"] == measure) & (rows["outcome"] != OutcomeKind.UNSUPPORTED)]
 
 
 def _kept(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
@@ -142,7 +142,7 @@ def _same_map(table: pd.DataFrame) -> Iterator[Finding]:
 
 
 def _mujoco(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
-    rows = table[(table["study"] == "paper") & table["method"].str.startswith("mujoco")]
+    rows = keyed(table[(table["study"] == "paper") & table["method"].str.startswith("mujoco")])
     for scene, members in rows.groupby("scene", sort=False):
         rk4, single, implicit, fast = (
             _by_step(members, f"mujoco{setting}", measure)
@@ -180,10 +180,10 @@ def _coincide(scene: str, implicit: Mapping[float, float], fast: Mapping[float, 
     return Finding(claim, MUJOCO, f"attitude errors differ by {number(max(gaps))} of themselves", _judged(max(gaps) <= 1e-6))
 
 
-def _factor_four(scenes: Collection[str]) -> Iterator[Finding]:
-    if "lagrange_top" not in scenes:
+def _factor_four(table: pd.DataFrame) -> Iterator[Finding]:
+    distances = table[table["measure"] == Measure.PERIOD_DISTANCE.text]["value"].to_list()
+    if not distances:
         return
-    distances = paper_figures.position_errors()["distance"].to_list()
     ratios = [before / after for before, after in pairwise(distances)]
     measured = "ratios " + ", ".join(number(ratio, 3) for ratio in ratios)
     holds = all(abs(ratio - 4) <= 0.4 for ratio in ratios)
