@@ -169,6 +169,23 @@ def test_a_method_need_not_say_anything(installed):
     assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
 
 
+NEEDY = SOURCE.replace(
+    "    @property\n    def order",
+    "    def __post_init__(self):\n        raise MissingEngine('Engine', 'engine')\n\n    @property\n    def order",
+).replace("from conservative.method ", "from conservative.errors import MissingEngine\nfrom conservative.method ")
+"""The same method, which needs something that is not installed."""
+
+
+def test_a_method_without_what_it_needs_breaks_nothing(installed):
+    top = cv.scenes.asymmetric_top()
+    before = automatic.candidates(top), claims.findings(frame([]), [])
+    installed(NEEDY)
+    assert "borrowed" in registry.list_families()
+    assert (automatic.candidates(top), claims.findings(frame([]), [])) == before
+    missing = [point.method for point in points.points() if point.method.name == "borrowed"]
+    assert {type(method) for method in missing} == {selection.Missing}
+
+
 BROKEN = {
     "nothing there": ("", "borrowed = borrowed_nowhere:Borrowed"),
     "fails on import": ("raise OSError('no licence')", "borrowed = borrowed_method:Borrowed"),
