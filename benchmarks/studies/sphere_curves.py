@@ -53,13 +53,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 def drawn(methods: Sequence[Method]) -> list[Method]:
     """Return the methods that are drawn: the preferred ones, and the first of every family that has none there; no truth."""
     preferred = [method for method in methods if method.name in PREFERRED]
-    firsts = {method.family: method for method in reversed(methods) if method.role is not Role.TRUTH}
+    firsts = {method.family: method for method in reversed(methods) if method.role != Role.TRUTH}
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 
 
 def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
     """Return the first truth that can do a scene, if there is one."""
-    return [method for method in methods if method.role is Role.TRUTH and method.unsupported(scene) is None][:1]
+    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
 
 
 def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
