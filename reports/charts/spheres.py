@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from conservative.benchmarks.studies.sphere_curves import AXES
-from conservative.benchmarks.studies.sphere_curves import drawn as wanted
+from conservative.benchmarks.studies.sphere_curves import AXES, pick
 from conservative.method import Method
 
 from ..labels import shown
@@ -22,7 +21,7 @@ TURN, TILT = 35, 25
 def absent(found: pd.DataFrame, scene: str, methods: Sequence[Method]) -> list[str]:
     """Return the names of the methods that should be drawn on a scene and could not."""
     drawn = set(found[found["scene"] == scene]["method"])
-    return [method.name for method in wanted(methods) if method.name not in drawn]
+    return [method.name for method in pick(methods) if method.name not in drawn]
 
 
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
