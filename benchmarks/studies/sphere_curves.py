@@ -43,7 +43,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 
 def pick(methods: Sequence[Method]) -> list[Method]:
     """Return the methods that are drawn: of each family its `picture_settings`, or the first where it has none of those."""
-    competitors = [method for method in methods if method.role is not Role.TRUTH]
+    competitors = [method for method in methods if method.role != Role.TRUTH]
     preferred = [method for method in competitors if method in method.picture_settings()]
     firsts = {method.family: method for method in reversed(competitors)}
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
@@ -51,7 +51,7 @@ def pick(methods: Sequence[Method]) -> list[Method]:
 
 def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
     """Return the first truth that can do a scene, if there is one."""
-    return [method for method in methods if method.role is Role.TRUTH and method.unsupported(scene) is None][:1]
+    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
 
 
 def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:

@@ -160,7 +160,7 @@ def test_data_are_short_and_exact_to_their_digits():
 
 def test_verdict_names_the_cheapest_and_what_it_keeps():
     header, body = overview.verdict(made_up(), points(made_up()))
-    found_rows = [dict(zip(header, line, strict=True)) for line in body]
+    rows = [dict(zip(header, line, strict=True)) for line in body]
     assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
     assert rows[0]["cheapest"] == "reduced"
     assert "energy ✓" in rows[0]["conserves"]
