@@ -34,9 +34,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from ..declarations import README, Candidacy, Claims
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start
@@ -57,6 +58,10 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(1, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "olive"
+    kernel: ClassVar[str] = "lame"
 
     @property
     def order(self) -> None:

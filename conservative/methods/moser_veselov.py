@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
+from ..declarations import README, Candidacy, Claims
 from ..errors import BadInput
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
@@ -26,7 +27,12 @@ LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
 
 
 @dataclass(frozen=True)
-class MoserVeselov(Method):
+class _Fields:
+    order: int | None = None
+
+
+@dataclass(frozen=True, init=False)
+class MoserVeselov(_Fields, Method):
     """The discrete Moser-Veselov (DMV) map with a calibrated inertia, for free bodies of any inertia.
 
     With the Cayley vector c of a step h and the inertia B, where 1/B_i = css/J_i + cdd in principal axes,
@@ -45,7 +51,7 @@ class MoserVeselov(Method):
     Parameters
     ----------
     order
-        2, 4, 6, 8, 10 or "exact", which the attribute `order` shows as None: accuracy does not depend on the step.
+        2, 4, 6, 8, 10 or "exact", which the attribute `order` has as None: accuracy does not depend on the step.
 
     Raises
     ------
@@ -53,15 +59,17 @@ class MoserVeselov(Method):
         order is none of these; and on running: the step is too long, see `longest_step`.
     """
 
-    order: int | None = None
-
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "wine"
+    kernel: ClassVar[str] = "moser_veselov"
 
-    def __init__(self, order: int | Literal["exact"] = "exact") -> None:
-        if isinstance(order, bool) or order not in ORDERS:
+    def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
+        if order is not None and (isinstance(order, bool) or order not in ORDERS):
             raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
-        object.__setattr__(self, "order", None if order == "exact" else order)
+        super().__init__(None if order == "exact" else order)
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -76,6 +84,18 @@ class MoserVeselov(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in ORDERS)
+
+    @classmethod
+    def candidate_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls("exact"),)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[MoserVeselov, ...]:
+        return cls(2), cls("exact")
+
+    @classmethod
+    def audit_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls(4),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         start, model, coefficients = scene.derive(calibrate, self, grid.dt)

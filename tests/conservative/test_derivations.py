@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import copy
 import gc
-import pickle
-import threading
 import weakref
 
 import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.derivations import MOST, Derivations
-from conservative.methods import reduced
+from conservative.scene import MOST_DERIVATIONS
 
 
 def test_a_value_is_derived_once_for_each_setting_until_it_is_forgotten() -> None:
@@ -31,27 +27,11 @@ def test_a_value_is_derived_once_for_each_setting_until_it_is_forgotten() -> Non
 
 
 def test_the_store_is_bounded() -> None:
-    scene = cv.scenes.brick_flip()
-    for number in range(3 * MOST):
-        scene.derive(lambda _, number: number, number)
-    assert len(scene._derivations.entries) == MOST
-
-
-def test_each_thread_derives_for_itself() -> None:
-    scene, found = cv.scenes.lagrange_top(), []
-    for _ in range(2):
-        thread = threading.Thread(target=lambda: found.append(scene.derive(reduced.convert, cv.Reduced())))
-        thread.start()
-        thread.join()
-    assert found[0] is not found[1]
-    assert found[0] is not scene.derive(reduced.convert, cv.Reduced())
-
-
-def test_copies_do_not_carry_what_was_derived() -> None:
-    store = Derivations()
-    store.add(("key",), 1)
-    assert pickle.loads(pickle.dumps(store)).entries == {}
-    assert copy.deepcopy(store).entries == {}
+    scene = cv.scenes.lagrange_top()
+    for number in range(3 * MOST_DERIVATIONS + 5):
+        cv.Projected().prepare(scene, cv.Grid(0.01, 1))
+        assert scene.derive(lambda _, number: number, number) == number
+        assert len(scene._derivations) <= MOST_DERIVATIONS
 
 
 @pytest.mark.parametrize("method", [cv.Reduced(), cv.Reduced(4, frame="auto"), cv.Gauss(2), cv.Lame(), cv.Projected()])
