@@ -61,7 +61,7 @@ def untouched():
 
 @pytest.fixture(scope="module")
 def kept(untouched):
-    return baseline.updated(None, [untouched], "the first one")
+    return baseline.update_baseline(None, [untouched], "the first one")
 
 
 def with_row(untouched, name, **changes):
@@ -74,7 +74,7 @@ def with_row(untouched, name, **changes):
 
 def failures(kept, found, times="required"):
     """The violations as (measure, method), and their text."""
-    verdict = compare.judged(kept, found, times)
+    verdict = compare.judge(kept, found, times)
     assert verdict.passed == (not verdict.violations)
     return {(each.measure, each.method) for each in verdict.violations}, str(verdict)
 
@@ -82,7 +82,7 @@ def failures(kept, found, times="required"):
 def test_an_untouched_run_passes(kept, untouched):
     limits = {row.method: row.time_ratios for row in kept.rows.values()}
     again = [measured(name) for name in METHODS]
-    ratio = yardstick.confirmed(again[0].time_ratio, limits[SECOND][MACHINE].limit, lambda: measured(SECOND).time_ratio)
+    ratio = yardstick.confirm(again[0].time_ratio, limits[SECOND][MACHINE].limit, lambda: measured(SECOND).time_ratio)
     again[0] = replace(again[0], time_ratio=ratio)
     assert failures(kept, Results(MACHINE, {row.id: row for row in again}))[0] == set()
 
@@ -180,7 +180,7 @@ def test_a_baseline_of_a_foreign_machine(kept, untouched):
     assert "note: unbaselined machine" in text
     worse = replace(with_row(untouched, SECOND, values={"rate error max": 1.0}), machine="another")
     assert failures(kept, worse, "known")[0] == {("rate error max", SECOND)}  # all but time is gated everywhere
-    both = baseline.updated(kept, [elsewhere], "a second machine")
+    both = baseline.update_baseline(kept, [elsewhere], "a second machine")
     assert failures(both, elsewhere)[0] == failures(both, untouched)[0] == set()
 
 
@@ -232,7 +232,7 @@ def test_the_command_compares_and_accepts(kept, untouched, tmp_path):
 )
 def test_what_failed_cannot_be_accepted(kept, untouched, changes):
     with pytest.raises(cv.BadInput):
-        baseline.updated(kept, [with_row(untouched, SECOND, **changes)], "no")
+        baseline.update_baseline(kept, [with_row(untouched, SECOND, **changes)], "no")
 
 
 def test_the_limit_of_a_time_follows_from_repeats():

@@ -2,7 +2,7 @@
 
 Every run is a process of its own, as a run of the gate is. It measures the time ratio of each timed point of the suite as it is
 (an alarm is false), and of one whose method takes a fifth more steps than it says (no alarm is a miss). The thresholds come
-from the first runs, in the way a baseline gets them, and the runs after those are judged, also as the gate does it.
+from the first runs, in the way a baseline gets them, and the runs after those are judge, also as the gate does it.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def summary(runs: Sequence[Mapping[str, float]], limits: Mapping[str, float]) ->
 def one_run(limits: Mapping[str, float]) -> dict[str, float]:
     """Return the ratios of one run of the gate: all in one process, and those above their limits again in others."""
     first = _process(list(measures()))
-    return {name: yardstick.confirmed(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
+    return {name: yardstick.confirm(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
 
 
 def _alone(name: str) -> float:
@@ -106,7 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m conservative.benchmarks.verification.gate_false_alarms", description=__doc__
     )
-    parser.add_argument("--runs", type=int, default=100, help="runs that are judged")
+    parser.add_argument("--runs", type=int, default=100, help="runs that are judge")
     parser.add_argument("--learning", type=int, default=10, help="runs before those, from which the thresholds come")
     parser.add_argument("--once", nargs="+", metavar="NAME", help="print the ratios of these rows, from this process")
     options = parser.parse_args()
