@@ -77,7 +77,8 @@ def confirm(ratio: float, limit: float, measure: Callable[[], float]) -> float:
 
 
 @cache
-def _compiled() -> Any:
+def compiled_turn() -> Any:
+    """Return `turn`, compiled: once a process."""
     from numba import njit
 
     loop: Any = njit(cache=True, error_model="numpy")(turn)
@@ -92,7 +93,7 @@ def definition() -> str:
 
 def time_ratio(method: Method, scene: Scene, dt: float) -> float:
     """Return the time of a step of the method, in steps of the yardstick."""
-    loop = _compiled()
+    loop = compiled_turn()
     steps, run = _lasting(lambda n: method.prepare(scene, Grid(dt, n, n)))
     turns, reference = _lasting(lambda n: lambda: loop(n, 1e-3))
     again = [method.prepare(scene, Grid(dt, steps, steps)) for _ in range(PLACES - 1)]

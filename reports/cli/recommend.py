@@ -182,7 +182,7 @@ def notes(found: Recommendation) -> list[str]:
         f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.becomes:.2g} rad within "
         f"{amplified.until:.4g} s{after} ({amplified.label}): {stable}."
     )
-    lines.append("Cost: the largest_rate of interleaved runs in this machine's own time; ratios are what lasts.")
+    lines.append("Cost: the fastest of interleaved runs in this machine's own time; ratios are what lasts.")
     lines += [f"{called(a)}: {a.reason}." for a in found.advice if not a.reached]
     lines += [f"{name}: not installed." for name in found.missing]
     return lines
