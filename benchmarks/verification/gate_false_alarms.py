@@ -2,7 +2,7 @@
 
 Every run is a process of its own, as a run of the gate is. It measures the time ratio of each timed point of the suite as it is
 (an alarm is false), and of one whose method takes a fifth more steps than it says (no alarm is a miss). The thresholds come
-from the first runs, in the way a baseline gets them, and the runs after those are judge, also as the gate does it.
+from the first runs, in the way a baseline gets them, and the runs after those are judged, also as the gate does it.
 """
 
 from __future__ import annotations
