@@ -263,7 +263,8 @@ def test_the_command_compares_and_accepts(kept, untouched, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "changes", [{"status": Status.FAILED}, {"values": {"rate error max": float("nan")}}, {"values": {"iterations": float("inf")}}]
+    "changes",
+    [{"status": Status.FAILED}, {"values": {"rate error max": float("nan")}}, {"values": {"iterations": float("inf")}}],
 )
 def test_what_failed_cannot_be_accepted(kept, untouched, changes):
     with pytest.raises(cv.BadInput):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -67,33 +68,45 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     """Return the probes of a method from a step, or the tolerance it has, on, until one may be expected to have the error.
 
     Where the truth is known for longer, short probes only have to be good enough for an error that grows linearly, and long
-    ones find out. There a longer step is tried, too, where the error has turned out far smaller than wanted.
+    ones find out.
     """
     more = conditions.truth_until > conditions.short * (1 + 1e-9) and conditions.duration > conditions.short
-
-    def linear(probe: Probe) -> float:
-        law = probe.error_law
-        return law.error * max(1.0, conditions.duration / law.length) if law and law.error < LOST else math.inf
-
-    aim = linear if more else lambda probe: probe.expected
+    aim = partial(expect_linear, conditions) if more else expect
     short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], aim, long=False)
-    last = short[-1]
-    if not more or aim(last) > conditions.target:
+    if not more or aim(short[-1]) > conditions.target:
         return Refinement(tuple(short), ())
-    long = [conditions.probe(last.method, last.dt, last.cost, True, short)]
+    return Refinement(tuple(short), tuple(refine_long(conditions, short)))
+
+
+def expect(probe: Probe) -> float:
+    """Return the error, rad, that a probe makes expect over the duration."""
+    return probe.expected
+
+
+def expect_linear(conditions: Conditions, probe: Probe) -> float:
+    """Return the error, rad, to expect over the duration if that of a probe grows linearly."""
+    law = probe.error_law
+    return law.error * max(1.0, conditions.duration / law.length) if law and law.error < LOST else math.inf
+
+
+def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
+    """Return the long probes that follow short ones; the last has a longer step where the error is far below the wanted one."""
+    last = short[-1]
+    method = last.method
+    long = [conditions.probe(method, last.dt, last.cost, True, short)]
     if method.order is not None and long[0].length < conditions.duration * (1 - 1e-9):
         # The affordable run is shorter than the duration: one at a longer step, which gets further, shows how errors grow.
-        longer = min(LONGER * last.dt, dt)
+        longer = min(LONGER * last.dt, short[0].dt)
         ahead = conditions.probe(method, longer, last.cost * last.dt / longer, True)
-        long = [ahead, conditions.probe(last.method, last.dt, last.cost, True, (ahead,))]
+        long = [ahead, conditions.probe(method, last.dt, last.cost, True, (ahead,))]
     first = long[-1]
-    long = _refine_until(conditions, long, lambda probe: probe.expected, long=True)
+    long = _refine_until(conditions, long, expect, long=True)
     if method.order is not None and first.expected < COARSER * conditions.target:
         # At most four times: the error must still shrink with its order where the step comes from.
         factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / method.order))
         longer = conditions.step_at_most(first.dt * factor)
         long += [conditions.probe(method, longer, first.cost * first.dt / longer, True)] if longer > first.dt else []
-    return Refinement(tuple(short), tuple(long))
+    return long
 
 
 def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
