@@ -65,7 +65,7 @@ def generic():
 
 
 def test_the_default_method_walks():
-    # After 10^8 steps 8.5e-15 and 4.4e-15, by `python -m conservative.benchmarks.verification.round_off --steps 1e8 --members 4`.
+    # After 10^8 steps 8.5e-15 and 4.4e-15, by the command of `round_off` with --steps 1e8 --members 4.
     found = round_off.measure_growth(cv.Reduced(), cv.scenes.brick_flip(), 0.01, 10_000_000, 4)
     for name in ("energy", "momentum"):
         assert not found[name].linear, str(found[name])

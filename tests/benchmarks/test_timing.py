@@ -59,9 +59,9 @@ def test_a_run_over_its_budget_gets_three_rounds(rest):
     assert (timings["slow"].rounds, timings["fast"].rounds) == (3, 8)
 
 
-def test_the_collector_is_off_while_timing_and_on_afterwards():
+def test_the_collector_is_off_while_timing_and_on_afterwards(rest):
     seen = []
-    time_interleaved({"look": lambda: seen.append(gc.isenabled())}, rounds=3, min_time=1e-6)
+    time_interleaved({"look": lambda: (seen.append(gc.isenabled()), rest(1e-3))}, rounds=3, min_time=1e-6)
     assert seen[-1] is False
     assert gc.isenabled()
 
