@@ -11,7 +11,7 @@ Source of the mass model: our own, see `mass_model`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from importlib import import_module, metadata
 from typing import Any
 
@@ -27,7 +27,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix
 
 
-@cache
+@lru_cache(maxsize=32)
 def version(package: str, engine: str) -> str:
     """Return the version of an installed package; the engine itself is not imported.
 
@@ -42,7 +42,7 @@ def version(package: str, engine: str) -> str:
         raise MissingEngine(engine, package) from None
 
 
-@cache
+@lru_cache(maxsize=32)
 def load(module: str, package: str, engine: str) -> Any:
     """Return an engine's module, imported at the first call.
 
