@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, axes_about, to_quaternion
 from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.invariants import axial_direction
@@ -120,10 +120,7 @@ def symmetric_axes(scene: Scene) -> Axes | None:
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    R_BF = np.column_stack([first, np.cross(axis, first), axis])
+    R_BF = axes_about(axis)
     return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 
 

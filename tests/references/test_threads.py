@@ -48,6 +48,21 @@ def test_runs_that_overlap_do_not_meet(method):
         assert [states(trajectory) for trajectory in in_threads(runs)] == alone
 
 
+def test_runs_of_mujoco_that_overlap_leave_its_handler_of_warnings_as_it_was():
+    mj = pytest.importorskip("mujoco")
+
+    def handler(message):
+        raise AssertionError(message)
+
+    mj.set_mju_user_warning(handler)
+    try:
+        runs = [MuJoCo().prepare(cv.scenes.brick_flip(), cv.Grid(0.01, 300)) for _ in range(4 * THREADS)]
+        assert len({states(trajectory) for trajectory in in_threads(runs)}) == 1
+        assert mj.get_mju_user_warning() is handler
+    finally:
+        mj.set_mju_user_warning(None)
+
+
 def test_preparing_in_threads_and_precisions():
     """Preparation computes in many digits too, and leaves the user's own precision alone."""
     body, grid = cv.RigidBody([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]), cv.Grid(0.5, 4)
