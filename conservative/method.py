@@ -14,6 +14,7 @@ import numpy as np
 
 from .attitude import Array
 from .check import positive_integer, positive_number
+from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
 from .trajectory import Trajectory
@@ -54,7 +55,9 @@ class Grid:
     @property
     def t(self) -> Array:
         """Times (n,) of the samples, s."""
-        return self.steps * self.dt
+        t = self.steps
+        t *= self.dt
+        return t
 
     def kept(self, done: int) -> int:
         """Return how many samples a run of `done` steps has filled."""
@@ -85,11 +88,33 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
 class Method(ABC):
     """A way to integrate any scene it supports: a frozen value, one file, one line of registration.
 
-    Class attributes: `family` (its registered name) and `role`.
+    Only `family`, `role`, `order` and `prepare` have no default. All that others need to know about a method it says itself.
+
+    Attributes
+    ----------
+    family
+        The name that the class is registered with.
+    role
+        The side it is on.
+    candidacy
+        How the automatic choice considers it; None where it does not.
+    claims
+        What is claimed of it, and where: reports check `order` and `conserves` against that. None where nobody claims anything.
+    colour
+        A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
+    kernel
+        Module in `conservative.kernels` whose function `march` takes all steps of a run; "" where there is none.
+    step_goals
+        Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
     """
 
     family: ClassVar[str]
     role: ClassVar[Role]
+    candidacy: ClassVar[Candidacy | None] = None
+    claims: ClassVar[Claims | None] = None
+    colour: ClassVar[str | None] = None
+    kernel: ClassVar[str] = ""
+    step_goals: ClassVar[tuple[tuple[str, float], ...]] = ()
 
     @property
     def name(self) -> str:
@@ -115,6 +140,11 @@ class Method(ABC):
         """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
         return frozenset()
 
+    @property
+    def cost(self) -> Cost:
+        """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
+        return Cost(step=340.0)
+
     def unsupported(self, scene: Scene) -> str | None:
         """Return why the scene cannot be done, None if it can."""
         return None
@@ -135,6 +165,26 @@ class Method(ABC):
     def variants(cls) -> tuple[Method, ...]:
         """Return the settings that tables and generic tests take up by themselves."""
         return (cls(),)
+
+    @classmethod
+    def candidate_settings(cls) -> tuple[Method, ...]:
+        """Return the settings that the automatic choice probes, where the first supports the scene; by default all variants."""
+        return cls.variants()
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        """Return the settings that the benchmark suite times; by default all variants."""
+        return cls.variants()
+
+    @classmethod
+    def audit_settings(cls) -> tuple[Method, ...]:
+        """Return the settings whose order `claims` are about; by default those of the suite."""
+        return cls.suite_settings()
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Method, ...]:
+        """Return the settings whose motion a report draws, where it has them; by default the first that it has."""
+        return ()
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
         """Return the trajectory of steps dt to t_end, s, whatever its status; `integrate` is this with checks and exceptions.

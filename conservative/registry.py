@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from .entry_points import METHODS, SCENES, list_entries, load_entry
-from .errors import BadInput, nearest
+from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
 
@@ -72,6 +72,21 @@ def method(text: str) -> Method:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
     return family(**_arguments(f"method {name}", family, settings))
+
+
+def list_families() -> dict[str, type[Method]]:
+    """Return the registered classes of methods by name; what cannot be loaded, or is no method of that name, is left out."""
+    found = {name: _load_family(name) for name in list_methods()}
+    return {name: family for name, family in found.items() if family is not None}
+
+
+def _load_family(name: str) -> type[Method] | None:
+    try:
+        family = load_entry(METHODS, "method", name)
+    except (MissingEngine, NotLoadable):
+        return None
+    whole = isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name
+    return family if whole else None
 
 
 def _split(text: str) -> tuple[str, list[str]]:

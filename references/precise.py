@@ -58,6 +58,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "grey"
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)

@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import long_runs, paper_figures
-from conservative.benchmarks.studies.case import MISSING, OK, SKIPPED, UNSUPPORTED
+from conservative.benchmarks.studies import long_runs
+from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from .charts import figures, paper
@@ -26,7 +26,7 @@ from .tables import headline, orders, overview, tables, work_precision
 from .terminal import atomic_files
 from .terminal.progress import Step
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the layout of measurements.json; a change that breaks a reader raises it."""
 
 
@@ -103,7 +103,7 @@ def render(made: Plan, measured: Measured, source: Provenance, draw: Draw) -> st
         verdict=headline.lines(found),
         by_scene={scene.name: _scene_parts(scene, measured, found, draw) for scene in made.scenes},
         durations=f"{long_runs.DURATIONS:g}",
-        paper=list(_paper_parts(made, draw)),
+        paper=list(_paper_parts(made, measured, draw)),
         hard_cases=_matrix(overview.hard_cases(measured.table)),
         stability=_matrix(overview.stability(measured.table)),
         truths=tables.markdown(tables.truths(measured.table)),
@@ -134,29 +134,28 @@ def _scene_parts(scene: Scene, measured: Measured, contests: list[work_precision
         "order": tables.markdown(tables.order(table, name)),
         "time": tables.markdown(tables.time(table, name)),
         "work_precision": draw(f"work_precision_{name}", figures.work_precision(work_precision.points(table), name)),
-        "drift_picture": draw(f"drift_{name}", figures.drift(measured.drifts, name)),
+        "drift_picture": draw(f"drift_{name}", figures.drift(tables.drift_samples(measured.samples), name)),
         "convergence": draw(f"convergence_{name}", figures.convergence(errors, orders.fits(errors), name)),
     }
 
 
-def _paper_parts(made: Plan, draw: Draw) -> Iterator[str]:
+def _paper_parts(made: Plan, measured: Measured, draw: Draw) -> Iterator[str]:
     """Yield the paper's figures that belong to the scenes of the report."""
-    scenes = {scene.name for scene in made.scenes}
+    scenes, samples = {scene.name for scene in made.scenes}, measured.samples
     if "brick_flip" in scenes:
-        picture = draw("paper_figure_1", paper.figure_1(paper_figures.body_rates(), paper_figures.conservation()))
+        picture = draw("paper_figure_1", paper.figure_1(paper.body_rates(samples), paper.conservation(samples)))
         yield f"![Figure 1 of the paper: rates of the brick, errors of energy and momentum]({picture})"
     if "lagrange_top" in scenes:
-        picture = draw("paper_figure_2", paper.figure_2(paper_figures.centre_of_mass()))
+        picture = draw("paper_figure_2", paper.figure_2(paper.centre_of_mass(samples)))
         yield f"![Figure 2 of the paper: centre of mass of the top]({picture})"
         yield "Error of the centre of mass of the top after one period of precession (the whole number of steps next to it):"
-        yield tables.markdown(tables.positions(paper_figures.position_errors()))
+        yield tables.markdown(tables.positions(measured.table))
 
 
 def failed(measured: Measured) -> list[str]:
     """Return what of ours failed at the steps of the paper: one line each."""
     rows = measured.table
-    bad = rows[
-        (rows["study"] == "paper") & (rows["role"] == "ours") & ~rows["status"].isin([OK, UNSUPPORTED, MISSING, SKIPPED])
-    ]
-    found = zip(bad["method"], bad["scene"], bad["dt"], bad["status"], strict=True)
+    fine = [OutcomeKind.OK, OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED]
+    bad = rows[(rows["study"] == "paper") & (rows["role"] == "ours") & ~rows["outcome"].isin(fine)]
+    found = zip(bad["method"], bad["scene"], bad["dt"], tables.endings(bad), strict=True)
     return list(dict.fromkeys(f"{method} on {scene}, dt = {dt:g} s: {status}" for method, scene, dt, status in found))

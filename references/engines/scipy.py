@@ -51,6 +51,7 @@ class SciPy(Method):
 
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "orange"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -91,6 +92,10 @@ class SciPy(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return (cls(rtol=1e-9), cls(rtol=1e-12))
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return (cls(rtol=1e-9),)
 
 
 def _counting(solver: Any) -> Any:

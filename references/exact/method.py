@@ -126,6 +126,7 @@ class Exact(Method):
 
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "black"
 
     @property
     def label(self) -> str:

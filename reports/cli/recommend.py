@@ -13,7 +13,6 @@ from conservative import registry
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation, question, recommend
-from conservative.benchmarks.studies.case import OK
 from conservative.benchmarks.studies.selection import tolerance_setting
 from conservative.errors import BadInput
 
@@ -143,7 +142,7 @@ def _probe(probe: Probe) -> dict[str, Any]:
         "law": probe.law,
         "holds": finite(probe.holds),
         "drift": {d.name: {"measured": d.measured, "expected": d.expected, "secular": d.secular} for d in probe.drifts},
-        "status": probe.status,
+        "status": str(probe.outcome),
     }
 
 
@@ -204,7 +203,7 @@ def _failing(advice: Advice) -> tuple[str, ...]:
 def _probed(advice: Advice) -> Iterator[tuple[str, ...]]:
     order = "" if advice.order is None else "no order seen" if advice.order.reason else f"order {advice.order.slope:.2f}"
     for i, probe in enumerate(advice.probes):
-        error = f"{probe.error:.2e}" if probe.status == OK else probe.status
+        error = f"{probe.error:.2e}" if probe.outcome.ok else str(probe.outcome)
         expected = f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
         name = (called(advice), order)[i] if i < 2 else ""
         yield name, setting(probe) + (" <-" if probe is advice.best else ""), f"{probe.length:.4g}", error, expected

@@ -12,18 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import altair as alt
-import pandas as pd
 
 from conservative import registry
-from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import long_runs, studies
+from conservative.benchmarks.studies.study import Study
 from conservative.method import Method
 from conservative.scene import Scene
 
 from .. import document
 from ..charts import figures, spheres
 from ..charts.style import styled
-from ..tables import work_precision
+from ..tables import tables, work_precision
 from ..terminal.progress import Step, progress
 
 FOLDER = Path(__file__).parents[1] / "pictures"
@@ -64,22 +65,22 @@ def _methods(names: Sequence[str]) -> tuple[Method, ...]:
 
 def time_against_error(scene: Scene, methods: tuple[Method, ...], quick: bool) -> Any:
     """Return the report's chart of time against error."""
-    study = studies.Study("work_precision", (scene,), methods, quick)
+    study = Study("work_precision", (scene,), methods, quick)
     table = measurement.frame(list(studies.rows(study)))
     return figures.work_precision(work_precision.points(table), scene.name)
 
 
 def drift_of_energy(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the report's chart of drifts, of the energy alone."""
-    found = pd.concat(
-        [long_runs.measured(long_runs.case_for(scene, method), False)[1] for method in methods], ignore_index=True
-    )
+    every = studies.findings(Study("long_runs", (scene,), methods))
+    found = tables.drift_samples(samples.frame(line for line in every if isinstance(line, Samples)))
     return figures.drift(found[found["invariant"] == "energy"], scene.name)
 
 
 def polhodes(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the page's spheres side by side, each under the name of its method."""
-    curves = spheres.curves((scene,), methods)
+    every = studies.findings(Study("sphere_curves", (scene,), methods))
+    curves = spheres.curves(samples.frame(line for line in every if isinstance(line, Samples)))
     names = list(dict.fromkeys(curves["series"]))
     panels = [spheres.chart(curves, scene.name, name) for name in names]
     shared = panels[0]["params"]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import import_time, long_runs
+from conservative.benchmarks.studies import long_runs
 from conservative.scene import Scene
 
 from ..charts import figures, spheres, vega_embed
@@ -62,10 +62,9 @@ class SceneParts:
 
 
 def render(made: Plan, measured: Measured, source: Provenance) -> str:
-    """Return the page; runs what it draws on spheres, and measures what imports cost."""
+    """Return the page; from measurements alone."""
     points = work_precision.points(measured.table)
-    curves = spheres.curves(made.scenes, made.methods)
-    costs = import_time.costs(1 if made.quick else import_time.ROUNDS)
+    curves = spheres.curves(measured.samples)
     parts = [_scene(scene, made, measured, points, curves) for scene in made.scenes]
     table = measured.table
     return _template().render(
@@ -82,7 +81,7 @@ def render(made: Plan, measured: Measured, source: Provenance) -> str:
         hard_cases=overview.hard_cases(table),
         stability=overview.stability(table),
         once=list(overview.costs_paid_once(table)),
-        imports=overview.imports(costs),
+        imports=overview.imports(table),
         audit=claims.as_cells(claims.findings(table, made.scenes)),
         truths=tables.truths(table),
         failures=tables.failures(table),
@@ -127,7 +126,7 @@ def _scene(scene: Scene, made: Plan, measured: Measured, points: pd.DataFrame, c
         dt=f"{scene.dt:g}",
         work_precision=_work_precision(points, name),
         contests=tables.contests([contest for contest in work_precision.contests(points) if contest.scene == name]),
-        drift=_drift(measured.drifts, name),
+        drift=_drift(tables.drift_samples(measured.samples), name),
         conservation=overview.conservation(table, name),
         convergence=_convergence(table, name),
         order=tables.order(table, name),
@@ -151,7 +150,7 @@ def _work_precision(points: pd.DataFrame, scene: str) -> Figure:
 
 def _drift(samples: pd.DataFrame, scene: str) -> Figure:
     rows = samples[samples["scene"] == scene]
-    every = max(1, long_runs.KEPT // DRIFT_SAMPLES)
+    every = max(1, long_runs.SAMPLES // DRIFT_SAMPLES)
     thin = rows[rows.groupby(["series", "invariant"], sort=False).cumcount(ascending=False) % every == 0]
     summary = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
     charts = vega_embed.embedded(figures.drift(thin, scene), _hovering("t", "drift"), 220)

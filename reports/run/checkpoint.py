@@ -9,13 +9,16 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
-from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.measures.measurement import Measurement
+from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.studies.study import Finding
 from conservative.benchmarks.suite.points import Point
 from conservative.errors import BadInput
 from conservative.methods.reduced import Reduced
@@ -24,7 +27,7 @@ from ..terminal.atomic_files import text_file
 from .plan import Plan
 from .provenance import Provenance
 
-FORMAT = 1
+FORMAT = 2
 _SOURCE = (".", "references", "benchmarks")
 """What decides about a measurement; the rest of `reports` only shows it."""
 _SHOWN = 3
@@ -42,10 +45,10 @@ class Process:
 
 @dataclass(frozen=True)
 class Piece:
-    """A finished piece: its rows, samples of its picture under `long_runs.COLUMNS` if it has one, and what measured it."""
+    """A finished piece: its rows, lines of its pictures, and what measured it."""
 
     rows: tuple[Measurement, ...]
-    samples: tuple[tuple[Any, ...], ...]
+    samples: tuple[Samples, ...]
     by: Process
 
 
@@ -59,9 +62,12 @@ class Partial:
     process: Process
     pieces: dict[str, Piece] = field(default_factory=dict)
 
-    def keep(self, name: str, rows: list[Measurement], samples: list[list[object]] | None = None) -> None:
+    def keep(self, name: str, findings: Iterable[Finding]) -> None:
         """Keep a finished piece, in the file as well; what an earlier report left there goes."""
-        self.pieces[name] = Piece(tuple(rows), tuple(map(tuple, samples or [])), self.process)
+        every = list(findings)
+        rows = tuple(found for found in every if isinstance(found, Measurement))
+        lines = tuple(found for found in every if isinstance(found, Samples))
+        self.pieces[name] = Piece(rows, lines, self.process)
         with text_file(self.path, "out") as stream:
             stream.write(_as_json(self))
 
@@ -180,7 +186,11 @@ def _source_hash() -> str:
 def _as_json(partial: Partial) -> str:
     """Return the file: floats come back as they are, nan as nan."""
     pieces = {
-        name: {"by": vars(piece.by), "rows": [astuple(row) for row in piece.rows], "samples": piece.samples}
+        name: {
+            "by": vars(piece.by),
+            "rows": list(map(measurement.flat, piece.rows)),
+            "samples": list(map(samples.flat, piece.samples)),
+        }
         for name, piece in partial.pieces.items()
     }
     content = {"format": FORMAT, "command": partial.process.command, "terms": partial.terms, "pieces": pieces}
@@ -201,7 +211,9 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Piece]]:
             raise ValueError(f"format {content['format']}")
         pieces = {
             name: Piece(
-                tuple(Measurement(*row) for row in piece["rows"]), tuple(map(tuple, piece["samples"])), Process(**piece["by"])
+                tuple(map(measurement.from_flat, piece["rows"])),
+                tuple(map(samples.from_flat, piece["samples"])),
+                Process(**piece["by"]),
             )
             for name, piece in content["pieces"].items()
         }

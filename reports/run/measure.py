@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.measures import measurement
-from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.studies import long_runs, studies
-from conservative.method import Role
+from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.studies import studies
 
 from ..terminal.progress import Step
 from .checkpoint import Partial
@@ -22,14 +20,14 @@ Report = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class Measured:
-    """What was measured: the tidy table, and drifts over time (see `long_runs.samples`)."""
+    """What was measured: the tidy table, and the table of the lines of pictures."""
 
     table: pd.DataFrame
-    drifts: pd.DataFrame
+    samples: pd.DataFrame
 
 
 def measure(made: Plan, step: Step, kept: Partial) -> Measured:
-    """Return all rows, in the order of the plan: the studies, then long runs for the drift over time.
+    """Return all rows, and samples, in the order of the plan.
 
     What `kept` has is not measured again; what is measured is kept there.
     """
@@ -38,13 +36,11 @@ def measure(made: Plan, step: Step, kept: Partial) -> Measured:
     by_name = {study.name: study for study in made.studies}
     for name in left:
         report = _within(step, name, spans[name])
-        if name in by_name:
-            kept.keep(name, list(studies.rows(by_name[name], report)))
-        else:
-            kept.keep(name, *_long_runs(made, report))
-    rows = [row for name in made.pieces for row in kept.pieces[name].rows]
+        kept.keep(name, studies.findings(by_name[name], report))
+    pieces = [kept.pieces[name] for name in made.pieces]
     return Measured(
-        measurement.frame(rows), pd.DataFrame(kept.pieces[long_runs.STUDY].samples, columns=list(long_runs.COLUMNS))
+        measurement.frame(row for piece in pieces for row in piece.rows),
+        samples.frame(line for piece in pieces for line in piece.samples),
     )
 
 
@@ -52,15 +48,3 @@ def _within(step: Step, name: str, span: tuple[float, float]) -> Report:
     """Return a piece's progress as a share of the whole."""
     start, end = span
     return lambda done, total, what: step(start + (end - start) * done / total, f"{name.replace('_', ' ')}: {what}")
-
-
-def _long_runs(made: Plan, report: Report) -> tuple[list[Measurement], list[list[object]]]:
-    """Return the rows of the long runs, and the samples of their picture under `long_runs.COLUMNS`."""
-    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.role != Role.TRUTH]
-    rows, samples = [], []
-    for k, (scene, method) in enumerate(pairs):
-        report(k, len(pairs), f"{scene.name}: {method.name}")
-        found, picture = long_runs.measured(long_runs.case_for(scene, method), made.skip_missing)
-        rows += found
-        samples += picture.to_numpy(dtype=object).tolist()
-    return rows, samples

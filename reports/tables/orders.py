@@ -18,7 +18,7 @@ RATES = "rate error max"
 
 def errors(table: pd.DataFrame, measure: str = ERROR) -> pd.DataFrame:
     """Return columns scene, series, dt (s), error of the convergence study, coarse to fine; runs that failed are not in it."""
-    rows = table[(table["study"] == "convergence") & (table["measure"] == measure) & (table["status"] == "ok")]
+    rows = table[(table["study"] == "convergence") & (table["measure"] == measure) & (table["outcome"] == "ok")]
     names = [shown(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
     return (
         rows.rename(columns={"value": "error"}).assign(series=names)[["scene", "series", "dt", "error"]].reset_index(drop=True)

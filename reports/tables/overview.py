@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
-from conservative.benchmarks.studies import long_runs
-from conservative.benchmarks.studies.case import MISSING, NO_ORDER, OK, SKIPPED, UNSUPPORTED
-from conservative.benchmarks.studies.import_time import ImportCost
-from conservative.benchmarks.studies.stability import LARGEST
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import OutcomeKind
 
 from ..labels import shown
 from . import work_precision
-from .tables import Table, number
+from .tables import Table, endings, keyed, number
 
 ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad, that the verdict is given for."""
@@ -73,10 +71,11 @@ def _cost(cost: work_precision.Cost | None) -> str:
 
 def _drifts(table: pd.DataFrame) -> pd.DataFrame:
     """Return the largest drift of each quantity over the long runs: columns scene, method, label, quantity, value, status."""
-    rows = table[table["study"] == long_runs.STUDY]
+    rows = table[table["study"] == "long_runs"]
+    rows = keyed(rows).assign(status=endings(rows))
     rows = rows[rows["measure"].str.endswith(" max")]
     quantity = rows["measure"].str.replace(r"( drift)? max$", "", regex=True)
-    return rows.assign(quantity=quantity)[["scene", "method", "label", "quantity", "value", "status"]]
+    return rows.assign(quantity=quantity)[["scene", "method", "label", "quantity", "value", "status", "outcome"]]
 
 
 def _conserved(drift: pd.DataFrame, scene: str, methods: set[str]) -> str:
@@ -98,24 +97,28 @@ def graded(value: float) -> Cell:
 
 
 def _troubles(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs that failed, and the scenes that a method has no run of: columns scene, method, status."""
-    rows = table[~table["status"].isin([NO_ORDER, SKIPPED, MISSING]) & (table["study"] != STABILITY)]
-    can = set(rows[rows["status"] == OK][["scene", "method"]].itertuples(index=False, name=None))
-    pairs = zip(rows["scene"], rows["method"], rows["status"], strict=True)
+    """Return the runs that failed, and the scenes that a method has no run of: columns scene, method, outcome."""
+    passed_over = [OutcomeKind.NO_ORDER, OutcomeKind.SKIPPED, OutcomeKind.MISSING]
+    rows = table[~table["outcome"].isin(passed_over) & (table["study"] != STABILITY)]
+    can = set(rows[rows["outcome"] == OutcomeKind.OK][["scene", "method"]].itertuples(index=False, name=None))
+    pairs = zip(rows["scene"], rows["method"], rows["outcome"], strict=True)
     real = pd.Series(
-        [status != OK and (status != UNSUPPORTED or (scene, method) not in can) for scene, method, status in pairs],
+        [
+            status != OutcomeKind.OK and (status != OutcomeKind.UNSUPPORTED or (scene, method) not in can)
+            for scene, method, status in pairs
+        ],
         index=rows.index,
         dtype=bool,
     )
-    return rows.loc[real, ["scene", "method", "status"]].drop_duplicates()
+    return rows.loc[real, ["scene", "method", "outcome"]].drop_duplicates()
 
 
 def _where(trouble: pd.DataFrame, methods: set[str]) -> str:
     """Return the scenes of each kind of failure; the hard cases have them all, so that here a few names stand for many."""
     rows = trouble[trouble["method"].isin(methods)]
     scenes: dict[str, dict[str, None]] = {}
-    for scene, status in zip(rows["scene"], rows["status"], strict=True):
-        scenes.setdefault(_kind(status), {})[scene] = None
+    for scene, outcome in zip(rows["scene"], rows["outcome"], strict=True):
+        scenes.setdefault(outcome, {})[scene] = None
     return "; ".join(f"{kind}: {_few(list(names))}" for kind, names in scenes.items()) or "nowhere here"
 
 
@@ -123,11 +126,6 @@ def _few(names: list[str]) -> str:
     if len(names) <= FEW:
         return ", ".join(names)
     return f"{', '.join(names[: FEW - 1])} and {len(names) - FEW + 1} more scenes"
-
-
-def _kind(status: str) -> str:
-    """Return what kind of failure a status tells of, without its time: `diverged after t = ...` is `diverged`."""
-    return status if status == UNSUPPORTED else " ".join(status.split()[:2]).removesuffix(" after").removesuffix(" in")
 
 
 def conservation(table: pd.DataFrame, scene: str) -> Cells:
@@ -145,15 +143,17 @@ def _conservation_row(members: pd.DataFrame, quantities: list[str]) -> list[str 
     return [
         shown(first["method"], first["label"]),
         *(graded(float(values.get(q, math.nan))) for q in quantities),
-        ended(first["status"]),
+        ended(first["outcome"], first["status"]),
     ]
 
 
-def ended(status: str) -> Cell:
+def ended(outcome: str, text: str = "") -> Cell:
     """Return how a run ended, with a symbol."""
-    if status == OK:
+    if outcome == OutcomeKind.OK:
         return Cell("✓ done", "good")
-    return Cell(f"{DASH} {status}", "none") if status in (UNSUPPORTED, MISSING, SKIPPED) else Cell(f"✗ {status}", "bad")
+    text = text or outcome
+    none = outcome in (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
+    return Cell(f"{DASH} {outcome}", "none") if none else Cell(f"✗ {text}", "bad")
 
 
 def hard_cases(table: pd.DataFrame) -> Cells | None:
@@ -180,8 +180,8 @@ def _matrix(rows: pd.DataFrame, cell: Callable[[pd.DataFrame], Cell]) -> Cells |
 
 def _longest(rows: pd.DataFrame) -> Cell:
     """Return the longest step that works, rad, and how the next one fails."""
-    works = rows[rows["measure"] == LARGEST]
-    ends = [status for status in rows["status"] if status != OK]
+    works = rows[rows["measure"] == Measure.LONGEST_STEP.text]
+    ends = [outcome for outcome in rows["outcome"] if outcome != OutcomeKind.OK]
     if works.empty or works["value"].isna().all():
         return ended(ends[0]) if ends else Cell(f"{DASH} not run", "none")
     text = f"{number(float(works['value'].max()))} rad"
@@ -192,9 +192,10 @@ def _case(rows: pd.DataFrame) -> Cell:
     """Return how a method did on a case: its worst status, else its graded drift of energy and its attitude error."""
     if rows.empty:
         return Cell(f"{DASH} not run", "none")
-    bad = [status for status in rows["status"].unique() if status != OK]
-    if bad:
-        return ended(bad[0])
+    bad = rows[rows["outcome"] != OutcomeKind.OK]
+    if len(bad):
+        return ended(bad["outcome"].iloc[0], endings(bad[:1])[0])
+    rows = keyed(rows)
     energy = rows[rows["measure"] == "energy drift max"]["value"]
     if not len(energy):
         return Cell(f"✓ {_first(rows)}", "good")
@@ -210,7 +211,7 @@ def _first(rows: pd.DataFrame) -> str:
 
 def costs_paid_once(table: pd.DataFrame) -> Iterator[tuple[str, Table]]:
     """Yield for each scene what a method costs before its first step: conversion, compilation, the first call."""
-    rows = table[(table["study"] == "speed") & (table["status"] == OK)]
+    rows = table[(table["study"] == "speed") & (table["outcome"] == OutcomeKind.OK)]
     for scene, members in rows.groupby("scene", sort=False):
         named = members.assign(name=[shown(m, label) for m, label in zip(members["method"], members["label"], strict=True)])
         wide = named.pivot_table(index="name", columns="measure", values="value", sort=False)
@@ -223,6 +224,8 @@ def _once(row: pd.Series[float]) -> list[str]:
     return [number(float(row.get(measure, math.nan)) * scale, 3) for measure, scale in scales]
 
 
-def imports(costs: Sequence[ImportCost]) -> Table:
+def imports(table: pd.DataFrame) -> Table:
     """Return what importing each library costs."""
-    return ["library", "role", "import, ms"], [[c.module, c.role, number(c.seconds * 1e3, 3)] for c in costs]
+    rows = table[table["measure"] == Measure.IMPORT.text]
+    found = zip(rows["method"], rows["role"], rows["value"], strict=True)
+    return ["library", "role", "import, ms"], [[name, role, number(seconds * 1e3, 3)] for name, role, seconds in found]

@@ -8,8 +8,10 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
-from conservative.benchmarks.studies.case import MISSING, NO_ORDER, OK, UNSUPPORTED
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import outcome_of
 from conservative.benchmarks.studies.studies import HARD
+from conservative.outcome import OutcomeKind
 
 from ..labels import shown
 from . import orders, work_precision
@@ -29,6 +31,22 @@ def number(value: float, digits: int = 2) -> str:
     return f"{value:.{digits}g}" if plain else f"{value:.{digits - 1}e}"
 
 
+def keyed(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with the quantity in front of the measure: `energy drift max`."""
+    return table.assign(measure=(table["quantity"] + " " + table["measure"]).str.lstrip())
+
+
+def endings(table: pd.DataFrame) -> list[str]:
+    """Return in words how the run of each row ended."""
+    return [str(outcome_of(record)) for _, record in table.iterrows()]
+
+
+def drift_samples(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the lines of the long runs: columns scene, series, t, invariant, drift."""
+    rows = _named(samples[samples["study"] == "long_runs"])
+    return rows.rename(columns={"name": "series", "quantity": "invariant", "value": "drift"})
+
+
 def _named(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(name=[shown(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)])
 
@@ -37,7 +55,7 @@ def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
     """Return the values of a study at the scene's step, a row a method and a column a measure; ours first, as in the table."""
     rows = table[(table["study"] == study) & (table["scene"] == scene) & (table["method"] != "truth")]
     rows = _named(rows[rows["dt"] == rows.groupby("method")["dt"].transform("max")])
-    return rows.pivot_table(index="name", columns="measure", values="value", sort=False)
+    return keyed(rows).pivot_table(index="name", columns="measure", values="value", sort=False)
 
 
 def drift(table: pd.DataFrame, scene: str) -> Table:
@@ -134,16 +152,20 @@ def _cost(cost: work_precision.Cost | None) -> tuple[str, str]:
     return (cost.series, number(cost.time * 1e6, 3)) if cost else ("none gets there", "–")
 
 
-def positions(errors: pd.DataFrame) -> Table:
-    """Return errors of the top's centre of mass after one period (`paper.position_errors`): of x1, and the distance."""
+def positions(table: pd.DataFrame) -> Table:
+    """Return errors of the top's centre of mass after one period: of x1, and the distance."""
     header = ["dt, s", "t, s", "error of x1, m", "distance, m"]
-    return header, [[f"{e.dt:g}", f"{e.t:g}", f"{e.x1:.4f}", f"{e.distance:.4f}"] for e in errors.itertuples()]
+    wanted = [measure.text for measure in (Measure.PERIOD, Measure.PERIOD_X1, Measure.PERIOD_DISTANCE)]
+    rows = table[table["study"] == "paper_figures"].pivot_table(index="dt", columns="measure", values="value", sort=False)
+    return header, [[f"{dt:g}", f"{t:g}", f"{x1:.4f}", f"{gap:.4f}"] for dt, (t, x1, gap) in rows[wanted].iterrows()]
 
 
 def failures(table: pd.DataFrame) -> Table:
     """Return the runs that did not reach their end or that the study did not wait for."""
     elsewhere = table["study"].isin(HARD)  # with a matrix of their own
-    rows = _named(table[~table["status"].isin([OK, UNSUPPORTED, MISSING, NO_ORDER]) & ~elsewhere])
+    fine = [OutcomeKind.OK, OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.NO_ORDER]
+    rows = _named(table[~table["outcome"].isin(fine) & ~elsewhere])
+    rows = rows.assign(status=endings(rows))
     body = [
         [*map(str, key), ", ".join(members["study"].unique()), _steps(members)]
         for key, members in rows.groupby(["scene", "name", "status"], sort=False)
@@ -158,22 +180,17 @@ def _steps(members: pd.DataFrame) -> str:
 
 def unsupported(table: pd.DataFrame) -> Table:
     """Return what cannot be done, or is not installed, and why: a row a reason, with all methods that have it."""
-    rows = _named(table[table["status"].isin([UNSUPPORTED, MISSING]) & ~table["study"].isin(HARD)])
-    reasons = [_reason(study, detail) for study, detail in zip(rows["study"], rows["detail"], strict=True)]
-    rows = rows.assign(reason=reasons, kind=[_DIGITS.sub("…", reason) for reason in reasons])
+    here = table["outcome"].isin([OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING]) & ~table["study"].isin([*HARD, "import_time"])
+    rows = _named(table[here])
+    rows = rows.assign(kind=[_DIGITS.sub("…", reason) for reason in rows["reason"]])
     body = [
         [*map(str, key[:2]), str(members["reason"].iloc[0]), ", ".join(members["name"].unique())]
-        for key, members in rows.groupby(["scene", "status", "kind"], sort=False)
+        for key, members in rows.groupby(["scene", "outcome", "kind"], sort=False)
     ]
     return ["scene", "status", "why (numbers: of the first)", "methods"], body
 
 
 _DIGITS = re.compile(r"\d[\d.e+-]*")
-
-
-def _reason(study: str, detail: str) -> str:
-    """Return the reason out of a detail, which in the study of error against time begins with the name of the line."""
-    return detail.partition("; ")[2] or detail if study == "work_precision" else detail
 
 
 def truths(table: pd.DataFrame) -> Table:

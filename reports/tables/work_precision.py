@@ -53,13 +53,13 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     Columns scene, series, method, label, role, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
     error below what the truth is known to is raised to that.
     """
-    rows = table[(table["study"] == "work_precision") & (table["status"] == "ok") & table["measure"].isin([ERROR, TIME])]
-    keys = ["scene", "detail", "method", "label", "role", "dt"]
+    rows = table[(table["study"] == "work_precision") & (table["outcome"] == "ok") & table["measure"].isin([ERROR, TIME])]
+    keys = ["scene", "series", "method", "label", "role", "dt"]
     wide = rows.pivot_table(index=keys, columns="measure", values="value").reset_index()
     wide = rows[keys].drop_duplicates().merge(wide, how="left", on=keys)  # pivot_table orders rows by the values of the keys
     wide = wide.reindex(columns=[*keys, ERROR, TIME]).rename(columns={ERROR: "error", TIME: "time"})
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(confirmed(table)).fillna(0.0))
-    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).drop(columns="detail").reset_index(drop=True)
+    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).reset_index(drop=True)
 
 
 def confirmed(table: pd.DataFrame) -> dict[str, float]:
@@ -69,8 +69,8 @@ def confirmed(table: pd.DataFrame) -> dict[str, float]:
 
 
 def _line_names(found: pd.DataFrame) -> list[str]:
-    """Return the name of each point's line; points with one `detail` are one line."""
-    settings = found.groupby("detail")["method"].transform("nunique")
+    """Return the name of each point's line; points with one series are one line."""
+    settings = found.groupby("series")["method"].transform("nunique")
     names = [shown(method, label) for method, label in zip(found["method"], found["label"], strict=True)]
     return [without_tolerance(name) if count > 1 else name for name, count in zip(names, settings, strict=True)]
 
