@@ -129,7 +129,7 @@ class Scene(_Fields):
         """Return `function(self, *settings)`, kept as long as the scene is: a scene never changes. Settings are hashable."""
         known, key = self._derivations, (function, settings)
         try:
-            found: T = known[key]
+            return known[key]
         except KeyError:
             found = function(self, *settings)
             if len(known) >= MOST_DERIVATIONS:

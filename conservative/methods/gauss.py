@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, from_quaternion, triple
+from ..attitude import Array, axes_about, from_quaternion, triple
 from ..check import choice, positive_integer
 from ..declarations import README, Candidacy, Claims, Cost
 from ..errors import BadInput
@@ -18,8 +18,8 @@ from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
-from .non_spinning import FRAMES, Frame, choose_frame, frame_unsupported
-from .principal_axes import PrincipalStart, axes_about, principal_start, quadruple
+from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
+from .principal_axes import PrincipalStart, principal_start, quadruple
 from .run_kernel import prepare_run
 
 
@@ -101,9 +101,9 @@ class Gauss(Method):
 
 def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
-    frame, label = choose_frame(method, scene)
+    frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
-    return label, start, closed_system(start)
+    return replace(method, frame=frame).label, start, closed_system(start)
 
 
 @lru_cache(maxsize=MOST_STAGES)

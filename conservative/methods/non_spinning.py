@@ -11,16 +11,11 @@ Klein and Sommerfeld, Theorie des Kreisels, call it the spherical top.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from ..scene import Scene
-
-if TYPE_CHECKING:
-    from .gauss import Gauss
-    from .reduced import Reduced
 
 Frame = Literal["auto", "body", "non_spinning"]
 Resolved = Literal["body", "non_spinning"]
@@ -34,12 +29,6 @@ def resolve_frame(frame: Frame, scene: Scene) -> Resolved:
     moments = scene.body.moments
     spherical = np.ptp(moments) <= 1e-14 * moments.max()
     return "body" if spherical or scene.symmetry_axis_B is None else "non_spinning"
-
-
-def choose_frame(method: Reduced | Gauss, scene: Scene) -> tuple[Resolved, str]:
-    """Return the frame that a method takes a scene in, and the label of the run, in which the choice is seen."""
-    frame = resolve_frame(method.frame, scene)
-    return frame, replace(method, frame=frame).label
 
 
 def frame_unsupported(frame: Frame, scene: Scene) -> str | None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..attitude import Array, to_quaternion, triple
+from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
 from ..errors import BadInput
 from ..scene import Scene
@@ -75,14 +75,6 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
     return PrincipalStart(triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
-
-
-def axes_about(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,); of e_z no rotation at all."""
-    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3]
-    first = np.cross(other, axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis], axis=1)
 
 
 def quadruple(R: Array) -> Quadruple:

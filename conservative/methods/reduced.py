@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -14,7 +14,7 @@ from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from .coefficients.compositions import BEST, composition_of
-from .non_spinning import FRAMES, Frame, choose_frame, frame_unsupported
+from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
 
@@ -111,9 +111,10 @@ class Reduced(Method):
 
 def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
-    frame, label = choose_frame(method, scene)
+    frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
-    return label, start, kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L)
+    model = kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L)
+    return replace(method, frame=frame).label, start, model
 
 
 @lru_cache(maxsize=256)

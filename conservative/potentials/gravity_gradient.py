@@ -13,7 +13,6 @@ from ..body import RigidBody
 from ..check import finite_array, positive_number, read_only
 from ..errors import BadInput
 
-
 _UNIT = 4 * np.finfo(float).eps
 """A direction whose length is 1 to this stays as it is, so that dividing by the length once more changes nothing."""
 

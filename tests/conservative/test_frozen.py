@@ -1,4 +1,4 @@
-"""Values that others hand out: `dataclasses.replace` works on each, nothing is assigned to one, arrays in them are read-only."""
+"""Values that others hand out: `dataclasses.replace` works on each, nothing is assigned to one, its arrays are read-only."""
 
 from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
