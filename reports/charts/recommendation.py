@@ -12,7 +12,7 @@ import vl_convert
 from conservative.benchmarks.recommendation.recommend import Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..cli.recommend import called, setting
+from ..tables.recommendation import method_text, setting_text
 from .figures import log_channel
 from .style import BLACK, HEIGHT, WIDTH, colour_scale, series_order, shape_scale, styled
 
@@ -23,7 +23,7 @@ def points(found: Recommendation) -> pd.DataFrame:
     """Return a row for each probe: method, kind and value of the setting, error to expect, rad, number."""
     rows = [
         {
-            "method": called(advice),
+            "method": method_text(advice),
             "kind": STEP if tolerance_setting(probe.method) is None else TOLERANCE,
             "setting": probe.setting,
             "expected": min(probe.expected, math.pi),
@@ -39,7 +39,7 @@ def points(found: Recommendation) -> pd.DataFrame:
 def costs(found: Recommendation) -> pd.DataFrame:
     """Return a row for each method that reaches the error: method, setting, cost in µs per simulated second."""
     reaching = [advice for advice in found.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
-    rows = [{"method": called(a), "setting": setting(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
+    rows = [{"method": method_text(a), "setting": setting_text(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
     return pd.DataFrame(rows, columns=["method", "setting", "cost"])
 
 
