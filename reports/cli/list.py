@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from conservative.extras import require_extra
+
 from .options import epilog
 
 
@@ -18,6 +20,7 @@ from .options import epilog
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def list_all(as_json: bool) -> None:
     """Show the scenes, grouped, and the methods, with what they conserve and whether their engine is installed."""
+    require_extra("conservative list", "report", "rich")
     from ..tables.catalogue import json_text, tables
     from ..terminal.tables import print_tables
 

@@ -54,10 +54,10 @@ class Commands(click.Group):
 
 def _as_click(error: Exception) -> Exception:
     """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
-    from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+    from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra
 
     text = "; ".join([str(error), *notes(error)])
-    if isinstance(error, BadInput | MissingEngine):
+    if isinstance(error, BadInput | MissingEngine | MissingExtra):
         return _UserError(text)
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 

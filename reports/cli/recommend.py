@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from conservative.extras import require_extra
+
 from ..terminal.interrupts import interruptible
 from . import completion
 from .options import epilog, split_names
@@ -50,6 +52,7 @@ def recommend(
 
     What a probe cannot cover of the duration is extrapolated by a law that is told with it.
     """
+    require_extra("conservative recommend", "report")
     from ..tables.recommendation import json_text
     from ..terminal.progress import progress
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from conservative.extras import require_extra
+
 from ..terminal.interrupts import interruptible
 from . import completion
 from .options import epilog, split_names
@@ -38,6 +40,7 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     The folder is there whole or not at all; until then, what is finished is in a file beside it, OUT.partial.json.
     A family's bare name, such as mujoco, stands for all its variants.
     """
+    require_extra("conservative report", "report")
     from .. import document
     from ..run.plan import plan_report
     from ..terminal.atomic_files import MANIFEST

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from conservative.extras import require_extra
+
 from . import completion
 from .options import epilog
 
@@ -32,6 +34,7 @@ def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json:
     Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
     A run that fails leaves what it reached in the file, and exits with 1.
     """
+    require_extra("conservative run", "report", "rich")
     from ..run.single_run import json_text, run_once, summary_text
     from ..terminal.progress import waiting
 
