@@ -15,6 +15,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.method import Grid, Method
+from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..studies.case import Case, Done, attempt
@@ -55,8 +56,8 @@ class Probe:
         Of the invariants.
     cost
         Wall time per simulated second of this one run, s/s, to plan with; nan where it failed. Not interleaved.
-    status
-        "ok", or what failed.
+    outcome
+        How it ended.
     """
 
     method: Method
@@ -69,7 +70,7 @@ class Probe:
     growth: Growth | None
     drifts: tuple[Drift, ...]
     cost: float
-    status: str
+    outcome: Outcome
 
     @property
     def setting(self) -> float:
@@ -166,8 +167,8 @@ class Bench:
         outcome = attempt(Case("recommendation", self.scene, method, grid))
         length = samples.dt * samples.n_steps
         if not isinstance(outcome, Done):
-            reason = f"{outcome.status}: {outcome.detail}" if outcome.detail else outcome.status
-            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, reason)
+            why = outcome.outcome
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, why)
         return self._measured(method, grid, samples, outcome, before)
 
     def _measured(self, method: Method, grid: Grid, samples: Grid, outcome: Done, before: Sequence[Probe]) -> Probe:
@@ -183,7 +184,7 @@ class Bench:
         holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.holds(self.error))
         expected, cost = law.at(self.duration), outcome.cost.first_call / length
         return Probe(
-            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, str(trajectory.outcome)
+            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, trajectory.outcome
         )
 
     def _carried(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> Growth | None:

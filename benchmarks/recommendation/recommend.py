@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from conservative.benchmarks.studies.case import OK
 from conservative.check import positive_number
 from conservative.errors import BadInput, nearest
 from conservative.method import Grid, Method, Role
@@ -221,7 +220,7 @@ def timed(bench: Bench, climbs: dict[str, Climb | str]) -> dict[str, float]:
     runs, lengths = {}, {}
     for line, climb in climbs.items():
         probe = None if isinstance(climb, str) else climb.best(bench.target)
-        if probe is None or probe.status != OK:
+        if probe is None or not probe.outcome.ok:
             continue
         length = TIMED / probe.cost
         n = max(1, round(length / probe.dt))
@@ -248,8 +247,8 @@ def advice(bench: Bench, line: str, role: str, climb: Climb | str, cost: float |
 def shortfall(bench: Bench, climb: Climb, probe: Probe) -> str:
     """Return why nothing finer was found."""
     last = climb.last
-    if probe.status != OK:
-        return probe.status
+    if not probe.outcome.ok:
+        return str(probe.outcome)
     if math.isinf(bench.amplification.excess(probe.length, bench.duration)):
         return "the motion amplifies errors without bound"
     if hopeless(last):

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.benchmarks.studies.case import OK
 from conservative.errors import BadInput
 from conservative.method import Method
 
@@ -116,7 +115,7 @@ def hopeless(probes: Sequence[Probe]) -> bool:
 def _shorter(bench: Bench, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
     """Return method, next step and its cost; None where the cost allows none."""
     last = probes[-1]
-    per_step = min((probe.cost * probe.dt for probe in probes if probe.status == OK), default=math.nan)
+    per_step = min((probe.cost * probe.dt for probe in probes if probe.outcome.ok), default=math.nan)
     factor = BLINDLY
     if expected < math.inf and last.method.order is not None:
         factor = min(0.8, max(BOLDEST, (bench.target / expected) ** (1 / last.method.order)))

@@ -10,7 +10,7 @@ from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
 from conservative.benchmarks.measures.timing import interleaved, prepared
 from conservative.benchmarks.studies.case import Case, Done, attempt
-from conservative.benchmarks.studies.speed import end_only, stretched
+from conservative.benchmarks.studies.speed import end_only, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.lazy_kernels import kernels
@@ -36,8 +36,8 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     benchmark.group = scene.name
     run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
-        pytest.xfail(f"{method.label}: {last.status}")  # a finding, which the studies report, and no time to compare
-    assert last.status == "ok"
+        pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
+    assert last.ok, last.outcome
     gated = points.gated(point)
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
     benchmark.extra_info.update({name: found.value for name, found in gated.items()})
@@ -103,4 +103,4 @@ def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
     case = Case("ratios", scene, method, end_only(grid_for(scene, scene.dt)))
     done = attempt(case)
     assert isinstance(done, Done), done
-    return stretched(case, done)
+    return lengthen(case, done)

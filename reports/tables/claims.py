@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import paper_figures
-from conservative.benchmarks.studies.case import UNSUPPORTED
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from . import orders
-from .overview import Cell, Cells
-from .tables import number
+from .cells import Cell, Grade, Table, number
+from .rows import keyed
 
-HOLDS, FAILS, OPEN = Cell("✓ holds", "good"), Cell("✗ does not hold", "bad"), Cell("– not measured here", "none")
+HOLDS, FAILS, OPEN = (
+    Cell("✓ holds", Grade.GOOD),
+    Cell("✗ does not hold", Grade.BAD),
+    Cell("– not measured here", Grade.NONE),
+)
 ENERGY = "energy drift max"
 ROUND_OFF = 1e-12
 """Relative drift up to which a quantity is taken to be kept to round-off over the paper's runs."""
@@ -64,10 +68,10 @@ def findings(table: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
     """Return every claim that the report can say something about."""
     by_name = {scene.name: scene for scene in scenes}
     of_tables = [*_orders(table), *_exact(table), *_same_map(table)]
-    return [*_kept(table, by_name), *of_tables, *_mujoco(table, by_name), *_factor_four(by_name)]
+    return [*_kept(table, by_name), *of_tables, *_mujoco(table, by_name), *_factor_four(table)]
 
 
-def as_cells(found: list[Finding]) -> Cells:
+def as_cells(found: list[Finding]) -> Table:
     """Return the findings as a table."""
     return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in found]
 
@@ -77,8 +81,8 @@ def _judged(holds: bool) -> Cell:
 
 
 def _paper_rows(table: pd.DataFrame, method: str, measure: str) -> pd.DataFrame:
-    rows = table[(table["study"] == "paper") & (table["method"] == method) & (table["measure"] == measure)]
-    return rows[rows["status"] != UNSUPPORTED]
+    rows = keyed(table[(table["study"] == "paper") & (table["method"] == method)])
+    return rows[(rows["measure"] == measure) & (rows["outcome"] != OutcomeKind.UNSUPPORTED)]
 
 
 def _kept(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
@@ -107,7 +111,7 @@ def _orders(table: pd.DataFrame) -> Iterator[Finding]:
     rows = table[(table["study"] == "convergence") & table["method"].isin(list(DECLARED))]
     names = rows.drop_duplicates(["method", "scene"])
     for method, scene in zip(names["method"], names["scene"], strict=True):
-        fits = orders.fits(orders.errors(rows[(rows["method"] == method) & (rows["scene"] == scene)]))
+        fits = orders.fits(orders.errors(rows[(rows["method"] == method) & (rows["scene"] == scene)], Measure.ATTITUDE_MAX))
         order, where = DECLARED[method]
         if len(fits):
             yield _order(f"{method} is of order {order} ({scene})", where, order, fits.iloc[0])
@@ -124,7 +128,7 @@ def _order(claim: str, where: str, order: int, fit: pd.Series[Any]) -> Finding:
 
 def _exact(table: pd.DataFrame) -> Iterator[Finding]:
     for method in ("moser_veselov", "lame"):
-        rows = _paper_rows(table, method, orders.ERROR)
+        rows = _paper_rows(table, method, Measure.ATTITUDE_MAX.text)
         for scene, members in rows.groupby("scene", sort=False):
             worst = _worst(members)
             measured = f"largest attitude error {number(worst)} rad, bound 1e-11"
@@ -133,7 +137,7 @@ def _exact(table: pd.DataFrame) -> Iterator[Finding]:
 
 def _same_map(table: pd.DataFrame) -> Iterator[Finding]:
     """Compare the errors of the paper's map and of ours, which is said to be the same."""
-    ours, theirs = (_paper_rows(table, method, orders.ERROR) for method in ("reduced", "convected"))
+    ours, theirs = (_paper_rows(table, method, Measure.ATTITUDE_MAX.text) for method in ("reduced", "convected"))
     both = ours.merge(theirs, on=["scene", "dt"], suffixes=("", "_paper")).dropna(subset=["value", "value_paper"])
     for scene, rows in both.groupby("scene", sort=False):
         gap = float((rows["value"] / rows["value_paper"] - 1).abs().max())
@@ -142,15 +146,15 @@ def _same_map(table: pd.DataFrame) -> Iterator[Finding]:
 
 
 def _mujoco(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
-    rows = table[(table["study"] == "paper") & table["method"].str.startswith("mujoco")]
+    rows = keyed(table[(table["study"] == "paper") & table["method"].str.startswith("mujoco")])
     for scene, members in rows.groupby("scene", sort=False):
         rk4, single, implicit, fast = (
             _by_step(members, f"mujoco{setting}", measure)
             for setting, measure in (
                 ("", ENERGY),
                 (":integrator=Euler", ENERGY),
-                (":integrator=implicit", orders.ERROR),
-                (":integrator=implicitfast", orders.ERROR),
+                (":integrator=implicit", Measure.ATTITUDE_MAX.text),
+                (":integrator=implicitfast", Measure.ATTITUDE_MAX.text),
             )
         )
         if rk4 and single:
@@ -180,10 +184,10 @@ def _coincide(scene: str, implicit: Mapping[float, float], fast: Mapping[float, 
     return Finding(claim, MUJOCO, f"attitude errors differ by {number(max(gaps))} of themselves", _judged(max(gaps) <= 1e-6))
 
 
-def _factor_four(scenes: Collection[str]) -> Iterator[Finding]:
-    if "lagrange_top" not in scenes:
+def _factor_four(table: pd.DataFrame) -> Iterator[Finding]:
+    distances = table[table["measure"] == Measure.PERIOD_DISTANCE.text]["value"].to_list()
+    if not distances:
         return
-    distances = paper_figures.position_errors()["distance"].to_list()
     ratios = [before / after for before, after in pairwise(distances)]
     measured = "ratios " + ", ".join(number(ratio, 3) for ratio in ratios)
     holds = all(abs(ratio - 4) <= 0.4 for ratio in ratios)

@@ -10,7 +10,6 @@ from typing import Any
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
-from conservative.benchmarks.studies.case import OK
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..labels import shown
@@ -112,7 +111,7 @@ def _probe(probe: Probe) -> dict[str, Any]:
         "law": probe.law,
         "holds": finite_or_none(probe.holds),
         "drift": {d.name: {"measured": d.measured, "expected": d.expected, "secular": d.secular} for d in probe.drifts},
-        "status": probe.status,
+        "status": str(probe.outcome),
     }
 
 
@@ -183,7 +182,7 @@ def _failing(advice: Advice) -> tuple[str, ...]:
 def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:
     order = "" if advice.order is None else "no order seen" if advice.order.reason else f"order {advice.order.slope:.2f}"
     for i, probe in enumerate(advice.probes):
-        error = f"{probe.error:.2e}" if probe.status == OK else probe.status
+        error = f"{probe.error:.2e}" if probe.outcome.ok else str(probe.outcome)
         name = (method_text(advice), order)[i] if i < 2 else ""
         setting = setting_text(probe) + (" <-" if probe is advice.best else "")
         yield name, setting, f"{probe.length:.4g}", error, _expected(probe)

@@ -22,6 +22,11 @@ def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.D
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
 
 
+def keyed(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with the quantity in front of the measure: `energy drift max`."""
+    return rows.assign(measure=(rows["quantity"] + " " + rows["measure"]).str.lstrip())
+
+
 def with_names(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows with another column `name`: what to call the method."""
     names = [display_name(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]

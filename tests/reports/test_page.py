@@ -5,26 +5,32 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
-import pandas as pd
 import pytest
 import vl_convert
 
 from conservative import Reduced, RigidBody, Scene, registry, scenes
 from conservative.attitude import rotation_about
-from conservative.benchmarks.measures.measurement import Measurement, frame
-from conservative.benchmarks.studies import import_time
+from conservative.benchmarks.measures import samples
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import frame
+from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.studies import sphere_curves, studies
+from conservative.benchmarks.studies.study import Study
+from conservative.errors import Diverged
+from conservative.method import Role
 from conservative.reports import document
 from conservative.reports.charts import figures, spheres, vega_embed
 from conservative.reports.page import page
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables import claims, overview
+from conservative.reports.tables import claims, overview, tables
 from conservative.reports.tables.work_precision import points
 
+from . import rows
 from .rows import point
 
 
-def row(study, method, measure, value, dt=0.1, scene="brick_flip", status="ok", role="ours"):
-    return Measurement(study, scene, method, method, role, dt, measure, value, "1", status)
+def row(study, method, measure, value, dt=0.1, scene="brick_flip", **fields):
+    return rows.row(study, method, measure, value, dt, scene=scene, **fields)
 
 
 def ladder(method, order, scene="brick_flip"):
@@ -41,30 +47,26 @@ def made_up():
     ]
     lines += [*point("scipy:DOP853", "engine", 1e-3, 1e-4, scene="brick_flip")]
     drift = [
-        row("drift", "reduced", "energy drift max", 2e-15),
-        row("drift", "mujoco", "energy drift max", 3e-2, role="engine"),
+        row("long_runs", "reduced", "energy drift max", 2e-15),
+        row("long_runs", "mujoco", "energy drift max", 3e-2, role="engine"),
     ]
-    return frame([*lines, *drift, *ladder("reduced", 2), row("speed", "reduced", "first call time", 0.25)])
+    absent = row("import_time", "no_such_library", Measure.IMPORT, math.nan, scene="", role="engine", outcome="missing")
+    return frame([*lines, *drift, *ladder("reduced", 2), row("speed", "reduced", "first call time", 0.25), absent])
 
 
 def measured():
-    samples = pd.DataFrame(
-        [("brick_flip", name, t, "energy", 1e-15 * t) for name in ("reduced", "mujoco") for t in np.linspace(0.5, 60, 120)],
-        columns=["scene", "series", "t", "invariant", "drift"],
-    )
-    return document.Measured(made_up(), samples)
+    t = np.linspace(0.5, 60, 120)
+    common = {"study": "long_runs", "scene": "brick_flip", "role": Role.OURS, "dt": 0.1, "quantity": "energy"}
+    lines = [Samples(method=name, label=name, t=t, value=1e-15 * t, **common) for name in ("reduced", "mujoco")]
+    return document.Measured(made_up(), samples.frame([*lines, *curves(registry.scene("brick_flip"), Reduced())]))
 
 
-@pytest.fixture(scope="module", autouse=True)
-def libraries():
-    """Libraries that are imported in no time, one of which is not there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(import_time, "MODULES", {"json": "ours", "no_such_library": "engine"})
-        yield
+def curves(scene, *methods):
+    return list(studies.findings(Study("sphere_curves", (scene,), methods)))
 
 
 @pytest.fixture(scope="module")
-def text(libraries):
+def text():
     return page.render(document.plan(["brick_flip"], ["reduced"], quick=True), measured(), provenance(["report"]))
 
 
@@ -145,7 +147,7 @@ def test_chart_draws_its_lines_and_the_switch_takes_one_away():
 def test_legend_has_the_lines_of_the_charts():
     figure = page._work_precision(points(made_up()), "brick_flip")
     assert [entry.name for entry in figure.legend] == ["reduced", "scipy DOP853"]
-    panels = page._drift(measured().drifts, "brick_flip").charts
+    panels = page._drift(tables.drift_samples(measured().samples), "brick_flip").charts
     assert len(panels) == 1
     assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * page.DRIFT_SAMPLES + 1
 
@@ -158,7 +160,7 @@ def test_data_are_short_and_exact_to_their_digits():
 
 def test_verdict_names_the_cheapest_and_what_it_keeps():
     header, body = overview.verdict(made_up(), points(made_up()))
-    rows = [dict(zip(header, line, strict=True)) for line in body]
+    found_rows = [dict(zip(header, line, strict=True)) for line in body]
     assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
     assert rows[0]["cheapest"] == "reduced"
     assert "energy ✓" in rows[0]["conserves"]
@@ -166,16 +168,19 @@ def test_verdict_names_the_cheapest_and_what_it_keeps():
 
 
 def test_verdict_tells_where_the_cheapest_fails():
-    failed = row("drift", "reduced", "energy drift max", math.nan, scene="other", status="diverged after t = 0.36 s (why)")
-    cannot = [row("drift", "reduced", "energy drift max", math.nan, scene=f"s{k}", status="unsupported") for k in range(5)]
+    failed = row("long_runs", "reduced", "energy drift max", math.nan, scene="other", outcome=Diverged(0.36, "why").outcome)
+    cannot = [row("long_runs", "reduced", "energy drift max", math.nan, scene=f"s{k}", outcome="unsupported") for k in range(5)]
     found = overview.verdict(frame([failed, *cannot]), points(made_up()))
     assert found[1][0][-1] == "diverged: other; unsupported: s0, s1 and 3 more scenes"
 
 
 def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
-    rows = [row("convergence", "a", "x", math.nan, status="unsupported"), row("drift", "a", "energy drift max", 1e-15)]
-    assert overview._troubles(frame(rows)).empty
-    assert len(overview._troubles(frame(rows[:1]))) == 1
+    found_rows = [
+        row("convergence", "a", "attitude error max", math.nan, outcome="unsupported"),
+        row("long_runs", "a", "energy drift max", 1e-15),
+    ]
+    assert overview._troubles(frame(found_rows)).empty
+    assert len(overview._troubles(frame(found_rows[:1]))) == 1
 
 
 @pytest.mark.parametrize(
@@ -193,19 +198,19 @@ def test_drift_is_graded_by_symbol_and_colour(value, text, status):
 
 
 def test_hard_cases_are_a_matrix():
-    rows = [
+    found_rows = [
         row("hard_cases", "reduced", "energy drift max", 1e-15, scene="needle"),
-        row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", status="not converged in step 3"),
+        row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", outcome="not converged"),
         row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", role="engine"),
     ]
-    header, body = overview.hard_cases(frame(rows))
+    header, body = overview.hard_cases(frame(found_rows))
     assert header == ["method", "needle", "falling_top"]
     assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
     assert overview.hard_cases(made_up()) is None
 
 
-def verdicts(rows, scene="brick_flip"):
-    return {found.claim: found.verdict for found in claims.findings(frame(rows), [registry.scene(scene)])}
+def verdicts(found_rows, scene="brick_flip"):
+    return {found.claim: found.verdict for found in claims.findings(frame(found_rows), [registry.scene(scene)])}
 
 
 @pytest.mark.parametrize(("order", "verdict"), [(4, claims.HOLDS), (2, claims.FAILS)])
@@ -215,54 +220,56 @@ def test_audit_of_an_order(order, verdict):
 
 @pytest.mark.parametrize(("drift", "verdict"), [(4e-16, claims.HOLDS), (1e-9, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_a_conserved_quantity(drift, verdict):
-    rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
-    assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
+    found_rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
+    assert verdicts(found_rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
 
 
 @pytest.mark.parametrize(("error", "verdict"), [(0.1, claims.HOLDS), (0.2, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_one_map_in_two_programs(error, verdict):
-    rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
-    found = verdicts(rows)
+    found_rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
+    found = verdicts(found_rows)
     assert found.get("reduced is the paper's map (brick_flip)", claims.FAILS) == verdict
 
 
 @pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, claims.HOLDS), (0.5, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
-    rows = [
+    found_rows = [
         row("paper", "mujoco", "energy drift max", coarse, 0.01, role="engine"),
         row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, role="engine"),
         row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, role="engine"),
         row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, role="engine"),
     ]
-    found = verdicts(rows)
+    found = verdicts(found_rows)
     assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
     assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == claims.HOLDS
 
 
 @pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
 def test_curves_lie_on_the_unit_sphere(name):
-    found = spheres.curves([registry.scene(name)], [registry.method("reduced")])
+    found = spheres.curves(samples.frame(curves(registry.scene(name), registry.method("reduced"))))
     assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
-    assert 200 < len(found) <= spheres.KEPT
+    assert 200 < len(found) <= sphere_curves.SAMPLES
 
 
 def test_polhode_is_the_same_whatever_the_body_axes():
     base = scenes.brick_flip()
     S = rotation_about((1.0, 2.0, -0.5), 0.7)
     turned = Scene("turned", RigidBody(S.T @ base.body.inertia @ S), base.R_WB0 @ S, S.T @ base.w_WB_B0, base.t_end, dt=base.dt)
-    one, other = (np.abs(spheres.curves([scene], [Reduced()])[["x", "y", "z"]].to_numpy()) for scene in (base, turned))
+    one, other = (
+        np.abs(spheres.curves(samples.frame(curves(scene, Reduced())))[["x", "y", "z"]].to_numpy()) for scene in (base, turned)
+    )
     assert np.abs(one - other)[:50].max() < 1e-9  # measured 3e-13
 
 
 def test_methods_without_a_curve_are_named():
-    found = spheres.curves([scenes.brick_flip()], [Reduced()])
+    found = spheres.curves(samples.frame(curves(scenes.brick_flip(), Reduced())))
     assert spheres.absent(found, "brick_flip", [Reduced(), registry.method("lame")]) == ["lame"]
 
 
 def test_picks_one_method_of_each_family_that_has_no_preferred_one():
     names = [
         m.name
-        for m in spheres.chosen(
+        for m in sphere_curves.drawn(
             [registry.method(n) for n in ("gauss:stages=2", "gauss", "reduced:order=4", "reduced", "exact")]
         )
     ]
@@ -270,13 +277,13 @@ def test_picks_one_method_of_each_family_that_has_no_preferred_one():
 
 
 def test_longest_steps_are_a_matrix():
-    largest, first = overview.LARGEST, "first"
-    rows = [
+    largest, first = Measure.LONGEST_STEP, Measure.FAILING_STEP
+    found_rows = [
         row("stability", "a", largest, 1.0, scene="needle"),
-        row("stability", "a", first, 3.2, scene="needle", status="not converged"),
+        row("stability", "a", first, 3.2, scene="needle", outcome="not converged"),
         row("stability", "b", largest, 10.0, scene="needle"),
-        row("stability", "c", largest, math.nan, scene="needle", status="unsupported"),
+        row("stability", "c", largest, math.nan, scene="needle", outcome="unsupported"),
     ]
-    _, body = overview.stability(frame(rows))
+    _, body = overview.stability(frame(found_rows))
     assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
-    assert overview._troubles(frame(rows)).empty
+    assert overview._troubles(frame(found_rows)).empty

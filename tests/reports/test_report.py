@@ -8,11 +8,13 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
-from conservative.benchmarks.measures.measurement import COLUMNS
+from conservative.benchmarks.measures.measurement import COLUMNS, frame
 from conservative.reports import document
 from conservative.reports.charts import style
 from conservative.reports.cli.main import _listed, main
 from conservative.reports.run.provenance import provenance
+
+from .rows import row
 
 
 @pytest.fixture(scope="module")
@@ -52,13 +54,18 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     stored = json.loads((folder / "measurements.json").read_text())
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
-    assert {"paper", "convergence", "speed", "work_precision", "drift"} == set(table["study"])
+    assert {"paper", "convergence", "speed", "work_precision", "long_runs", "import_time"} == set(table["study"])
     assert stored["schema"] == document.SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]
     for key in ("command", "python", "commit", "date"):
         assert stored[key]
-    energy = table[(table["study"] == "paper") & (table["measure"] == "energy drift max") & (table["method"] == "reduced")]
+    energy = table[
+        (table["study"] == "paper")
+        & (table["measure"] == "drift max")
+        & (table["quantity"] == "energy")
+        & (table["method"] == "reduced")
+    ]
     assert energy["value"].max() < 1e-13  # measured 5e-16
 
 
@@ -149,22 +156,13 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
 
 
 def test_failure_of_ours_is_told(monkeypatch):
-    from conservative.benchmarks.measures.measurement import Measurement, frame
-
-    status = str(NotConverged(3, 0.02, 1.0).outcome)
-    common = (
-        "paper",
-        "brick_flip",
-        "reduced",
-        "conservative==0.1.0/reduced",
-        "ours",
-        0.01,
-        "energy drift max",
-        float("nan"),
-        "1",
-    )
-    measured = document.Measured(frame([Measurement(*common, status), Measurement(*common, "unsupported")]), pd.DataFrame())
-    assert document.failed(measured) == [f"reduced on brick_flip, dt = 0.01 s: {status}"]
+    outcome = NotConverged(3, 0.02, 1.0).outcome
+    found = [
+        row("paper", "reduced", "energy drift max", float("nan"), 0.01, scene="brick_flip", outcome=each)
+        for each in (outcome, "unsupported")
+    ]
+    measured = document.Measured(frame(found), pd.DataFrame())
+    assert document.failed(measured) == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
     monkeypatch.setattr(document, "write", lambda plan, out, step, resume: measured)
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1

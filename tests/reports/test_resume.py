@@ -8,18 +8,23 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from conservative import BadInput
-from conservative.benchmarks.measures.measurement import Measurement
+from conservative import BadInput, NotConverged
+from conservative.benchmarks.measures.samples import Samples
+from conservative.method import Role
 from conservative.reports import document
 from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
 from conservative.reports.run.provenance import provenance
 from conservative.reports.terminal.interrupts import Terminated, interruptible, unstoppable
 
+from .rows import row
+
+OUTCOME = NotConverged(3, 0.02, 0.5, "why").outcome
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
 TIMES = ("s", "s/s")
 
@@ -73,7 +78,7 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     assert out == ""
     assert err.count("\n") == 1
     assert err.startswith("Interrupted; ")
-    assert f"{len(content['pieces'])} of 5 studies are finished (paper, convergence, speed" in err
+    assert f"{len(content['pieces'])} of 8 studies are finished (paper, convergence, speed" in err
     assert again == ["conservative", *SMALL, "--resume"]
     assert left == {"report", "report.partial.json"}
     assert earlier["report.md"] == "earlier"
@@ -98,17 +103,17 @@ def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(r
     timed = found["unit"].isin(TIMES)
     assert timed.any()
     pd.testing.assert_frame_equal(found[~timed], whole[~timed], check_exact=True)
-    same = ["study", "scene", "method", "label", "role", "dt", "measure", "unit", "status"]
+    same = ["study", "scene", "method", "label", "role", "dt", "quantity", "measure", "unit", "outcome"]
     pd.testing.assert_frame_equal(found.loc[timed, same], whole.loc[timed, same], check_exact=True)
 
 
 def test_what_was_finished_is_not_measured_again(resumed):
     folder, content = resumed[0], resumed[4]
     rows = json.loads((folder / "report" / "measurements.json").read_text())["rows"]
-    kept = [tuple(row) for row in content["pieces"]["speed"]["rows"]]
-    assert [tuple(row.values())[:7] for row in rows if row["study"] == "speed"] == [row[:7] for row in kept]
+    kept = content["pieces"]["speed"]["rows"]
+    assert [list(row.values())[:9] for row in rows if row["study"] == "speed"] == [list(row.values())[:9] for row in kept]
     times = [row["value"] for row in rows if row["study"] == "speed"]
-    assert times == pytest.approx([row[7] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
+    assert times == pytest.approx([row["value"] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
 
 
 def test_a_resumed_report_says_so(resumed):
@@ -141,8 +146,9 @@ def unfinished(tmp_path, monkeypatch):
     made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     source = provenance(SMALL)
     kept = checkpoint.begun(made, Path("report"), source, resume=False)
-    row = ("paper", "brick_flip", "reduced", "reduced", "ours", 0.1, "energy drift max", float("nan"), "1", "ok")
-    kept.keep("paper", [Measurement(*row)], [["brick_flip", 0.1 + 0.2]])
+    line = {"study": "paper", "scene": "brick_flip", "method": "reduced", "label": "reduced", "role": Role.OURS, "dt": 0.1}
+    lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
+    kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
     return tmp_path
 
 
@@ -150,7 +156,9 @@ def test_floats_come_back_as_they_are(unfinished):
     _, found = checkpoint.read(unfinished / "report.partial.json")
     assert found["paper"].rows[0].dt == 0.1
     assert found["paper"].rows[0].value != found["paper"].rows[0].value
-    assert found["paper"].samples == (("brick_flip", 0.1 + 0.2),)
+    assert found["paper"].rows[0].outcome == OUTCOME
+    assert found["paper"].samples[0].t[0] == 0.1 + 0.2
+    assert np.isnan(found["paper"].samples[0].value[0])
 
 
 @pytest.mark.parametrize(
@@ -191,7 +199,7 @@ def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 1, "pieces": {"paper": {}}}'])
+@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}'])
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
 def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -222,7 +230,7 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
     made = document.plan(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         document.write(made, tmp_path / "report", fail)
-    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
+    assert "1 of 8 studies are finished (paper)" in caught.value.__notes__[0]
     assert pieces(tmp_path / "report.partial.json") == ["paper"]
 
 
