@@ -86,16 +86,15 @@ def polhodes(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the page's spheres side by side, each under the name of its method."""
     curves = lines.curves(_samples("sphere_curves", scene, methods))
     names = list(dict.fromkeys(curves["series"]))
-    panels = [spheres.chart(curves, scene.name, name) for name in names]
-    shared = panels[0]["params"]
-    panels = [{key: panel[key] for key in ("width", "height", "layer")} for panel in panels]
-    panels = [panel | {"title": name} for panel, name in zip(panels, names, strict=True)]
+    charts = [spheres.chart(curves, scene.name, name) for name in names]
+    panels = [{key: chart[key] for key in ("width", "height", "layer")} for chart in charts]
+    titles = [panel | {"title": name} for panel, name in zip(panels, names, strict=True)]
     end = scene.t_end * long_runs.DURATIONS
     title = {
         "text": f"{scene.name}: angular momentum in body axes, on its sphere",
         "subtitle": f"over {end:g} s in steps of {scene.dt:g} s; what loses momentum leaves the curve",
     }
-    return styled(alt.HConcatChart.from_dict({"title": title, "params": shared, "hconcat": panels}))
+    return styled(alt.HConcatChart.from_dict({"title": title, "params": charts[0]["params"], "hconcat": titles}))
 
 
 def write(folder: Path, quick: bool, step: Step) -> list[Path]:

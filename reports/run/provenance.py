@@ -37,6 +37,12 @@ class Provenance:
         return {name: self.packages.get(name, "not installed") for name in COMPARED}
 
 
+    @property
+    def others(self) -> list[str]:
+        """Name and version of every other package."""
+        return [f"{name} {version}" for name, version in self.packages.items() if name not in COMPARED]
+
+
 def provenance(arguments: list[str] | None = None) -> Provenance:
     """Return the provenance of this process; `arguments` are those of the command, default this process's."""
     words = sys.argv[1:] if arguments is None else arguments
