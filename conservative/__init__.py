@@ -21,8 +21,9 @@ from .errors import (
     Unsupported,
     WrongBranch,
 )
+from .integration import integrate
 from .invariants import Invariant
-from .method import Grid, Method, Role, integrate
+from .method import Grid, Method, Role
 from .methods.convected import Convected
 from .methods.gauss import Gauss
 from .methods.lame import Lame
@@ -33,8 +34,9 @@ from .methods.substepped import Substepped
 from .outcome import Outcome, OutcomeKind
 from .potentials.gravity_gradient import GravityGradient
 from .potentials.point_to_point import LinearSpring, PointAttraction
-from .potentials.potential import Potential, UniformGravity
+from .potentials.potential import Potential
 from .potentials.python_function import FunctionPotential
+from .potentials.uniform_gravity import UniformGravity
 from .scene import Scene
 from .trajectory import Counters, Trajectory
 from .version import VERSION

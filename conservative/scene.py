@@ -122,7 +122,7 @@ class Scene:
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
         """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
-        return (*invariants_of(self), *self.extra_invariants)
+        return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
 
     def renamed(self, name: str, **changes: Any) -> Scene:
         """Return the scene under another name and with other fields where `changes` says so."""

@@ -21,7 +21,7 @@ from .attitude import Array
 from .body import RigidBody
 from .check import finite_array, finite_number, positive_number, rotation
 from .errors import BadInput
-from .potentials.potential import UniformGravity
+from .potentials.uniform_gravity import UniformGravity
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

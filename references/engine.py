@@ -22,7 +22,7 @@ from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.invariants import axial_direction
 from conservative.method import Grid
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix
 

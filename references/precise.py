@@ -19,7 +19,7 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -55,6 +55,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "grey"
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)

@@ -9,7 +9,7 @@ import numpy as np
 from conservative.attitude import Array, angle_between, orthonormality
 from conservative.errors import BadInput
 from conservative.invariants import sizes
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
-from conservative.method import Grid, Method, integrate
+from conservative.integration import integrate
+from conservative.method import Grid, Method
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene

@@ -28,7 +28,7 @@ LIMIT = 20.0
 
 def scenes() -> tuple[Scene, ...]:
     """Return every registered scene with its default parameters, by group."""
-    return tuple(sorted(map(registry.scene, registry.registered(registry.SCENES)), key=lambda scene: scene.group))
+    return tuple(sorted(map(registry.scene, registry.list_scenes()), key=lambda scene: scene.group))
 
 
 def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:

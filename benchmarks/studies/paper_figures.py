@@ -14,7 +14,7 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import Array
 from conservative.method import Method, grid_for
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

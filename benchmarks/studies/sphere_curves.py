@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.method import Method, Role
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
@@ -28,16 +27,6 @@ SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymm
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
 PAPER = SCENES[:2]
 """Where orders are fitted and our kernels are timed against the yardstick."""
-SHORT = {
-    "gauss": ("gauss:stages=2", "gauss:stages=6"),
-    "moser_veselov": ("moser_veselov:order=2", "moser_veselov:order=exact"),
-    "reduced": ("reduced:order=2", "reduced:order=4", "reduced:order=6"),
-    "heyoka": ("heyoka:tol=1e-9", "heyoka:tol=1e-16"),
-    "mujoco": ("mujoco:Euler", "mujoco:RK4"),
-    "pinocchio": ("pinocchio:RK4",),
-    "scipy": ("scipy:rtol=1e-9",),
-}
-"""Settings that stand for families with many; every other registered family has its variants in the suite."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
@@ -104,9 +93,9 @@ class Point:
 
 
 def points() -> Iterator[Point]:
-    """Yield the points: every registered method, those of other packages as well, on every scene of the suite."""
-    names = [name for family in registry.registered(registry.METHODS) for name in SHORT.get(family, (family,))]
-    methods = [method for method in selection.methods(names, skip_missing=True) if method.role != Role.TRUTH]
+    """Yield the points: `suite_settings` of every registered method, of other packages as well, on every scene of the suite."""
+    found = selection.methods(skip_missing=True, settings=lambda method: method.suite_settings())
+    methods = [method for method in found if method.role != Role.TRUTH]
     truths = Truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between, from_quaternion, to_quaternion
 from conservative.body import RigidBody
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references import precise
 from conservative.references.exact import method
 from conservative.references.exact.lagrange_top import top, top_motion

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import positive_number
+from ..declarations import Claims
 from ..errors import NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
@@ -39,6 +40,8 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
+    claims: ClassVar[Claims] = Claims("paper", drift_per_step=1e-8)
+    colour: ClassVar[str] = "sky"
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)
@@ -50,6 +53,10 @@ class Convected(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Convected, ...]:
+        return (cls(),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from ..kernels.convected import G, conjugate_momentum

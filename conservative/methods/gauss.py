@@ -11,10 +11,11 @@ import numpy as np
 
 from ..attitude import Array, from_quaternion, triple
 from ..check import choice, positive_integer
+from ..declarations import README, Candidacy, Claims, Cost
 from ..errors import BadInput, branch_ended
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
@@ -52,6 +53,10 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit")
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "indigo"
+    kernel: ClassVar[str] = "gauss"
 
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"
@@ -67,6 +72,10 @@ class Gauss(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=50.0, correction=12.0 * self.stages)
+
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
             return "collocation keeps quadratic invariants, so a free body or uniform gravity"
@@ -75,6 +84,14 @@ class Gauss(Method):
     @classmethod
     def variants(cls) -> tuple[Gauss, ...]:
         return tuple(cls(stages) for stages in (2, 4, 6, 8))
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Gauss, ...]:
+        return cls(2), cls(6)
+
+    @classmethod
+    def audit_settings(cls) -> tuple[Gauss, ...]:
+        return (cls(2),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         frame, label = in_frame(self, scene)

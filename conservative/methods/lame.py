@@ -36,9 +36,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..declarations import README, Candidacy, Claims
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .non_spinning import frame_unsupported
@@ -59,6 +60,10 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(1, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "olive"
+    kernel: ClassVar[str] = "lame"
 
     @property
     def order(self) -> None:

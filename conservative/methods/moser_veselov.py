@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
+from ..declarations import README, Candidacy, Claims
 from ..errors import BadInput
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
@@ -58,6 +59,10 @@ class MoserVeselov(Method):
 
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "wine"
+    kernel: ClassVar[str] = "moser_veselov"
 
     def __init__(self, order: int | Literal["exact"] = "exact") -> None:
         if isinstance(order, bool) or order not in ORDERS:
@@ -77,6 +82,18 @@ class MoserVeselov(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in ORDERS)
+
+    @classmethod
+    def candidate_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls("exact"),)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[MoserVeselov, ...]:
+        return cls(2), cls("exact")
+
+    @classmethod
+    def audit_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls(4),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         march, (start, p, step) = kernels("moser_veselov").march, calibrated(self, scene, grid.dt)

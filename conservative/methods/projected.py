@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import triple
+from ..declarations import Candidacy, Cost
 from ..errors import NotConverged
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
@@ -37,6 +38,9 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(2)
+    colour: ClassVar[str] = "teal"
+    kernel: ClassVar[str] = "projected"
 
     @property
     def order(self) -> int:
@@ -45,6 +49,10 @@ class Projected(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
+
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=340.0, correction=80.0)
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import choice, positive_number
+from ..declarations import README, Candidacy, Claims, Cost, SameErrors
 from ..errors import branch_ended
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
@@ -62,6 +63,13 @@ class Reduced(Method):
 
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(4, "implicit")
+    claims: ClassVar[Claims] = Claims(
+        README, comparisons=(SameErrors("reduced is the paper's map", ("reduced", "convected"), tolerance=1e-3),)
+    )
+    colour: ClassVar[str] = "blue"
+    kernel: ClassVar[str] = "reduced"
+    step_goals: ClassVar[tuple[tuple[str, float], ...]] = (("mujoco:Euler", 25), ("mujoco:RK4", 100), ("convected", 100))
 
     def __post_init__(self) -> None:
         composition_of(self.order, self.composition)
@@ -73,12 +81,28 @@ class Reduced(Method):
         kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
         return kept | {"energy"} if self.frame == "body" else kept
 
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=10.0, correction=50.0)
+
     def unsupported(self, scene: Scene) -> str | None:
         return frame_unsupported(self.frame, scene)
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in BEST)
+
+    @classmethod
+    def candidate_settings(cls) -> tuple[Reduced, ...]:
+        return cls(2), cls(4), cls(6), cls(8)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Reduced, ...]:
+        return cls(2), cls(4), cls(6)
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Reduced, ...]:
+        return (cls(),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         frame, label = in_frame(self, scene)

@@ -13,14 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import registry
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
 from ..check import finite_array, finite_number, rotation
+from ..entry_points import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction
-from ..potentials.potential import Potential, UniformGravity
+from ..potentials.potential import Potential
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
 from .toml_reader import Table, keys_of, read
@@ -82,7 +83,7 @@ def load(path: str | Path) -> Scene:
 
 def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
     """Return the body and, where the file says so much, its mass and centre of mass."""
-    sources = ("inertia", "shape", *registry.registered(registry.BODY_FILES))
+    sources = ("inertia", "shape", *list_entries(BODY_FILES))
     given = [key for key in table.values if key in sources]
     if not given:
         table.only({*sources, "name", *_PLACED, *(key for shape in SHAPES.values() for key in keys_of(shape))})
@@ -110,8 +111,7 @@ def _from_file(table: Table, kind: str) -> MassDistribution:
     path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
     name = table.text("name", f"the name of the body in {path}")
     with table.blamed(path=kind):
-        found: MassDistribution = registry.body_file(kind)(path, name)
-    return found
+        return load_body_reader(kind)(path, name)
 
 
 def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:

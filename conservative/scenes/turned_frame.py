@@ -13,7 +13,7 @@ from ..attitude import Array, rotation_about
 from ..body import RigidBody
 from ..check import finite_number, rotation
 from ..errors import BadInput
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .asymmetric_top import asymmetric_top
 from .brick_flip import brick_flip

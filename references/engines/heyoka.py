@@ -54,6 +54,7 @@ class Heyoka(Method):
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "green"
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
@@ -96,6 +97,10 @@ class Heyoka(Method):
     def variants(cls) -> tuple[Method, ...]:
         tols = (1e-6, 1e-9, 1e-12, 1e-16)
         return (*(cls(tol) for tol in tols), *(cls(tol, "non_spinning") for tol in tols), *(cls(tol, "lean") for tol in tols))
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls(1e-9), cls(1e-16)
 
 
 def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, Any]:

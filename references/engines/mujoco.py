@@ -11,6 +11,7 @@ import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice
+from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -65,6 +66,19 @@ class MuJoCo(Method):
 
     family: ClassVar[str] = "mujoco"
     role: ClassVar[Role] = Role.ENGINE
+    claims: ClassVar[Claims] = Claims(
+        "MuJoCo documentation, Computation, Numerical integration",
+        comparisons=(
+            BetterEnergy("RK4 is better than Euler on energy-conserving systems", "mujoco", "mujoco:integrator=Euler"),
+            SameErrors(
+                "implicit and implicitfast coincide for a free body",
+                ("mujoco:integrator=implicit", "mujoco:integrator=implicitfast"),
+                tolerance=1e-6,
+                free=True,
+            ),
+        ),
+    )
+    colour: ClassVar[str] = "vermilion"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -102,6 +116,14 @@ class MuJoCo(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(integrator) for integrator in INTEGRATORS)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("RK4")
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("RK4"), cls("implicit")
 
 
 def _model(mj: Any, axes: Axes, dt: float, integrator: str, free_joint: bool) -> Any:

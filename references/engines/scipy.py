@@ -12,7 +12,8 @@ from conservative.attitude import Array, from_quaternion
 from conservative.check import choice, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import UniformGravity, torque_W
+from conservative.potentials.potential import torque_W
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -50,6 +51,7 @@ class SciPy(Method):
 
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "orange"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -90,6 +92,10 @@ class SciPy(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return (cls(rtol=1e-9), cls(rtol=1e-12))
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return (cls(rtol=1e-9),)
 
 
 def _counting(solver: Any) -> Any:

@@ -20,7 +20,8 @@ from conservative.check import finite_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import Potential, UniformGravity
+from conservative.potentials.potential import Potential
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 from conservative.version import VERSION
@@ -122,6 +123,7 @@ class Exact(Method):
 
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "black"
 
     @property
     def label(self) -> str:

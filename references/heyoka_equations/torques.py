@@ -8,7 +8,8 @@ from typing import Any
 
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
-from conservative.potentials.potential import Potential, UniformGravity
+from conservative.potentials.potential import Potential
+from conservative.potentials.uniform_gravity import UniformGravity
 
 from .forms import Expression, cross, heyoka, product, to_body
 

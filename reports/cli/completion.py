@@ -32,9 +32,9 @@ def _last(incomplete: str) -> tuple[str, str]:
 
 
 def _registered(group: str, start: str) -> list[str]:
-    from conservative.registry import registered
+    from conservative.entry_points import list_entries
 
-    return [name for name in registered(f"conservative.{group}") if name.startswith(start)]
+    return [name for name in list_entries(f"conservative.{group}") if name.startswith(start)]
 
 
 def _files(start: str) -> list[str]:

@@ -16,8 +16,9 @@ from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.benchmarks.measures.timing import elapsed
 from conservative.errors import BadInput
+from conservative.integration import integrate, require_support
 from conservative.invariants import Invariant, sizes
-from conservative.method import Grid, Method, grid_for, integrate, require_support
+from conservative.method import Grid, Method, grid_for
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
 from conservative.scene import Scene

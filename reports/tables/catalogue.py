@@ -44,7 +44,7 @@ class MethodEntry:
 
 def scenes() -> list[SceneEntry]:
     """Return every registered scene, sorted by group and name."""
-    return sorted((_scene(name) for name in registry.registered(registry.SCENES)), key=lambda entry: (entry.group, entry.name))
+    return sorted((_scene(name) for name in registry.list_scenes()), key=lambda entry: (entry.group, entry.name))
 
 
 def _scene(name: str) -> SceneEntry:
@@ -56,7 +56,7 @@ def _scene(name: str) -> SceneEntry:
 
 def methods() -> list[MethodEntry]:
     """Return every variant of every registered method, ours first, then engines, then truths."""
-    entries = [entry for name in registry.registered(registry.METHODS) for entry in _variants(name)]
+    entries = [entry for name in registry.list_methods() for entry in _variants(name)]
     return sorted(entries, key=lambda entry: (*Role, None).index(entry.role))
 
 
