@@ -71,9 +71,7 @@ def convergence(scene: SceneView) -> Figure:
     """Return error against step, with the fitted orders."""
     charts = vega_embed.embed(figures.convergence(scene.errors, scene.fits, scene.name), hover("dt", "error"), 520)
     summary = "In brackets the fitted slope with its standard error; the bold stretch is what it is fitted to."
-    return _figure(
-        f"convergence_{scene.name}", f"{scene.name}: attitude error against step", summary, charts, marks=True
-    )
+    return _figure(f"convergence_{scene.name}", f"{scene.name}: attitude error against step", summary, charts, marks=True)
 
 
 def _figure(name: str, title: str, summary: str, charts: list[Spec], marks: bool) -> Figure:

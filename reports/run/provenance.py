@@ -36,7 +36,6 @@ class Provenance:
         """Versions of what can change a number, by package."""
         return {name: self.packages.get(name, "not installed") for name in COMPARED}
 
-
     @property
     def others(self) -> list[str]:
         """Name and version of every other package."""

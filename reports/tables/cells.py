@@ -54,9 +54,7 @@ def grade_drift(value: float) -> Cell:
     """Return a drift with a symbol that is not its colour alone."""
     if math.isnan(value):
         return Cell(DASH, Grade.NONE)
-    symbol, grade = (
-        ("✓", Grade.GOOD) if value <= CONSERVED else ("≈", Grade.FAIR) if value <= SMALL else ("✗", Grade.BAD)
-    )
+    symbol, grade = ("✓", Grade.GOOD) if value <= CONSERVED else ("≈", Grade.FAIR) if value <= SMALL else ("✗", Grade.BAD)
     return Cell(f"{symbol} {number(value)}", grade)
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
 from .work_precision import Contest
 
 
-def lines(found: list[Contest]) -> list[str]:
+def lines(contests: Sequence[Contest]) -> list[str]:
     """Return, for each scene, where an engine is faster than anything of ours, or alone, and where ours is."""
-    out = [line for scene, contests in groupby(found, key=lambda c: c.scene) for line in _scene(scene, list(contests))]
+    out = [line for scene, members in groupby(contests, key=lambda c: c.scene) for line in _scene(scene, list(members))]
     return out or ["No engine and no method of ours was measured on error against time."]
 
 

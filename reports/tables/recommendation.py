@@ -12,7 +12,7 @@ from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..labels import shown
+from ..labels import display_name
 from ..terminal.tables import TerminalTable
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
@@ -31,9 +31,9 @@ def setting_text(probe: Probe) -> str:
 def method_text(advice: Advice) -> str:
     """Return what to call the method of an advice, with its engine's version, without the setting looked for."""
     if advice.best is None:
-        return shown(advice.line, "")
+        return display_name(advice.line, "")
     method = advice.best.method
-    name = shown(method.name, method.label)
+    name = display_name(method.name, method.label)
     tolerance = tolerance_setting(method)
     return (
         name if tolerance is None else name.replace(f"{tolerance}={advice.best.setting:g}", "").replace(" ,", " ").strip(" ,")

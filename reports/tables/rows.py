@@ -35,7 +35,7 @@ def with_names(rows: pd.DataFrame) -> pd.DataFrame:
 
 def outcomes(rows: pd.DataFrame) -> list[Outcome]:
     """Return the outcome of each row."""
-    return [outcome_of(record) for record in rows.to_dict("records")]
+    return [outcome_of(row) for _, row in rows.iterrows()]
 
 
 def with_outcome(rows: pd.DataFrame, *kinds: OutcomeKind) -> pd.DataFrame:

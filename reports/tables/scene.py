@@ -35,7 +35,7 @@ def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float
 def drift(table: pd.DataFrame, scene: str) -> Table:
     """Return the drift of every invariant, its slope over time where there is one, and orthonormality, at the scene's step."""
     values = _wide(table, "paper", scene)
-    invariants = [str(quantity) for measure, quantity in values.columns if measure == Measure.DRIFT_MAX.text]
+    invariants = [column[1] for column in values.columns if column[0] == Measure.DRIFT_MAX.text]
     header = ["method", *(f"{name}{part}" for name in invariants for part in ("", ", 1/s")), "orthonormality"]
     return header, [
         [name, *_drift_cells(row, invariants), number(_value(row, Measure.ORTHONORMALITY))] for name, row in _lines(values)
@@ -95,8 +95,9 @@ def time(table: pd.DataFrame, scene: str) -> Table:
     rows = with_names(of_measure(of_study(table, "speed", scene), Measure.TIME))
     details = rows.set_index("name")["detail"]
     header = ["method", f"steps of {UNIT}", *(title for _, _, title in _TIMES), "timed"]
-    unit = _value(values.loc[UNIT], Measure.TIME_PER_STEP) if UNIT in values.index else math.nan
-    return header, [[name, *_times(row, unit), str(details[name])] for name, row in _lines(values)]
+    lines = _lines(values)
+    unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == UNIT), math.nan)
+    return header, [[name, *_times(row, unit), str(details[name])] for name, row in lines]
 
 
 def _times(row: pd.Series[float], unit: float) -> Row:
