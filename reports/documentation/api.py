@@ -9,6 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
+import conservative
 from conservative.errors import MissingEngine
 from conservative.version import VERSION
 
@@ -44,6 +45,7 @@ def write(folder: Path) -> Path:
     except ImportError as error:
         raise MissingEngine("pdoc", "pdoc") from error
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
+    tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows what is imported, and these come on demand
     _name_aliases()
     pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")
     pdoc.pdoc(*MODULES, output_directory=folder)
