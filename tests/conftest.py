@@ -1,5 +1,7 @@
 """Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip."""
 
+import os
+
 import pytest
 
 
@@ -9,6 +11,8 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "browser: needs chromium; runs with --browser")
+    for name in [name for name in os.environ if name.startswith("PYTEST_XDIST")]:
+        del os.environ[name]  # a pytest that a test starts is no worker, and pytest-benchmark would take it for one
 
 
 def pytest_collection_modifyitems(config, items):
