@@ -80,7 +80,7 @@ def pytest_configure(config: pytest.Config) -> None:
         _gate(config)
 
 
-@pytest.hookimpl(optionalhook=True)
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     """Run benchmarks without workers, which disturb each other's times, unless the command line has a number of them."""
     return 0 if wanted(config) else None
