@@ -70,7 +70,7 @@ def pytest_configure(config: pytest.Config) -> None:
             raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
         return
     if not config.pluginmanager.hasplugin(TIMER):
-        allowed = "allowed after: pip install pytest-benchmark, and without -p no:benchmark"
+        allowed = "allowed after: pip install 'conservative-rotation[gate]', and without -p no:benchmark"
         raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(SUITE)]
@@ -78,6 +78,12 @@ def pytest_configure(config: pytest.Config) -> None:
             config.option.benchmark_max_time, config.option.benchmark_min_rounds = SHORT, FEW
     if config.getoption("conservative_gate"):
         _gate(config)
+
+
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """Run benchmarks without workers, which disturb each other's times, unless the command line has a number of them."""
+    return 0 if wanted(config) else None
 
 
 def _linked(text: str, folder: Path) -> str:
