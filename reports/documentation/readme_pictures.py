@@ -1,4 +1,6 @@
-"""The README's three pictures: `python -m conservative.reports.documentation.readme_pictures` measures and draws them anew, into reports/pictures/.
+"""The README's three pictures, drawn anew into reports/pictures/.
+
+    python -m conservative.reports.documentation.readme_pictures
 
 They are those of a report, of fewer methods: time against error, drift of the energy, and the polhode on the momentum sphere.
 Times mean something on a quiet machine only.

@@ -1,7 +1,7 @@
 """What is measured of a report that is not written yet: one file beside its folder, so that `--resume` can go on.
 
-The file is replaced as a whole after each study, and goes when the report is there. It says on which terms its measurements were
-taken: they are only ever put together with others of the same scenes, methods, versions, source and machine.
+The file is replaced as a whole after each study, and goes when the report is there. It says on which terms it was measured:
+measurements are only ever put together with others of the same scenes, methods, versions, source and machine.
 """
 
 from __future__ import annotations

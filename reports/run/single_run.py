@@ -81,7 +81,7 @@ def _integrate(scene: Scene, method: Method, grid: Grid, stream: IO[str] | None)
 
 
 def _announce_time(scene: Scene, method: Method, grid: Grid, writes: bool, expect: Expect) -> None:
-    """Do the first of `TRIAL` parts, and again now that it is compiled, and tell how long all take; of few steps say nothing."""
+    """Do the first of `TRIAL` parts, again now that it is compiled, and tell how long all take; of few steps say nothing."""
     if grid.n_steps >= TRIAL:
         part = replace(grid, n_steps=grid.n_steps // TRIAL)
         _integrate(scene, method, part, None)

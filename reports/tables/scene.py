@@ -97,7 +97,7 @@ def time(table: pd.DataFrame, scene: str) -> Table:
     header = ["method", f"steps of {UNIT}", *(title for _, _, title in _TIMES), "timed"]
     lines = _lines(values)
     unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == UNIT), math.nan)
-    return header, [[name, *_times(row, unit), str(details[name])] for name, row in lines]
+    return header, [[name, *_times(row, unit), str(details.get(name, ""))] for name, row in lines]
 
 
 def _times(row: pd.Series[float], unit: float) -> Row:
