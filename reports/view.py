@@ -117,7 +117,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         paper=_paper(table, samples),
         hard_cases=hard_cases.hard_cases(table),
         stability=hard_cases.stability(table),
-        claims=claims.as_cells(claims.findings(table, plan.scenes)),
+        claims=claims.as_cells(claims.findings(table, builder.fits, plan.scenes)),
         imports=runs.imports(table),
         truths=runs.truths(table),
         failures=runs.failures(table),
@@ -161,7 +161,7 @@ class _Builder:
             orders.fits(errors),
             orders.fits(orders.errors(table, Measure.RATES_MAX)),
             lines.curves(samples),
-            tuple(sphere_curves.drawn(methods)),
+            tuple(sphere_curves.pick(methods)),
         )
 
     def scene(self, value: Scene) -> SceneView:

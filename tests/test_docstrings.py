@@ -178,6 +178,7 @@ def test_everything_in_all_is_walked():
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
     "conservative.lazy_kernels": "imports",
+    "conservative.declarations": "values",
     "conservative.errors": "exceptions",
     "conservative.method": "the protocol",
     "conservative.presentation": "tables and cards",

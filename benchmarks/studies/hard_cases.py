@@ -17,6 +17,7 @@ from conservative.scene import Scene
 from ..measures.measurement import Measurement
 from .case import Case
 from .paper import accuracy
+from .selection import Missing
 from .study import Progress, Study
 from .time_limit import attempt_within
 
@@ -35,13 +36,14 @@ def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
     """Return one or two settings of each family: of ours the first and the last one listed, of an engine the first two."""
     families: dict[str, list[Method]] = {}
     for method in methods:
-        families.setdefault(method.name if method.family == "missing" else method.family, []).append(method)
-    found: list[Method] = []
-    for members in families.values():
-        if members[0].role != Role.TRUTH:
-            second = members[-1] if members[0].role == Role.OURS else members[min(1, len(members) - 1)]
-            found += dict.fromkeys((members[0], second))
-    return tuple(found)
+        if method.role != Role.TRUTH:
+            families.setdefault(method.name if isinstance(method, Missing) else method.family, []).append(method)
+    return tuple(method for members in families.values() for method in dict.fromkeys((members[0], _second(members))))
+
+
+def _second(members: list[Method]) -> Method:
+    """Return the other setting that stands for a family, which may be the first again."""
+    return members[-1] if members[0].role == Role.OURS else members[:2][-1]
 
 
 def grid(scene: Scene) -> Grid:

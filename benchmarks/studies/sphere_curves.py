@@ -1,7 +1,7 @@
 """The study of what a motion looks like: a curve on a sphere for each method that is drawn.
 
-The run is that of the drift over time. Of a free body the curve is its polhode: the angular momentum in principal axes, relative
-to its length at the start. Of a body in a field it is the trace of its axis, as a unit vector in world axes.
+The run is that of the drift over time. Of a free body the curve is its polhode: the angular momentum in principal axes,
+relative to its length at the start. Of a body in a field it is the trace of its axis, as a unit vector in world axes.
 """
 
 from __future__ import annotations
@@ -25,15 +25,6 @@ SAMPLES = 700
 """Samples of a curve at most."""
 AXES = ("x", "y", "z")
 """Quantities of a curve, in units of the sphere's radius."""
-PREFERRED = (
-    "convected",
-    "reduced",
-    "mujoco:integrator=Euler",
-    "mujoco",
-    "mujoco:integrator=implicit",
-    "pinocchio:scheme=Euler",
-)
-"""What is drawn where a study has it: a curve that stays, beside ones that may not."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Samples]:
@@ -41,7 +32,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 
     The first truth among the methods that can do the scene comes first.
     """
-    pairs = [(scene, method) for scene in study.scenes for method in (*truth(scene, study.methods), *drawn(study.methods))]
+    pairs = [(scene, method) for scene in study.scenes for method in [*truth(scene, study.methods), *pick(study.methods)]]
     for k, (scene, method) in enumerate(pairs):
         progress(k, len(pairs), f"{scene.name}: {method.name}")
         case = case_for(study.name, scene, method)
@@ -50,16 +41,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
             yield from curve(case, outcome.trajectory)
 
 
-def drawn(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods that are drawn: the preferred ones, and the first of every family that has none there; no truth."""
-    preferred = [method for method in methods if method.name in PREFERRED]
-    firsts = {method.family: method for method in reversed(methods) if method.role is not Role.TRUTH}
+def pick(methods: Sequence[Method]) -> list[Method]:
+    """Return the methods that are drawn: of each family its `picture_settings`, or the first where it has none of those."""
+    competitors = [method for method in methods if method.role != Role.TRUTH]
+    preferred = [method for method in competitors if method in method.picture_settings()]
+    firsts = {method.family: method for method in reversed(competitors)}
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 
 
 def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
     """Return the first truth that can do a scene, if there is one."""
-    return [method for method in methods if method.role is Role.TRUTH and method.unsupported(scene) is None][:1]
+    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
 
 
 def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:

@@ -85,7 +85,7 @@ class Study:
     @property
     def competitors(self) -> tuple[Method, ...]:
         """The methods without those that the others are measured against."""
-        return tuple(method for method in self.methods if method.role is not Role.TRUTH)
+        return tuple(method for method in self.methods if method.role != Role.TRUTH)
 
     def __post_init__(self) -> None:
         for argument in ("scenes", "methods"):

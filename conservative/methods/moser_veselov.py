@@ -28,7 +28,12 @@ LONGEST_SHIFT = 2 * math.acos(FARTHEST)
 
 
 @dataclass(frozen=True)
-class MoserVeselov(Method):
+class _Fields:
+    order: int | None = None
+
+
+@dataclass(frozen=True, init=False)
+class MoserVeselov(_Fields, Method):
     """The discrete Moser-Veselov (DMV) map with a calibrated inertia, for free bodies of any inertia.
 
     With the Cayley vector c of a step h and the inertia B, where 1/B_i = css/J_i + cdd in principal axes,
@@ -47,15 +52,13 @@ class MoserVeselov(Method):
     Parameters
     ----------
     order
-        2, 4, 6, 8, 10 or "exact", which the attribute `order` shows as None: accuracy does not depend on the step.
+        2, 4, 6, 8, 10 or "exact", which the attribute `order` has as None: accuracy does not depend on the step.
 
     Raises
     ------
     BadInput
         order is none of these; and on running: the step is too long, see `longest_step`.
     """
-
-    order: int | None = None
 
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
@@ -64,10 +67,10 @@ class MoserVeselov(Method):
     colour: ClassVar[str] = "wine"
     kernel: ClassVar[str] = "moser_veselov"
 
-    def __init__(self, order: int | Literal["exact"] = "exact") -> None:
-        if isinstance(order, bool) or order not in ORDERS:
+    def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
+        if order is not None and (isinstance(order, bool) or order not in ORDERS):
             raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
-        object.__setattr__(self, "order", None if order == "exact" else order)
+        super().__init__(None if order == "exact" else order)
 
     @property
     def conserves(self) -> frozenset[str]:

@@ -32,7 +32,7 @@ def chart(curves: pd.DataFrame, scene: str, series: str) -> Spec:
                 "data": as_csv(points, ("k", "x", "y", "z")),
                 "transform": [*_project(), *_sides()],
                 "mark": _line(colours([series])[series], 1.3, 1.0),
-                "encoding": _encoding("stretch") | {"opacity": _faint()},
+                "encoding": _encoding("stretch") | {"opacity": _fade()},
             },
         ],
         "config": {"view": {"stroke": None}},
@@ -82,5 +82,5 @@ def _encoding(detail: str) -> Spec:
     return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}, "order": order, "detail": {"field": detail}}
 
 
-def _faint() -> Spec:
+def _fade() -> Spec:
     return {"condition": {"test": "datum.near < 0", "value": 0.3}, "value": 1}

@@ -3,14 +3,17 @@ import math
 import pytest
 
 from conservative import registry
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
-from conservative.reports.tables import claims
+from conservative.reports.tables import claims, orders
 
 from .made_up import convergence, row
 
 
 def verdicts(rows, scene="brick_flip"):
-    return {found.claim: found.verdict for found in claims.findings(frame(rows), [registry.scene(scene)])}
+    table = frame(rows)
+    fits = orders.fits(orders.errors(table, Measure.ATTITUDE_MAX))
+    return {found.claim: found.verdict for found in claims.findings(table, fits, [registry.scene(scene)])}
 
 
 @pytest.mark.parametrize(("order", "verdict"), [(4, claims.HOLDS), (2, claims.FAILS)])
