@@ -181,10 +181,12 @@ NEEDY = SOURCE.replace(
 
 def test_a_method_without_what_it_needs_breaks_nothing(installed):
     top = cv.scenes.asymmetric_top()
-    before = automatic.candidates(top), claims.findings(frame([]), [])
+    nothing = frame([])
+    fits = orders.fits(orders.errors(nothing, Measure.ATTITUDE_MAX))
+    before = automatic.candidates(top), claims.findings(nothing, fits, [])
     installed(NEEDY)
     assert "borrowed" in registry.list_families()
-    assert (automatic.candidates(top), claims.findings(frame([]), [])) == before
+    assert (automatic.candidates(top), claims.findings(nothing, fits, [])) == before
     missing = [point.method for point in points.points() if point.method.name == "borrowed"]
     assert {type(method) for method in missing} == {selection.Missing}
 

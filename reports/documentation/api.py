@@ -1,4 +1,6 @@
-"""Pages for every public name, made from the docstrings by pdoc: `python -m conservative.reports.documentation.api` writes them into the folder api/.
+"""Pages for every public name, made from the docstrings by pdoc, into the folder api/.
+
+    python -m conservative.reports.documentation.api
 
 They open from disk without a network. What stands here is pdoc's settings: docstrings are NumPy's, and formulas are plain text.
 """

@@ -70,7 +70,7 @@ def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, not
     ids=["curves", "figures of the paper", "imports"],
 )
 def test_what_rendering_once_measured_would_be_noticed(measure, nothing_is_measured):
-    with pytest.raises(pytest.fail.Exception, match="runs on|a process starts"):
+    with pytest.raises(pytest.fail.Exception, match=r"runs on|a process starts"):
         measure()
 
 
