@@ -117,7 +117,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         paper=_paper(table, samples),
         hard_cases=hard_cases.hard_cases(table),
         stability=hard_cases.stability(table),
-        claims=claims.as_cells(claims.findings(table, builder.fits, plan.scenes)),
+        claims=claims.as_table(claims.findings(table, builder.fits, plan.scenes)),
         imports=runs.imports(table),
         truths=runs.truths(table),
         failures=runs.failures(table),
@@ -146,7 +146,7 @@ class _Builder:
     fits: pd.DataFrame
     rate_fits: pd.DataFrame
     curves: pd.DataFrame
-    drawn: tuple[Method, ...]
+    pictures: tuple[Method, ...]
 
     @classmethod
     def of(cls, table: pd.DataFrame, samples: pd.DataFrame, methods: Sequence[Method]) -> _Builder:
@@ -179,7 +179,7 @@ class _Builder:
             errors=_of(self.errors, name),
             fits=fits,
             curves=curves,
-            without_curve=tuple(method.name for method in self.drawn if method.name not in set(curves["method"])),
+            without_curve=tuple(method.name for method in self.pictures if method.name not in set(curves["method"])),
             contests=scene.contests(contest for contest in self.contests if contest.scene == name),
             drift=scene.drift(table, name),
             conservation=overview.conservation(table, name),

@@ -92,8 +92,8 @@ def sphere(scene: SceneView) -> Figure:
     """Return the curves of a scene, a sphere each, and the names of the methods that have none."""
     kind, words = _POLHODE if scene.free else _TRACE
     run = f"At the scene's own step, over {long_runs.DURATIONS:g} durations."
-    absent = ", ".join(scene.without_curve)
-    missing = f" Not drawn, as they fail or cannot do the scene: {absent}." if absent else ""
+    names = ", ".join(scene.without_curve)
+    absent = f" Not drawn, as they fail or cannot do the scene: {names}." if names else ""
     charts = tuple(spheres.chart(scene.curves, scene.name, str(name)) for name in scene.curves["series"].unique())
     title = f"{scene.name}: {kind}"
-    return replace(Figure(f"sphere_{scene.name}", title, f"{run} {words}{missing}", charts, ()), view="sphere")
+    return replace(Figure(f"sphere_{scene.name}", title, f"{run} {words}{absent}", charts, ()), view="sphere")

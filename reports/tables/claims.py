@@ -60,9 +60,9 @@ def findings(table: pd.DataFrame, fits: pd.DataFrame, scenes: Iterable[Scene]) -
     return [*of_methods, *_comparisons(table, by_name), *_factor_four(table)]
 
 
-def as_cells(found: list[Finding]) -> Table:
+def as_table(findings: list[Finding]) -> Table:
     """Return the findings as a table."""
-    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in found]
+    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in findings]
 
 
 def _judge(holds: bool) -> Cell:
@@ -78,10 +78,10 @@ def _claimed(settings: Settings) -> Iterator[tuple[Method, Claims]]:
     """Yield settings of each family; none of one whose engine is not installed."""
     for family, claims in _families():
         try:
-            found = tuple(settings(family))
+            methods = tuple(settings(family))
         except MissingEngine:
             continue
-        yield from ((method, claims) for method in found)
+        yield from ((method, claims) for method in methods)
 
 
 def _default(family: type[Method]) -> tuple[Method, ...]:

@@ -50,8 +50,8 @@ def _errors(contests: list[Contest]) -> str:
     """Return the errors, every decade in between left out where they are neighbours."""
     errors = [c.error for c in contests]
     neighbours = all(1 < a / b < 11 for a, b in pairwise(errors))
-    shown = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
-    return f"{shown} rad"
+    text = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
+    return f"{text} rad"
 
 
 def _range(factors: list[float]) -> str:
