@@ -47,11 +47,13 @@ def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
     data, prices = points(recommendation), costs(recommendation)
     names = series_order(data["method"])
-    panels = [_probes(part, str(kind), names, recommendation.bench.error) for kind, part in data.groupby("kind", sort=True)]
+    panels = [
+        _probes(part, str(kind), names, recommendation.conditions.error) for kind, part in data.groupby("kind", sort=True)
+    ]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, names))
-    title = f"{recommendation.bench.scene.name}: {recommendation.bench.error:g} rad over {recommendation.bench.duration:g} s"
+    title = f"{recommendation.conditions.scene.name}: {recommendation.conditions.error:g} rad over {recommendation.conditions.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 

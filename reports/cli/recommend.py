@@ -79,14 +79,15 @@ def _answer(
     from contextlib import ExitStack
 
     from conservative import registry
-    from conservative.benchmarks.recommendation.recommend import question, recommend
+    from conservative.benchmarks.recommendation.question import ask
+    from conservative.benchmarks.recommendation.recommend import recommend as answer
 
     from ..terminal.atomic_files import text_file
 
-    asked = question(registry.scene(scene), error, duration, engines or None, cost_limit)
+    question = ask(registry.scene(scene), error, duration, engines or None, cost_limit)
     with ExitStack() as files:
         streams = [files.enter_context(text_file(path, "out")) for path in _paths(out)]
-        recommendation = recommend(asked, step)
+        recommendation = answer(question, step)
         for stream, content in zip(streams, _contents(recommendation) if streams else (), strict=True):
             stream.write(content)
     return recommendation

@@ -60,7 +60,7 @@ def compare(paths: Sequence[Path], path: Path | None, times: str) -> Comparison:
         A file holds no results, or there is no baseline.
     """
     before = baseline.read(path or baseline.PATH)
-    return Comparison([comparison.judged(before, content, cast(comparison.Times, times)) for content in _read(paths)])
+    return Comparison([comparison.judge(before, content, cast(comparison.Times, times)) for content in _read(paths)])
 
 
 def accept(paths: Sequence[Path], path: Path | None, reason: str) -> Acceptance:
@@ -73,7 +73,7 @@ def accept(paths: Sequence[Path], path: Path | None, reason: str) -> Acceptance:
     """
     target = path or baseline.PATH
     before = baseline.read(target) if target.exists() else None
-    after = baseline.updated(before, _read(paths), reason)
+    after = baseline.update_baseline(before, _read(paths), reason)
     baseline.write(after, target)
     return Acceptance(target, len(after.rows), after.history[-1])
 

@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from conservative.benchmarks.recommendation.advice import Advice
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
-from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
+from conservative.benchmarks.recommendation.recommend import Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..labels import display_name
@@ -58,8 +59,13 @@ def json_text(recommendation: Recommendation) -> str:
 
 
 def _question(recommendation: Recommendation) -> dict[str, Any]:
-    bench = recommendation.bench
-    return {"scene": bench.scene.name, "error": bench.error, "duration": bench.duration, "cost_limit": bench.cost_limit}
+    conditions = recommendation.conditions
+    return {
+        "scene": conditions.scene.name,
+        "error": conditions.error,
+        "duration": conditions.duration,
+        "cost_limit": conditions.cost_limit,
+    }
 
 
 def _truth(recommendation: Recommendation) -> dict[str, Any]:
@@ -69,12 +75,12 @@ def _truth(recommendation: Recommendation) -> dict[str, Any]:
         "checked_by": truth.names[1],
         "agreement": truth.agreement_rad,
         "checked_until": truth.checked_until,
-        "until": recommendation.bench.truth_until,
+        "until": recommendation.conditions.truth_until,
     }
 
 
 def _motion(recommendation: Recommendation) -> dict[str, Any]:
-    amplified = recommendation.bench.amplification
+    amplified = recommendation.conditions.amplification
     return {
         "unstable": amplified.unstable,
         "disturbance": amplified.disturbance,
@@ -117,15 +123,15 @@ def _probe(probe: Probe) -> dict[str, Any]:
 
 def question_text(recommendation: Recommendation) -> str:
     """Return what was asked, with an empty line below it."""
-    bench = recommendation.bench
-    return f"{bench.scene.name}: attitude error of at most {bench.error:g} rad over {bench.duration:g} s\n"
+    conditions = recommendation.conditions
+    return f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s\n"
 
 
 def tables(recommendation: Recommendation) -> Iterator[TerminalTable]:
     """Yield what reaches the error, what does not, and the probe runs."""
     reaching = sorted((advice for advice in recommendation.advice if advice.reached), key=lambda advice: advice.cost)
     failing = [advice for advice in recommendation.advice if advice.best and not advice.reached]
-    limit = f"What does not, at up to {recommendation.bench.cost_limit:g} s of computing per simulated second"
+    limit = f"What does not, at up to {recommendation.conditions.cost_limit:g} s of computing per simulated second"
     if reaching:
         yield TerminalTable("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching])
     if failing:
@@ -148,7 +154,7 @@ def notes(recommendation: Recommendation) -> list[str]:
 
 
 def _truth_text(recommendation: Recommendation) -> str:
-    truth, until = recommendation.truth, recommendation.bench.truth_until
+    truth, until = recommendation.truth, recommendation.conditions.truth_until
     return (
         f"Truth: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the first "
         f"{truth.checked_until:.3g} s; errors are measured over up to {until:.4g} s."
@@ -156,7 +162,7 @@ def _truth_text(recommendation: Recommendation) -> str:
 
 
 def _stability_text(recommendation: Recommendation) -> str:
-    amplified = recommendation.bench.amplification
+    amplified = recommendation.conditions.amplification
     stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
     after = ", and by anything after that" if amplified.lost else ""
     return (
