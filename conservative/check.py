@@ -37,7 +37,7 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
 
 
 def read_only(array: Array) -> Array:
-    """Return an array of any shape and unit after closing it to writing: frozen values hold no others."""
+    """Return an array, (...) in and (...) out and of any unit, after closing it to writing: frozen values hold no others."""
     array.flags.writeable = False
     return array
 

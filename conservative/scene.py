@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +14,16 @@ from .attitude import Array
 from .body import RigidBody
 from .check import finite_array, positive_number, rotation
 from .errors import BadInput
-from .invariants import Invariant, invariants_of
+from .invariants import Invariant, axial_direction, invariants_of
 from .potentials.potential import Potential
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+T = TypeVar("T")
+Settings = TypeVarTuple("Settings")
+MOST_DERIVATIONS = 64
+"""Results that `Scene.derive` keeps at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +115,31 @@ class Scene(_Fields):
     def invariants(self) -> tuple[Invariant, ...]:
         """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
         return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
+
+    @cached_property
+    def symmetry_axis_B(self) -> Array | None:
+        """Unit vector (3,), body axes, about which body and field are symmetric; None where they are not."""
+        return axial_direction(self.body, self.potential)
+
+    @cached_property
+    def _derivations(self) -> dict[Any, Any]:
+        return {}
+
+    def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
+        """Return `function(self, *settings)`, kept as long as the scene is: a scene never changes. Settings are hashable."""
+        known, key = self._derivations, (function, settings)
+        try:
+            return known[key]
+        except KeyError:
+            found = function(self, *settings)
+            if len(known) >= MOST_DERIVATIONS:
+                known.clear()
+            known[key] = found
+        return found
+
+    def forget(self) -> None:
+        """Drop what `derive` has kept, so that whoever times the preparation of a run times all of it."""
+        self._derivations.clear()
 
     def renamed(self, name: str, **changes: Any) -> Scene:
         """Return the scene under another name and with other fields where `changes` says so."""

@@ -97,16 +97,16 @@ def compiled_methods() -> list[Method]:
 def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.MonkeyPatch) -> Callable[[], Any]:
     """Return the kernel with what `call` hands to it."""
     module = kernels(method.kernel)
-    march, handed = module.march, []
+    enter, handed = module.enter, []
 
     def record(*arguments: Any) -> Any:
         handed.append(arguments)
-        return march(*arguments)
+        return enter(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "march", record)
+        patch.setattr(module, "enter", record)
         call()
-    return partial(march, *handed[0])
+    return partial(enter, *handed[0])
 
 
 def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:

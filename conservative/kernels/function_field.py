@@ -6,16 +6,17 @@ done in Python, by `conservative.potentials.python_function`, so that nothing bu
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from ..errors import PotentialFailed
-from . import kernel
-from .fields import body_torque, energy, finite_derivative, finite_torque, is_field
+from . import COMPILED, kernel
+from .fields import body_torque, energy, finite_derivative, finite_torque, implements
 
 BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
 FAILED = 1
@@ -37,7 +38,7 @@ class Function(NamedTuple):
 
 
 @intrinsic
-def _call(typingctx, address, what, talk):
+def _call_compiled(typingctx, address, what, talk):
     """Call the C function at `address` with the int64 `what` and the address of a talk."""
 
     def code(context, builder, signature, arguments):
@@ -45,6 +46,13 @@ def _call(typingctx, address, what, talk):
         return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
 
     return types.int64(types.int64, types.int64, types.int64), code
+
+
+def _call_plain(address, what, talk):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(address)(what, int(talk))
+
+
+_call = _call_compiled if COMPILED else _call_plain
 
 
 @kernel
@@ -76,51 +84,27 @@ def _triple(v, i):
     return (v[i], v[i + 1], v[i + 2])
 
 
-@overload(energy)
+@implements(energy, Function)
 def _energy_function(field, q):
-    if not is_field(field, Function):
-        return None
-
-    def of_function(field, q):
-        return _ask(field, ENERGY, _begin_at(field, q))[0]
-
-    return of_function
+    return _ask(field, ENERGY, _begin_at(field, q))[0]
 
 
-@overload(body_torque)
+@implements(body_torque, Function)
 def _body_torque_function(field, q):
-    if not is_field(field, Function):
-        return None
-
-    def torque(field, q):
-        return _triple(_ask(field, BODY_TORQUE, _begin_at(field, q)), 0)
-
-    return torque
+    return _triple(_ask(field, BODY_TORQUE, _begin_at(field, q)), 0)
 
 
-@overload(finite_torque)
+@implements(finite_torque, Function)
 def _finite_torque_function(field, q, a):
-    if not is_field(field, Function):
-        return None
-
-    def torque(field, q, a):
-        talk = _begin_at(field, q)
-        talk[STATE + 4], talk[STATE + 5], talk[STATE + 6] = a
-        v = _ask(field, FINITE_TORQUE, talk)
-        return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
-
-    return torque
+    talk = _begin_at(field, q)
+    talk[STATE + 4], talk[STATE + 5], talk[STATE + 6] = a
+    v = _ask(field, FINITE_TORQUE, talk)
+    return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
 
 
-@overload(finite_derivative)
+@implements(finite_derivative, Function)
 def _finite_derivative_function(field, q0, q1):
-    if not is_field(field, Function):
-        return None
-
-    def derivative(field, q0, q1):
-        talk = _begin(field)
-        talk[STATE : STATE + 9], talk[STATE + 9 : GIVEN] = q0, q1
-        v = _ask(field, FINITE_DERIVATIVE, talk)
-        return v[:9].copy(), v[9:].copy().reshape(9, 9)
-
-    return derivative
+    talk = _begin(field)
+    talk[STATE : STATE + 9], talk[STATE + 9 : GIVEN] = q0, q1
+    v = _ask(field, FINITE_DERIVATIVE, talk)
+    return v[:9].copy(), v[9:].copy().reshape(9, 9)

@@ -52,7 +52,7 @@ class Gradient:
     function: GradientFunction
 
     def at(self, R: Array) -> Array:
-        """Return dV/dR, (3, 3), in J, at a matrix (3, 3)."""
+        """Return dV/dR, (3, 3), in J, at a matrix (3, 3). Raise `BadInput` where the function gives another shape."""
         gradient = np.asarray(self.function(R.copy()), dtype=float)
         if gradient.shape != (3, 3):
             raise BadInput("gradient", f"shape {gradient.shape}", "a function that returns a matrix (3, 3)")

@@ -1,4 +1,4 @@
-"""Values that others hand out: `dataclasses.replace` works on each, nothing is assigned to one, arrays in them are read-only."""
+"""Values that others hand out: `dataclasses.replace` works on each, nothing is assigned to one, its arrays are read-only."""
 
 from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
@@ -87,7 +87,12 @@ def test_what_is_replaced_is_checked_and_converted():
 
 
 def test_the_exact_step_of_moser_and_veselov_by_all_its_names():
-    names = [cv.MoserVeselov(), cv.MoserVeselov("exact"), registry.method("moser_veselov:order=exact"), replace(cv.MoserVeselov())]
+    names = [
+        cv.MoserVeselov(),
+        cv.MoserVeselov("exact"),
+        registry.method("moser_veselov:order=exact"),
+        replace(cv.MoserVeselov()),
+    ]
     assert {(method.name, method.order) for method in names} == {("moser_veselov", None)}
     assert len(set(names)) == 1
     assert replace(cv.MoserVeselov(), order=4).name == "moser_veselov:order=4"
