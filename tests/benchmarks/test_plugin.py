@@ -38,7 +38,8 @@ import sys
 import pytest
 before = set(sys.modules)
 import conservative.benchmarks.gate.pytest_plugin
-print(*sorted(name for name in set(sys.modules) - before if name.partition(".")[0] in {"conservative", "numpy", "numba", "pandas"}))
+roots = {"conservative", "numpy", "numba", "pandas"}
+print(*(name for name in set(sys.modules) - before if name.partition(".")[0] in roots))
 """
 
 
