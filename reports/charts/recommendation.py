@@ -45,15 +45,15 @@ def costs(recommendation: Recommendation) -> pd.DataFrame:
 
 def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
-    data, prices = points(recommendation), costs(recommendation)
+    data, prices, asked = points(recommendation), costs(recommendation), recommendation.conditions
     names = series_order(data["method"])
     panels = [
-        _probes(part, str(kind), names, recommendation.conditions.error) for kind, part in data.groupby("kind", sort=True)
+        _probes(part, str(kind), names, asked.error) for kind, part in data.groupby("kind", sort=True)
     ]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, names))
-    title = f"{recommendation.conditions.scene.name}: {recommendation.conditions.error:g} rad over {recommendation.conditions.duration:g} s"
+    title = f"{asked.scene.name}: {asked.error:g} rad over {asked.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 
