@@ -101,8 +101,8 @@ class Trajectory:
 
         Raises
         ------
-        MissingEngine
-            pandas is not installed.
+        MissingExtra
+            pandas, of the extra `report`, is not installed.
         """
         from .presentation import table
 
@@ -115,8 +115,8 @@ class Trajectory:
         ------
         BadInput
             There are no samples.
-        MissingEngine
-            Altair or pandas is not installed.
+        MissingExtra
+            Altair or pandas, of the extra `report`, is not installed.
         """
         from .presentation import picture
 

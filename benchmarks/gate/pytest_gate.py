@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from . import baseline, compare, dashboards, results, yardstick
-from .pytest_plugin import REPEAT
+from .stash import REPEAT
 from .results import TIME_RATIO, Results, Row
 
 

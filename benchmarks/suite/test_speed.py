@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from conservative.benchmarks.gate.pytest_plugin import REPEAT
+from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
 from conservative.benchmarks.measures.timing import interleaved, prepared
 from conservative.benchmarks.studies.case import Case, Done, attempt
@@ -36,8 +36,8 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     benchmark.group = scene.name
     run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
-        pytest.xfail(f"{method.label}: {last.status}")  # a finding, which the studies report, and no time to compare
-    assert last.status == "ok"
+        pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
+    assert last.ok, last.outcome
     gated = points.gated(point)
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
     benchmark.extra_info.update({name: found.value for name, found in gated.items()})

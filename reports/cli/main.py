@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from conservative.extras import require_extra
+
 from ..terminal.interrupts import Terminated, interruptible, notes
 from . import completion
 
@@ -64,10 +66,10 @@ class Commands(click.Group):
 
 def _as_click(error: Exception) -> Exception:
     """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
-    from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+    from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra
 
     text = "; ".join([str(error), *notes(error)])
-    if isinstance(error, BadInput | MissingEngine):
+    if isinstance(error, BadInput | MissingEngine | MissingExtra):
         return _UserError(text)
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 
@@ -139,6 +141,7 @@ def report(
     The folder is there whole or not at all; until then, what is finished is in a file beside it, OUT.partial.json.
     A family's bare name, such as mujoco, stands for all its variants.
     """
+    require_extra("conservative report", "report")
     from .. import document
     from ..run import checkpoint
     from ..terminal import atomic_files
@@ -216,6 +219,7 @@ def recommend(
 
     What a probe cannot cover of the duration is extrapolated by a law that is told with it.
     """
+    require_extra("conservative recommend", "report")
     from ..terminal.progress import progress
     from . import recommend as recommending
 
@@ -238,6 +242,7 @@ def recommend(
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def list_command(as_json: bool) -> None:
     """Show the scenes, grouped, and the methods, with what they conserve and whether their engine is installed."""
+    require_extra("conservative list", "report", "rich")
     from .list import as_json as listed_json
     from .list import show
 
@@ -287,6 +292,7 @@ def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json:
     Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
     A run that fails leaves what it reached in the file, and exits with 1.
     """
+    require_extra("conservative run", "report", "rich")
     from ..terminal.progress import waiting
     from . import run
 
