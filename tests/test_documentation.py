@@ -152,12 +152,20 @@ def test_the_readme_is_short_and_leads_to_every_room():
     assert {"conservative/README.md", "references/README.md", "benchmarks/README.md", "reports/README.md"} <= set(links(text))
 
 
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def cells_with_outputs(notebook):
+    return [cell.id for cell in code_cells(notebook) if cell.outputs or cell.execution_count]
+
+
 def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbformat.validate(notebook)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert not any(cell.outputs or cell.execution_count for cell in code)
+    assert not cells_with_outputs(notebook)
     NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
-    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in code if cell.outputs}
+    assert cells_with_outputs(notebook)
+    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in code_cells(notebook) if cell.outputs}
     assert "moser_veselov" in shown["cheapest"]
     assert "mujoco" in shown["runs"]
