@@ -69,22 +69,6 @@ class WrongBranch(NotConverged):
     kind = OutcomeKind.WRONG_BRANCH
 
 
-def branch_ended(step: int, time: float, residual: float, elsewhere: bool) -> NotConverged:
-    """Return the failure of a step to which the state does not lead continuously, as the step grows from 0.
-
-    Parameters
-    ----------
-    step, time
-        Number of the step, from 1, and its start, s.
-    residual
-        What is left of its equations where the branch ends, relative to their unknowns.
-    elsewhere
-        Whether they have a solution on another branch.
-    """
-    failed = WrongBranch if elsewhere else NotConverged
-    return failed(step, time, residual, "no continuous solution")
-
-
 class Diverged(IntegrationFailed):
     """The state stopped being finite, or an engine gave up. Attributes: `time` (s, of the last good sample), `reason`."""
 

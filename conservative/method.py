@@ -55,7 +55,9 @@ class Grid:
     @property
     def t(self) -> Array:
         """Times (n,) of the samples, s."""
-        return self.steps * self.dt
+        t = self.steps
+        t *= self.dt
+        return t
 
     def kept(self, done: int) -> int:
         """Return how many samples a run of `done` steps has filled."""

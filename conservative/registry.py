@@ -40,7 +40,8 @@ def scene(text: str) -> Scene:
     Raises
     ------
     BadInput
-        The name or a parameter is unknown, a value cannot be used, or the file cannot (see `conservative.scene_files.scene_file`).
+        The name or a parameter is unknown, a value cannot be used, or the file cannot: see
+        `conservative.scene_files.scene_file`.
     NotLoadable
         It is registered, but importing what is registered fails.
     """

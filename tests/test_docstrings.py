@@ -178,8 +178,11 @@ def test_everything_in_all_is_walked():
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
     "conservative.lazy_kernels": "imports",
+    "conservative.declarations": "values",
+    "conservative.entry_points": "names",
     "conservative.errors": "exceptions",
     "conservative.method": "the protocol",
+    "conservative.outcome": "an enum and a value",
     "conservative.presentation": "tables and cards",
     "conservative.registry": "names",
     "conservative.scene": "a value",

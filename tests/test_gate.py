@@ -66,7 +66,7 @@ def measured(name, instead=None):
     """The row of a method; with `instead`, measured with another one that goes by its name."""
     point = points.Point(BRICK, method(name))
     labels = point.labels
-    found = points.gated(replace(point, method=instead or point.method))
+    found = points.measure(replace(point, method=instead or point.method))
     values, spreads = ({key: getattr(each, kind) for key, each in found.items()} for kind in ("value", "spread"))
     ratio = yardstick.time_ratio(instead or point.method, BRICK, BRICK.dt) if name == SECOND and not instead else None
     return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads, ratio)

@@ -38,7 +38,7 @@ LARGEST = {Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measur
 
 
 @dataclass(frozen=True)
-class Gated:
+class GatedValue:
     """A value that should not change, and how much round-off alone changes it."""
 
     value: float
@@ -100,29 +100,29 @@ def points() -> Iterator[Point]:
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 
-def gated(point: Point) -> dict[str, Gated]:
+def measure(point: Point) -> dict[str, GatedValue]:
     """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
     exact = point.truths(point.scene, point.grid).trajectory
-    runs = [point.scene, *(nudged(point.scene, nudge) for nudge in NUDGES)]
-    found = [_measured(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
-    values = {name: Gated(found[0][name], _range([each[name] for each in found])) for name in found[0]}
-    return values | (observed(point) if point.scene.name in PAPER else {})
+    runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
+    found = [_measure_run(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
+    values = {name: GatedValue(found[0][name], _range([each[name] for each in found])) for name in found[0]}
+    return values | (fit_order(point) if point.scene.name in PAPER else {})
 
 
-def nudged(scene: Scene, nudge: int) -> Scene:
-    """Return the scene with a start that differs by `nudge` units in the last place of its largest rate."""
+def nudge(scene: Scene, units: int) -> Scene:
+    """Return the scene with a start that differs by `units` units in the last place of its largest rate."""
     pattern = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
-    return replace(scene, w_WB_B0=scene.w_WB_B0 + nudge * pattern)
+    return replace(scene, w_WB_B0=scene.w_WB_B0 + units * pattern)
 
 
-def _measured(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
+def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
     """Return errors and drifts at their largest, and the method's counters."""
     counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
     found = errors.measure_errors(trajectory, exact)
     return {value.key: value.value for value in found if value.measure in LARGEST} | counters
 
 
-def observed(point: Point) -> dict[str, Gated]:
+def fit_order(point: Point) -> dict[str, GatedValue]:
     """Return the observed order of the attitude; nothing where a method has or shows none."""
     scene, method = point.scene, point.method
     if method.order is None:
@@ -132,7 +132,7 @@ def observed(point: Point) -> dict[str, Gated]:
     found = [attempt(Case("order", scene, method, grid)) for grid in grids]
     sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
     order = observed_order([grid.dt for grid in grids], sizes)
-    return {} if order.reason else {Measure.ORDER.text: Gated(order.slope, 0.0)}
+    return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 
 
 def _range(values: list[float]) -> float:

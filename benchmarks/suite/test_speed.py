@@ -38,10 +38,10 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
-    gated = points.gated(point)
+    values = points.measure(point)
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
-    benchmark.extra_info.update({name: found.value for name, found in gated.items()})
-    benchmark.extra_info["spreads"] = {name: found.spread for name, found in gated.items()}
+    benchmark.extra_info.update({name: found.value for name, found in values.items()})
+    benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}
     if point.timed:
         benchmark.extra_info["time ratio"] = time_ratio(method, scene, scene.dt)
         request.node.stash[REPEAT] = partial(elsewhere, scene.name, method.name)
@@ -60,11 +60,11 @@ def test_step_ratios(benchmark: Any) -> None:
     benchmark.group = f"{scene.name}, ratios"
     benchmark.extra_info["definition"] = RATIOS
     for method in methods:
-        benchmark.extra_info |= ratios(method, per_step, labels)
+        benchmark.extra_info.update(compare_steps(method, per_step, labels))
     benchmark(ready[methods[0].name][1].run)
 
 
-def ratios(method: Method, per_step: dict[str, float], labels: dict[str, str]) -> dict[str, float]:
+def compare_steps(method: Method, per_step: dict[str, float], labels: dict[str, str]) -> dict[str, float]:
     """Return how many times longer than a step of a method those of its goals take, and its own time, s."""
     own = per_step[method.name]
     found = {f"{labels[name]} / {method.name} (goal {goal:g})": per_step[name] / own for name, goal in method.step_goals}
@@ -74,7 +74,7 @@ def ratios(method: Method, per_step: dict[str, float], labels: dict[str, str]) -
 def test_call_overhead(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a call of `integrate` costs beside its kernel, us, a few steps with a sample of each; nothing is asserted."""
     runs: dict[str, Callable[[], Any]] = {}
-    for method in compiled():
+    for method in compiled_methods():
         scene = next(scene for scene in map(registered, points.PAPER) if not method.unsupported(scene))
         call = partial(integrate, scene, scene.dt, method, FEW_STEPS * scene.dt)
         runs[method.name] = call
@@ -82,14 +82,14 @@ def test_call_overhead(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     timings = time_interleaved(runs, rounds=15, min_time=0.002)
     benchmark.group = "calls"
     benchmark.extra_info["definition"] = CALLS
-    for method in compiled():
+    for method in compiled_methods():
         over = timings[method.name].minimum - timings[f"kernel of {method.name}"].minimum
         benchmark.extra_info[f"{method.name}, us (goal {OVERHEAD_GOAL})"] = 1e6 * over
     scene = registered(points.PAPER[0])
     benchmark(partial(integrate, scene, scene.dt, t_end=FEW_STEPS * scene.dt))  # with the default method
 
 
-def compiled() -> list[Method]:
+def compiled_methods() -> list[Method]:
     """Return the settings of the families whose steps are one call of a kernel."""
     return [method for family in list_families().values() if family.kernel for method in family.variants()]
 
@@ -97,16 +97,16 @@ def compiled() -> list[Method]:
 def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.MonkeyPatch) -> Callable[[], Any]:
     """Return the kernel with what `call` hands to it."""
     module = kernels(method.kernel)
-    march, handed = module.march, []
+    enter, handed = module.enter, []
 
-    def recorded(*arguments: Any) -> Any:
+    def record(*arguments: Any) -> Any:
         handed.append(arguments)
-        return march(*arguments)
+        return enter(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "march", recorded)
+        patch.setattr(module, "enter", record)
         call()
-    return partial(march, *handed[0])
+    return partial(enter, *handed[0])
 
 
 def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:

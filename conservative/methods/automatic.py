@@ -23,7 +23,7 @@ import numpy as np
 from .. import registry
 from ..attitude import Array, angle_between
 from ..declarations import Candidacy
-from ..errors import AccuracyNotReached, IntegrationFailed, Unsupported
+from ..errors import AccuracyNotReached, IntegrationFailed, MissingEngine, Unsupported
 from ..method import Grid, Method, Role
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
@@ -43,11 +43,11 @@ Attempts = list[tuple[float, float]]
 
 
 def candidates(scene: Scene) -> tuple[Method, ...]:
-    """Return the methods worth probing on a scene: an exact family alone where one supports it, else one family of each group."""
+    """Return the methods worth probing on a scene: an exact family alone where one supports it, else one of each group."""
     found: dict[str, tuple[Method, ...]] = {}
     for family, candidacy in _ranked_families():
-        settings = family.candidate_settings()
-        if settings[0].unsupported(scene) is not None:
+        settings = _settings(family)
+        if not settings or settings[0].unsupported(scene) is not None:
             continue
         if candidacy.exact:
             return settings
@@ -60,6 +60,14 @@ def _ranked_families() -> list[tuple[type[Method], Candidacy]]:
     ours = [family for family in registry.list_families().values() if family.role == Role.OURS]
     found = [(family, family.candidacy) for family in ours if family.candidacy is not None]
     return sorted(found, key=lambda entry: entry[1].rank)
+
+
+def _settings(family: type[Method]) -> tuple[Method, ...]:
+    """Return the settings of a family that are probed; none where what it needs is not installed."""
+    try:
+        return family.candidate_settings()
+    except MissingEngine:
+        return ()
 
 
 def integrate_to_error(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
@@ -133,7 +141,7 @@ def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Traject
     stride = 1 + grid.every % 2
     try:
         coarse = method.prepare(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))()
-    except (IntegrationFailed, Unsupported):
+    except (IntegrationFailed, MissingEngine, Unsupported):
         return math.inf, fine
     if not (fine.ok and coarse.ok):
         return math.inf, fine

@@ -19,10 +19,10 @@ class Potential(Protocol):
 
     There are two ways to a potential of one's own. The short one is `FunctionPotential(energy, gradient)`, two plain Python
     functions, called from the compiled loop and differentiated by differences: a thousand times slower than a compiled field.
-    The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own with numba
-    overloads of `energy`, `body_torque`, `finite_torque` and `finite_derivative`: `conservative/potentials/point_to_point.py` and
-    `conservative/kernels/point_fields.py` are an example to follow. Whatever it is, `finite_derivative` must satisfy its
-    identity to round-off, since energy is conserved to no better than that.
+    The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own that implements
+    the functions of `conservative.kernels.fields`: follow the example of `conservative/potentials/point_to_point.py` and
+    `conservative/kernels/point_fields.py`. Whatever it is, `finite_derivative` must satisfy its identity to round-off, since
+    energy is conserved to no better than that.
     """
 
     def energy(self, R_WB: Array) -> Array:

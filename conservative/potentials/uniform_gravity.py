@@ -13,7 +13,13 @@ from ..check import finite_array, finite_number
 
 
 @dataclass(frozen=True, eq=False)
-class UniformGravity:
+class _Fields:
+    weight: float
+    com_B: Array
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class UniformGravity(_Fields):
     """A uniform field along the world's -z axis: V = weight (R_WB com_B).e_z.
 
     Parameters
@@ -29,13 +35,11 @@ class UniformGravity:
         A parameter is not finite or of another shape.
     """
 
-    weight: float
-    com_B: Array
-
     def __init__(self, weight: float, com_B: ArrayLike) -> None:
-        object.__setattr__(self, "weight", finite_number("weight", weight, "a finite number, N"))
-        object.__setattr__(self, "com_B", finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"))
-        self.com_B.flags.writeable = False
+        super().__init__(
+            finite_number("weight", weight, "a finite number, N"),
+            finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
+        )
 
     @property
     def moment_B(self) -> Array:

@@ -78,16 +78,16 @@ class Heyoka(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
-        integrator, label = forms.compiled(problem.form, self.tol), self.label
+        integrators, label = forms.compile_double(problem.form, self.tol), self.label
         propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
 
         def run() -> Trajectory:
-            # The integrator is shared by all scenes of its form, and holds what the last run left.
-            integrator.time = 0.0
-            integrator.state[:] = problem.start
-            # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
-            integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-            states, steps, outcome = propagate(integrator, grid.t)
+            with integrators.borrow() as integrator:
+                integrator.time = 0.0
+                integrator.state[:] = problem.start
+                # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
+                integrator.pars[:] = problem.parameters[: len(integrator.pars)]
+                states, steps, outcome = propagate(integrator, grid.t)
             R_WF, w = problem.readout(grid.t[: len(states)], states)
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), f"heyoka: {outcome.name}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -200,12 +201,29 @@ def _warning(mj: Any, data: Any) -> str:
     return ""
 
 
-@contextmanager
-def _quiet(mj: Any) -> Iterator[None]:
-    """Keep MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead."""
-    before = mj.get_mju_user_warning()
-    mj.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mj.set_mju_user_warning(before)
+class _Quiet:
+    """Keeps MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead.
+
+    The first of the runs that overlap puts the user's own handler aside, the last one puts it back.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._runs, self._before = Lock(), 0, None
+
+    @contextmanager
+    def __call__(self, mj: Any) -> Iterator[None]:
+        with self._lock:
+            if self._runs == 0:
+                self._before = mj.get_mju_user_warning()
+                mj.set_mju_user_warning(lambda message: None)
+            self._runs += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._runs -= 1
+                if self._runs == 0:
+                    mj.set_mju_user_warning(self._before)
+
+
+_quiet = _Quiet()

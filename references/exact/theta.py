@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import RLock
 from typing import Any
 
 import mpmath
@@ -22,6 +23,9 @@ from conservative.attitude import Array
 
 mp = mpmath.MPContext()
 mp.prec = 500
+
+MP_LOCK = RLock()
+"""Held while `mp` is used: mpmath's functions raise the precision of their context while they run."""
 
 Number = Any
 """A real or complex number of `mp`."""

@@ -16,9 +16,11 @@ equal error); rates scaled so that all coefficients are 1 (8 % less a step, more
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 from ..engine import load
@@ -53,11 +55,33 @@ def form_of(equations: Callable[[Sequence[Expression]], Equations], parameters: 
     return Form(equations, tuple(bool(p != 0) for p in parameters)), [p for p in parameters if p != 0]
 
 
-@cache
-def compiled(form: Form, tol: float) -> Any:
-    """Return the integrator of a form, compiled for a relative tolerance; whoever runs it sets state, time and parameters."""
+class Integrators:
+    """Equal integrators of one form: a run borrows one, so that no two runs at a time write into the same.
+
+    The first is compiled; others are copies of it, made (in a millisecond) when all there are so far are lent out.
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        self._first, self._idle = compiled, [copy(compiled)]
+
+    @contextmanager
+    def borrow(self) -> Iterator[Any]:
+        """Lend an integrator; whoever borrows it sets state, time and parameters."""
+        try:
+            integrator = self._idle.pop()
+        except IndexError:
+            integrator = copy(self._first)
+        try:
+            yield integrator
+        finally:
+            self._idle.append(integrator)
+
+
+@lru_cache(maxsize=64)
+def compile_double(form: Form, tol: float) -> Integrators:
+    """Return integrators of a form in double precision, for a relative tolerance."""
     equations = form.build()
-    return heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol)
+    return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol))
 
 
 def body(parameters: Sequence[Expression]) -> Equations:

@@ -1,6 +1,6 @@
-"""A scene in the forms of `conservative.references.heyoka_equations.forms`: which axes, which numbers, and how states become attitudes and rates.
+"""A scene as heyoka integrates it: which axes, which numbers, and how states become attitudes and rates.
 
-Source: our own, measured against each other.
+The forms are those of `conservative.references.heyoka_equations.forms`. Source: our own, measured against each other.
 """
 
 from __future__ import annotations

@@ -53,12 +53,12 @@ def chart(found: pd.DataFrame, scene: str, series: str) -> Spec:
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
         "layer": [
-            {"data": _grid(), "transform": _projected(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding("part")},
+            {"data": _grid(), "transform": _project(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding("part")},
             {
                 "data": as_csv(points, ("k", "x", "y", "z")),
-                "transform": [*_projected(), *_sides()],
+                "transform": [*_project(), *_sides()],
                 "mark": _line(colours([series])[series], 1.3, 1.0),
-                "encoding": _encoding("stretch") | {"opacity": _faint()},
+                "encoding": _encoding("stretch") | {"opacity": _fade()},
             },
         ],
         "config": {"view": {"stroke": None}},
@@ -82,7 +82,7 @@ def _grid() -> Spec:
     return as_csv(rows, ("part", "k", "x", "y", "z"))
 
 
-def _projected() -> list[Spec]:
+def _project() -> list[Spec]:
     """Return the parallel projection: across and up on the paper, and towards the eye."""
     a, e = "(turn * PI / 180)", "(tilt * PI / 180)"
     ahead = f"(cos{a} * datum.x + sin{a} * datum.y)"
@@ -108,5 +108,5 @@ def _encoding(detail: str) -> Spec:
     return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}, "order": order, "detail": {"field": detail}}
 
 
-def _faint() -> Spec:
+def _fade() -> Spec:
     return {"condition": {"test": "datum.near < 0", "value": 0.3}, "value": 1}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ class Tableau:
     E: Array
 
 
-@cache
+@lru_cache(maxsize=MOST_STAGES)
 def tableau(stages: int) -> Tableau:
     """Return the coefficients for `stages` stages, 1 to `MOST_STAGES` (Hairer, Lubich & Wanner, II.1.3)."""
     import mpmath as mp
