@@ -17,8 +17,8 @@ import pytest
 
 from ..measures.origin import commit, machine
 from . import baseline, compare, dashboards, results, yardstick
-from .pytest_plugin import REPEAT
 from .results import TIME_RATIO, Results, Row, Status
+from .stash import REPEAT
 
 
 class GateFailed(Exception):

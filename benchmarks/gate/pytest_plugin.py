@@ -1,24 +1,23 @@
-"""The pytest plugin behind `pytest --benchmark`; without the option it only keeps the suite in this folder from running.
+"""The pytest plugin behind `pytest --benchmark`; without the option it only keeps the suite from running.
 
-It is an entry point, so every pytest run of the environment imports this file: nothing heavy at the top.
+It is an entry point, so every pytest run of the environment imports this file: nothing of ours is imported at the top.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-SUITE = Path(__file__).parents[1] / "suite"
+ROOM = Path(__file__).parents[1]
+"""The package `conservative.benchmarks`; in a checkout a link to `REAL`, the folder `benchmarks` at its top."""
+REAL = ROOM.resolve()
+SUITE = ROOM / "suite"
 TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
 MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
 """The suite has many points, and times 0.1 s or two calls of each unless pytest-benchmark's option says otherwise."""
-REPEAT = pytest.StashKey[Callable[[], float]]()
-"""Where a test leaves a function that measures its time ratio again, should the gate ask for it."""
-MEASURED = pytest.StashKey[list[dict[str, Any]]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -58,19 +57,20 @@ def wanted(config: pytest.Config) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """With the option and no path, make the suite what is run.
+    """With the option and no path, make the suite what is run; take paths of the suite by the name it is imported under.
 
     Raises
     ------
     pytest.UsageError
         pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
     """
+    config.args = [_linked(text, config.invocation_params.dir) for text in config.args]
     if not wanted(config):
         if config.getoption("conservative_gate"):
             raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
         return
     if not config.pluginmanager.hasplugin(TIMER):
-        allowed = "allowed after: pip install pytest-benchmark, and without -p no:benchmark"
+        allowed = "allowed after: pip install 'conservative-rotation[gate]', and without -p no:benchmark"
         raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(SUITE)]
@@ -78,6 +78,28 @@ def pytest_configure(config: pytest.Config) -> None:
             config.option.benchmark_max_time, config.option.benchmark_min_rounds = SHORT, FEW
     if config.getoption("conservative_gate"):
         _gate(config)
+
+
+@pytest.hookimpl(optionalhook=True, tryfirst=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """Run benchmarks without workers, which disturb each other's times, unless the command line has a number of them."""
+    return 0 if wanted(config) else None
+
+
+def _linked(text: str, folder: Path) -> str:
+    """Return an argument below `REAL` as one below `ROOM`: pytest names a module by its path, and a module has one name."""
+    place, *rest = text.partition("::")
+    path = (folder / place).resolve()
+    if not (ROOM.is_symlink() and path.is_relative_to(REAL)):
+        return text
+    return "".join([str(ROOM / path.relative_to(REAL)), *rest])
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Leave out `REAL`, which is collected below `ROOM`."""
+    if collection_path.name != REAL.name or collection_path.is_symlink() or not ROOM.is_symlink():
+        return None
+    return True if collection_path.resolve() == REAL else None
 
 
 def _gate(config: pytest.Config) -> None:
@@ -100,6 +122,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[str, Any]]) -> None:
     """Keep what pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
+    from .stash import MEASURED
+
     config.stash[MEASURED] = list(benchmarks)
 
 
@@ -111,10 +135,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         return
     if getattr(config.option, "dist", "no") != "no":
         terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")
+    from .accuracy_columns import lines
+    from .stash import MEASURED
+
     measured = config.stash.get(MEASURED, [])
     if measured:
-        from .accuracy_columns import lines
-
         terminalreporter.section("accuracy beside time")
         for group in dict.fromkeys(row["group"] for row in measured):
             for line in (*lines([row for row in measured if row["group"] == group]), ""):

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from conservative.benchmarks.gate.pytest_plugin import REPEAT
+from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
 from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
 from conservative.benchmarks.studies.case import Case, Done, attempt
