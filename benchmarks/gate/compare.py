@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .baseline import ORDER, Allowed, Baseline, BaselineRow
-from .results import PASSED, TIME_RATIO, Results, Row
+from .results import TIME_RATIO, Results, Row, Status
 
 Times = Literal["required", "known"]
 """required: the baseline has to know times on this machine. known: where it does not, time is not gated, and that is said."""
@@ -48,10 +48,12 @@ class Verdict:
         return "\n".join([head, *map(str, self.violations), *(f"note: {note}" for note in self.notes)])
 
 
-def judged(baseline: Baseline, results: Results, times: Times = "required") -> Verdict:
+def judge(baseline: Baseline, results: Results, times: Times = "required") -> Verdict:
     """Return the verdict on results. A baseline without rows, which would let everything pass, is a violation."""
     violations = [] if baseline.rows else [Violation("rows", "all", "all", "none", "none", "one or more")]
-    notes = [f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status == PASSED]
+    notes = [
+        f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status is Status.PASSED
+    ]
     known = {machine for row in baseline.rows.values() for machine in row.time_ratios}
     foreign = bool(known) and results.machine not in known
     if foreign and times == "required":
@@ -78,9 +80,9 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
     row = results.rows.get(id)
     if row is None:
         names = list(_renamed(was, results))
-        yield violation("row", PASSED, f"renamed {names[0]}" if names else "missing", PASSED)
-    elif row.status != PASSED:
-        yield violation("row", PASSED, row.status, PASSED)
+        yield violation("row", Status.PASSED, f"renamed {names[0]}" if names else "missing", Status.PASSED)
+    elif row.status is not Status.PASSED:
+        yield violation("row", Status.PASSED, row.status, Status.PASSED)
     elif row.definition != was.definition:
         yield violation("definition", was.definition, row.definition, was.definition)
     elif row.engine != was.engine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from .line import fit_line
 from .measure import Measure, Value
 
 
@@ -23,7 +25,7 @@ class Slope(NamedTuple):
     stderr: float
 
 
-def measure(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
+def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     """Return every measure of a trajectory; `blanks(trajectory.scene)` has the same in the same order, without values.
 
     Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity also the
@@ -58,10 +60,10 @@ def measure(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     if isinstance(potential, UniformGravity):
         position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=-1)
         found += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
-    return found + drifts(trajectory)
+    return found + measure_drifts(trajectory)
 
 
-def drifts(trajectory: Trajectory) -> list[Value]:
+def measure_drifts(trajectory: Trajectory) -> list[Value]:
     """Return the measures that need no truth: drift of each invariant of the scene, and orthonormality."""
     found: list[Value] = []
     for invariant in trajectory.scene.invariants:
@@ -78,9 +80,9 @@ def drifts(trajectory: Trajectory) -> list[Value]:
 
 
 def blanks(scene: Scene) -> list[Value]:
-    """Return all that `measure` finds for a scene, without values: what a run that failed has."""
+    """Return all that `measure_errors` finds for a scene, without values: what a run that failed has."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
-    return [found.blank for found in measure(start, start)]
+    return [found.blank for found in measure_errors(start, start)]
 
 
 def secular_slope(t: Array, drift: Array) -> Slope:
@@ -89,17 +91,12 @@ def secular_slope(t: Array, drift: Array) -> Slope:
     Of a vector (n, 3) the length of the three slopes. The standard error takes the residuals as independent; a drift that only
     oscillates has a slope within a few of them, or one that shrinks as the run gets longer.
     """
-    n = len(t)
-    if n < 3:
+    if len(t) < 3:
         return Slope(float("nan"), float("nan"))
-    columns = drift.reshape(n, -1)
-    centred = t - t.mean()
-    square = float(centred @ centred)
-    slopes = centred @ columns / square
-    residuals = columns - columns.mean(axis=0) - np.outer(centred, slopes)
-    variances = np.sum(residuals**2, axis=0) / (n - 2) / square
-    value = float(slopes[0]) if drift.ndim == 1 else float(np.linalg.norm(slopes))
-    return Slope(value, float(np.sqrt(variances.sum())))
+    if drift.ndim == 1:
+        return Slope(*fit_line(t, drift)[:2])
+    lines = [fit_line(t, column) for column in drift.T]
+    return Slope(math.hypot(*(line.slope for line in lines)), math.hypot(*(line.stderr for line in lines)))
 
 
 def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:

@@ -15,7 +15,7 @@ from conservative.trajectory import Trajectory
 from ..measures.measure import Value
 from ..measures.measurement import Measurement
 from ..measures.samples import Samples
-from ..measures.timing import Preparation, prepared
+from ..measures.timing import Preparation, prepare_and_run
 from .selection import series
 
 
@@ -113,7 +113,7 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
         reason = case.method.unsupported(case.scene)
         if reason:
             return unsupported(reason)
-        done = Done(*prepared(lambda: case.method.prepare(case.scene, case.grid)))
+        done = Done(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
     except MissingEngine as error:
         if not skip_missing:
             raise

@@ -12,7 +12,7 @@ from ..measures import errors
 from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import elapsed
+from ..measures.timing import wall_time
 from . import step_ladder
 from .case import Case, Done, Failed, at_no_step, attempt, unsupported
 from .selection import Missing
@@ -63,7 +63,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         if isinstance(outcome, Failed):
             yield from case.blanks(blanks(*ERRORS), outcome.outcome)
             continue
-        for value in errors.measure(outcome.trajectory, truth):
+        for value in errors.measure_errors(outcome.trajectory, truth):
             if value.measure in found:
                 found[value.measure][case.grid.dt] = value.value
                 yield case.row(value)
@@ -84,7 +84,7 @@ def attempt_each(cases: list[Case], longest: float, skip_missing: bool) -> Itera
         if isinstance(outcome, Done):
             # The very first call may include compilation, so that only a short one is taken for the cost of a run.
             first = outcome.cost.first_call
-            per_step = (first if per_step or first < longest / 4 else elapsed(outcome.run)) / case.grid.n_steps
+            per_step = (first if per_step or first < longest / 4 else wall_time(outcome.run)) / case.grid.n_steps
         yield case, outcome
 
 

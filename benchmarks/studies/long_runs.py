@@ -12,7 +12,7 @@ from conservative.method import Method, grid_for
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.errors import drifts
+from ..measures.errors import measure_drifts
 from ..measures.measure import Measure, Value
 from .case import Case, Failed, attempt
 from .study import Finding, Progress, Study
@@ -54,7 +54,7 @@ def long_run(case: Case, skip_missing: bool) -> Iterator[Finding]:
         yield from case.blanks(values, outcome.outcome)
         return
     detail = f"over {case.grid.t[-1]:g} s"
-    yield from (case.row(value, detail=detail) for value in drifts(outcome.trajectory))
+    yield from (case.row(value, detail=detail) for value in measure_drifts(outcome.trajectory))
     for quantity, drift in every_drift(outcome.trajectory).items():
         largest = np.maximum.accumulate(sizes(drift))
         some = np.unique(np.linspace(0, len(largest) - 1, SAMPLES).round().astype(int))[1:]

@@ -57,7 +57,7 @@ def accuracy(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Meas
     """Return a row for every measure, and for the work done; without values where the run did not reach its end."""
     if isinstance(outcome, Failed):
         return case.blanks(errors.blanks(case.scene), outcome.outcome)
-    found = errors.measure(outcome.trajectory, truth) + work(outcome.trajectory.counters)
+    found = errors.measure_errors(outcome.trajectory, truth) + work(outcome.trajectory.counters)
     return [case.row(value) for value in found]
 
 

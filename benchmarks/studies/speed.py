@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass, replace
 
 from conservative.method import Grid, grid_for
@@ -12,7 +11,7 @@ from conservative.outcome import OK
 
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import Timing, elapsed, interleaved
+from ..measures.timing import Timing, time_interleaved, wall_time
 from .case import Case, Done, attempt, unsupported
 from .study import Progress, Study
 
@@ -37,12 +36,12 @@ def end_only(grid: Grid, times: int = 1) -> Grid:
 
 
 def lengthen(case: Case, done: Done) -> tuple[Case, Done]:
-    """Return the case over so long a time that a call lasts about `CALL` s; as long as it gets there where the method fails.
+    """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
 
-    In several goes: the first, short runs are mostly what a call costs beside its steps, and say little of the steps.
+    The number is found in several rounds, because a short call is mostly overhead and says little of its steps.
     """
     bare, times = case, 1
-    while times < LONGEST and (spent := elapsed(done.run)) < CALL / 2:
+    while times < LONGEST and (spent := wall_time(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
         longer = replace(bare, grid=end_only(bare.grid, times))
         found = attempt(longer)
@@ -53,7 +52,7 @@ def lengthen(case: Case, done: Done) -> tuple[Case, Done]:
 
 
 @dataclass(frozen=True)
-class Timed:
+class TimedRun:
     """A case to be timed: as it is timed, and as it was at the first call."""
 
     case: Case
@@ -72,23 +71,25 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
         grid = end_only(grid_for(scene, scene.dt))
-        ready: dict[str, Timed] = {}
+        ready: dict[str, TimedRun] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
-            # A copy, as conversions are kept for each scene, and other studies have paid for this one's.
-            case = Case(study.name, copy(scene), method, grid)
+            scene.forget()  # what other studies have paid for
+            case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
             if isinstance(outcome, Done):
-                ready[method.name] = Timed(*lengthen(case, outcome), outcome)
+                ready[method.name] = TimedRun(*lengthen(case, outcome), outcome)
             else:
                 yield from case.blanks(blanks(*MEASURES), outcome.outcome)
         progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} methods")
-        timings = interleaved({name: timed.done.run for name, timed in ready.items()}, study.rounds, budget=study.timing_budget)
+        timings = time_interleaved(
+            {name: timed.done.run for name, timed in ready.items()}, study.rounds, budget=study.timing_budget
+        )
         for name, timed in ready.items():
             yield from times(timed, timings[name])
 
 
-def times(timed: Timed, timing: Timing) -> Iterator[Measurement]:
+def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
     """Yield the rows of one method."""
     steps = timed.done.trajectory.counters.steps or math.nan
     values = (

@@ -12,12 +12,12 @@ from conservative.trajectory import Trajectory
 from ..measures import errors
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import interleaved
+from ..measures.timing import time_interleaved
 from . import step_ladder
 from .case import Case, Done, Failed, attempt
 from .convergence import attempt_each
 from .selection import at_tolerance, series, tolerance_setting
-from .speed import CALL, Timed, end_only, lengthen
+from .speed import CALL, TimedRun, end_only, lengthen
 from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
@@ -66,21 +66,21 @@ def error_rows(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Me
     """Return the errors of one point; of one that failed the time as well, all without values."""
     if isinstance(outcome, Failed):
         return case.blanks(blanks(*ERRORS, Measure.TIME), outcome.outcome)
-    found = {value.measure: value for value in errors.measure(outcome.trajectory, truth)}
+    found = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
     return [case.row(found[measure]) for measure in ERRORS]
 
 
 def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, interleaved; the runs timed keep no sample but the last."""
-    ready: dict[str, Timed] = {}
+    ready: dict[str, TimedRun] = {}
     for case in cases:
         bare = replace(case, grid=end_only(case.grid))
         outcome = attempt(bare)
         if isinstance(outcome, Done):
-            ready[str(len(ready))] = Timed(*lengthen(bare, outcome), outcome)
+            ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome), outcome)
         else:
             yield from case.blanks(blanks(Measure.TIME), outcome.outcome)
     runs = {key: timed.done.run for key, timed in ready.items()}
-    timings = interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
+    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
     for key, timed in ready.items():
         yield timed.case.row(Value(Measure.TIME, timings[key].minimum / timed.simulated))

@@ -118,7 +118,7 @@ def nudge(scene: Scene, units: int) -> Scene:
 def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
     """Return errors and drifts at their largest, and the method's counters."""
     counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
-    found = errors.measure(trajectory, exact)
+    found = errors.measure_errors(trajectory, exact)
     return {value.key: value.value for value in found if value.measure in LARGEST} | counters
 
 
@@ -130,7 +130,7 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
     exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
     grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
     found = [attempt(Case("order", scene, method, grid)) for grid in grids]
-    sizes = [errors.measure(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
+    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
     order = observed_order([grid.dt for grid in grids], sizes)
     return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 

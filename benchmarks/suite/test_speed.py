@@ -8,7 +8,7 @@ import pytest
 
 from conservative.benchmarks.gate.pytest_plugin import REPEAT
 from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
-from conservative.benchmarks.measures.timing import interleaved, prepared
+from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
 from conservative.benchmarks.studies.case import Case, Done, attempt
 from conservative.benchmarks.studies.speed import end_only, lengthen
 from conservative.benchmarks.suite import points
@@ -34,7 +34,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     if reason:
         pytest.skip(reason)
     benchmark.group = scene.name
-    run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
+    run, last, cost = prepare_and_run(lambda: method.prepare(scene, end_only(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
@@ -54,7 +54,7 @@ def test_step_ratios(benchmark: Any) -> None:
     methods = [family() for family in list_families().values() if family.step_goals]
     names = dict.fromkeys(name for method in methods for name in (method.name, *dict(method.step_goals)))
     ready = {name: long_run(scene, named(name)) for name in names}
-    timings = interleaved({name: done.run for name, (_, done) in ready.items()}, rounds=15)
+    timings = time_interleaved({name: done.run for name, (_, done) in ready.items()}, rounds=15)
     per_step = {name: timings[name].minimum / case.grid.n_steps for name, (case, _) in ready.items()}
     labels = {name: case.method.label for name, (case, _) in ready.items()}
     benchmark.group = f"{scene.name}, ratios"
@@ -79,7 +79,7 @@ def test_call_overhead(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         call = partial(integrate, scene, scene.dt, method, FEW_STEPS * scene.dt)
         runs[method.name] = call
         runs[f"kernel of {method.name}"] = kernel_alone(call, method, monkeypatch)
-    timings = interleaved(runs, rounds=15, min_time=0.002)
+    timings = time_interleaved(runs, rounds=15, min_time=0.002)
     benchmark.group = "calls"
     benchmark.extra_info["definition"] = CALLS
     for method in compiled_methods():

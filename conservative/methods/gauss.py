@@ -95,7 +95,7 @@ class Gauss(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("gauss"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(self.stages, *padded_tableau(self.stages), grid.dt)
+        coefficients = kernel.Coefficients(self.stages, *pad_tableau(self.stages), grid.dt)
         return prepare_run(scene, grid, label, start, kernel, model, coefficients)
 
 
@@ -107,7 +107,7 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
 
 
 @lru_cache(maxsize=MOST_STAGES)
-def padded_tableau(stages: int) -> tuple[Array, ...]:
+def pad_tableau(stages: int) -> tuple[Array, ...]:
     """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
     table = tableau(stages)
     extra = (0, -len(table.b) % kernels("simd").LANES)

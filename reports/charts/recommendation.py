@@ -47,11 +47,11 @@ def picture(found: Recommendation) -> Any:
     """Return the chart."""
     data, prices = points(found), costs(found)
     names = series_order(data["method"])
-    panels = [_probes(part, str(kind), names, found.bench.error) for kind, part in data.groupby("kind", sort=True)]
+    panels = [_probes(part, str(kind), names, found.conditions.error) for kind, part in data.groupby("kind", sort=True)]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, names))
-    title = f"{found.bench.scene.name}: {found.bench.error:g} rad over {found.bench.duration:g} s"
+    title = f"{found.conditions.scene.name}: {found.conditions.error:g} rad over {found.conditions.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 

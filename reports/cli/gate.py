@@ -60,7 +60,7 @@ def gate(paths: Sequence[Path], kept: Path | None, times: str) -> Compared:
         A file holds no results, or there is no baseline.
     """
     before = baseline.read(kept or baseline.PATH)
-    return Compared([comparison.judged(before, found, cast(comparison.Times, times)) for found in _read(paths)])
+    return Compared([comparison.judge(before, found, cast(comparison.Times, times)) for found in _read(paths)])
 
 
 def update(paths: Sequence[Path], kept: Path | None, reason: str) -> Accepted:
@@ -73,7 +73,7 @@ def update(paths: Sequence[Path], kept: Path | None, reason: str) -> Accepted:
     """
     path = kept or baseline.PATH
     before = baseline.read(path) if path.exists() else None
-    after = baseline.updated(before, _read(paths), reason)
+    after = baseline.update_baseline(before, _read(paths), reason)
     baseline.write(after, path)
     return Accepted(path, len(after.rows), after.history[-1])
 

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from conservative import registry
+from conservative.benchmarks.recommendation.advice import Advice
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
-from conservative.benchmarks.recommendation.recommend import Advice, Recommendation, question, recommend
+from conservative.benchmarks.recommendation.question import ask
+from conservative.benchmarks.recommendation.recommend import Recommendation, recommend
 from conservative.benchmarks.studies.selection import tolerance_setting
 from conservative.errors import BadInput
 
@@ -40,7 +42,7 @@ def run(
     MissingEngine
         An engine that is named is not installed.
     """
-    asked = question(registry.scene(scene_name), error, duration, engines or None, limit)
+    asked = ask(registry.scene(scene_name), error, duration, engines or None, limit)
     with ExitStack() as files:
         streams = [files.enter_context(text_file(path, "out")) for path in _paths(out)]
         found = recommend(asked, step)
@@ -88,12 +90,12 @@ def finite(value: float) -> float | None:
 
 def as_json(found: Recommendation) -> str:
     """Return everything as JSON; null stands for what could not be measured, and for an attitude that is lost."""
-    bench, amplified = found.bench, found.bench.amplification
+    conditions, amplified = found.conditions, found.conditions.amplification
     content = {
-        "scene": bench.scene.name,
-        "error": bench.error,
-        "duration": bench.duration,
-        "cost_limit": bench.cost_limit,
+        "scene": conditions.scene.name,
+        "error": conditions.error,
+        "duration": conditions.duration,
+        "cost_limit": conditions.cost_limit,
         "cheapest": found.cheapest.line if found.cheapest else None,
         "recommendations": [_advice(advice) for advice in found.advice],
         "not_installed": list(found.missing),
@@ -102,7 +104,7 @@ def as_json(found: Recommendation) -> str:
             "checked_by": found.truth.names[1],
             "agreement": found.truth.agreement_rad,
             "checked_until": found.truth.checked_until,
-            "until": bench.truth_until,
+            "until": conditions.truth_until,
         },
         "motion": {
             "unstable": amplified.unstable,
@@ -151,12 +153,12 @@ def show(found: Recommendation) -> None:
     from rich.console import Console
 
     console = Console(soft_wrap=False)
-    bench = found.bench
-    asked = f"{bench.scene.name}: attitude error of at most {bench.error:g} rad over {bench.duration:g} s\n"
+    conditions = found.conditions
+    asked = f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s\n"
     console.print(asked, style="bold", markup=False)
     reaching = sorted((advice for advice in found.advice if advice.reached), key=lambda advice: advice.cost)
     failing = [advice for advice in found.advice if advice.best and not advice.reached]
-    limit = f"What does not, at up to {bench.cost_limit:g} s of computing per simulated second"
+    limit = f"What does not, at up to {conditions.cost_limit:g} s of computing per simulated second"
     if reaching:
         console.print(_table("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching]))
     if failing:
@@ -168,11 +170,11 @@ def show(found: Recommendation) -> None:
 
 def notes(found: Recommendation) -> list[str]:
     """Return in words what the figures rest on: laws of growth, truth, stability, what could not be tried."""
-    bench, truth, amplified = found.bench, found.truth, found.bench.amplification
+    conditions, truth, amplified = found.conditions, found.truth, found.conditions.amplification
     lines = [f"{called(a)}: {a.best.law}." for a in found.advice if a.best]
     lines.append(
         f"Truth: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the first "
-        f"{truth.checked_until:.3g} s; errors are measured over up to {bench.truth_until:.4g} s."
+        f"{truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s."
     )
     stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
     after = ", and by anything after that" if amplified.lost else ""

@@ -14,7 +14,7 @@ from typing import IO, Any
 
 from conservative import registry
 from conservative.attitude import orthonormality
-from conservative.benchmarks.measures.timing import elapsed
+from conservative.benchmarks.measures.timing import wall_time
 from conservative.errors import BadInput
 from conservative.integration import integrate, require_support
 from conservative.invariants import Invariant, sizes
@@ -85,7 +85,7 @@ def _trial(scene: Scene, method: Method, grid: Grid, written: bool, expect: Expe
     if grid.n_steps >= TRIAL:
         part = replace(grid, n_steps=grid.n_steps // TRIAL)
         _done(scene, method, part, None)
-        expect(TRIAL * elapsed(lambda: _done(scene, method, part, StringIO() if written else None)))
+        expect(TRIAL * wall_time(lambda: _done(scene, method, part, StringIO() if written else None)))
 
 
 def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:

@@ -50,7 +50,8 @@ def test_values_are_those_of_the_run():
     assert grid.dt == scene.dt
     assert grid.t[-1] == 6.0
     direct = {
-        value.key: value.value for value in errors.measure(cv.Reduced().run(scene, grid.dt), truth(scene, grid).trajectory)
+        value.key: value.value
+        for value in errors.measure_errors(cv.Reduced().run(scene, grid.dt), truth(scene, grid).trajectory)
     }
     assert table()["brick_flip", "reduced", "rate error max"].value == direct["rate error max"]
 

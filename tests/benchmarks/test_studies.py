@@ -101,7 +101,7 @@ def test_paper_says_how_well_the_truths_agree():
 def test_paper_errors_are_those_of_the_run():
     grid = grid_for(SCENE, 0.01)
     run = cv.integrate(SCENE, dt=0.01)
-    direct = {value.key: value.value for value in errors.measure(run, truth(SCENE, grid).trajectory)}
+    direct = {value.key: value.value for value in errors.measure_errors(run, truth(SCENE, grid).trajectory)}
     assert table("paper")["reduced", 0.01, "attitude error final"].value == direct["attitude error final"]
 
 

@@ -91,7 +91,7 @@ def test_the_lie_group_top_passes_next_to_straight_down():
     # (1 + cos theta) = 2.6e-13 there: where Euler's angles, or a root taken by subtraction, lose everything
     case = CASES["heavy_top_lie_group"]
     body, field = cv.RigidBody(numbers(case["J"])), cv.UniformGravity(1.0, numbers(case["weight_com_B"]))
-    # Tilts from the vertical, sampled finely: the smallest is what hard_cases.md calls 7e-7 rad
+    # Tilts from the vertical, sampled finely: the smallest is 7e-7 rad
     t = np.linspace(0, 2, 400_001)
     R, w = lagrange_top(body, field, np.eye(3), numbers(case["w0"]), t)
     tilt = np.hypot(R[:, 0, 1], R[:, 1, 1])

@@ -40,7 +40,7 @@ def test_run_equals_the_known_rates():
     done = conservative("run", "brick_flip", "--method", "reduced", "--dt", "0.01", "--json")
     assert done.exit_code == 0
     summary = json.loads(done.stdout)
-    # method.md, section 3: rates of the scheme itself at t = 6
+    # Rates of the scheme itself at t = 6
     error = np.abs(np.subtract(summary["last"]["w_WB_B"], (-0.2856185, 0.36022433, 9.99151229))).max()
     assert error < 1e-8  # measured 3.8e-9, the digits printed there
     assert summary["counters"]["steps"] == 600

@@ -39,7 +39,7 @@ def test_centre_of_mass_has_two_steps_and_the_analytical_line():
     positions = paper.centre_of_mass(study()[1])
     assert set(positions["run"]) == {"Δt = 0.01 s", "Δt = 0.005 s", "analytical"}
     last = positions[positions["run"] == "Δt = 0.01 s"].iloc[-1]
-    # The paper's top after 63 steps.
+    # Centre of mass of the paper's scheme after 63 steps
     assert abs(last["x1"] + 0.0589061) < 1e-7  # measured 5e-9, the digits printed there
     assert abs(last["x2"] + 0.02962542) < 1e-7  # measured 3e-9
 
