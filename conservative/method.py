@@ -161,8 +161,8 @@ class Method(ABC):
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
         Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs
-        that were prepared apart may overlap, in threads; nobody calls one run twice at a time.
+        of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
+        prepared apart may overlap, in threads; nobody calls one run twice at a time.
         """
 
     @classmethod
