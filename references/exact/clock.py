@@ -9,7 +9,8 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .theta import ComplexArray, Number, mp
+from .digits import Number, mp
+from .theta import ComplexArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,9 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
+from .digits import Number, mp
 from .start import Matrix, Start, Vector, as_array, cross, from_halves, halves_in_double, multiply, norm
-from .theta import Lattice, Number, Points, Quotient, Theta, jacobi, mp, theta
+from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
 
 
 @dataclass(frozen=True, eq=False)

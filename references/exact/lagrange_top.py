@@ -26,8 +26,9 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
+from .digits import Number, mp
 from .start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, halves_in_double, multiply, root, unit
-from .theta import ComplexArray, Lattice, Number, Points, Quotient, jacobi, mp, quotient
+from .theta import ComplexArray, Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
 """Roots of the cubic closer than this are one: its double roots come out with half of the 150 digits."""

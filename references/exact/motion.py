@@ -10,8 +10,8 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
+from .digits import mp
 from .start import Start, as_array, from_halves, norm
-from .theta import mp
 
 
 class Motion(Protocol):

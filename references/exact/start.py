@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .theta import Number, mp
+from .digits import Number, mp
 
 Vector = list[Number]
 Matrix = Any

@@ -12,23 +12,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from threading import RLock
 from typing import Any
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import Array
 
-mp = mpmath.MPContext()
-mp.prec = 500
+from .digits import Number, mp
 
-MP_LOCK = RLock()
-"""Held while `mp` is used: mpmath's functions raise the precision of their context while they run."""
-
-Number = Any
-"""A real or complex number of `mp`."""
 ComplexArray = NDArray[np.complex128]
 
 _BITS_KEPT = 600  # of a series, beside its first term: more than `mp` has

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from conservative.references.exact.clock import Clock, rotation_clock
-from conservative.references.exact.theta import Lattice, Points, jacobi, mp
+from conservative.references.exact.digits import mp
+from conservative.references.exact.theta import Lattice, Points, jacobi
 
 # From the sphere's parameter to the separatrix's, and next to both.
 PARAMETERS = ["0", "1e-30", "0.3", "0.4999", "0.5001", "0.97"]
