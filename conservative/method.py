@@ -105,7 +105,7 @@ class Method(ABC):
     module
         Module of an engine, whose import reports time; "" for none.
     kernel
-        Module in `conservative.kernels` whose function `march` takes all steps of a run; "" where there is none.
+        Module in `conservative.kernels` whose function `enter` takes all steps of a run; "" where there is none.
     step_goals
         Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
     """

@@ -24,12 +24,13 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        done, *work, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
+        done, stages, corrections, evaluations, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
         t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
         if failure is None and done < n_steps:
             kind = WrongBranch if elsewhere else NotConverged
             failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
-        return Trajectory(scene, t, R_WB, w_WB_B, label, Counters(done, *work), failure)
+        work = Counters(done, stages, corrections, evaluations)
+        return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
 
     return run
 
