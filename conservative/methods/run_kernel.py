@@ -38,7 +38,9 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 def turn_back(
     start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
 ) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times, attitudes and rates, body axes, of the first n samples; and the failure, if some are not finite.
+    """Return times (n,), s, attitudes (n, 3, 3), rates (n, 3), rad/s, body axes, of n samples; and the failure, if any.
+
+    From quaternions q (n, 4) and momenta L (n, 3), kg m^2/s, in the axes of `start`. It fails where a sample is not finite.
 
     The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
     """
