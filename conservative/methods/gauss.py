@@ -94,9 +94,8 @@ class Gauss(Method):
         return (cls(2),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (label, start, model) = kernels("gauss"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(self.stages, *pad_tableau(self.stages), grid.dt)
-        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        label, start, model = scene.derive(convert, self)
+        return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))
 
 
 def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
@@ -104,6 +103,12 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     frame = resolve_frame(method.frame, scene)
     start = principal_start(scene, frame)
     return replace(method, frame=frame).label, start, closed_system(start)
+
+
+@lru_cache(maxsize=256)
+def find_coefficients(stages: int, dt: float) -> Any:
+    """Return the kernel's coefficients of a step dt, s."""
+    return kernels("gauss").Coefficients(stages, *pad_tableau(stages), dt)
 
 
 @lru_cache(maxsize=MOST_STAGES)
