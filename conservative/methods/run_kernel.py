@@ -24,6 +24,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
+        # The fields of `conservative.kernels.protocol.Result`.
         done, stages, corrections, evaluations, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
         t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
         if failure is None and done < n_steps:
@@ -38,10 +39,9 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 def turn_back(
     start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
 ) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times (n,), s, attitudes (n, 3, 3), rates (n, 3), rad/s, body axes, of n samples; and the failure, if any.
+    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure, if some are not finite.
 
-    From quaternions q (n, 4) and momenta L (n, 3), kg m^2/s, in the axes of `start`. It fails where a sample is not finite.
-
+    They are made of the first n of q (., 4) and L (., 3), kg m^2/s, principal axes, up to the first that is not finite.
     The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
     """
     t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))
