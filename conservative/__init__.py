@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .errors import Diverged as Diverged
     from .errors import IntegrationFailed as IntegrationFailed
     from .errors import MissingEngine as MissingEngine
+    from .errors import MissingExtra as MissingExtra
     from .errors import NotConverged as NotConverged
     from .errors import PotentialFailed as PotentialFailed
     from .errors import Unsupported as Unsupported
@@ -68,6 +69,7 @@ _PLACES = {
     "LinearSpring": "potentials.point_to_point",
     "Method": "method",
     "MissingEngine": "errors",
+    "MissingExtra": "errors",
     "MoserVeselov": "methods.moser_veselov",
     "NotConverged": "errors",
     "Outcome": "outcome",
@@ -105,6 +107,7 @@ __all__ = [
     "LinearSpring",
     "Method",
     "MissingEngine",
+    "MissingExtra",
     "MoserVeselov",
     "NotConverged",
     "Outcome",

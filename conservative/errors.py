@@ -39,6 +39,18 @@ class MissingEngine(ImportError):
         super().__init__(f"engine: got {engine!r}, which is not installed; allowed after: pip install {package}")
 
 
+class MissingExtra(ImportError):
+    """Packages of an extra are not installed; the message has the line that installs them.
+
+    Attributes: `what` needs them, the names of the `packages`, and the `extra` that brings them.
+    """
+
+    def __init__(self, what: str, packages: str, extra: str) -> None:
+        self.what, self.packages, self.extra = what, packages, extra
+        allowed = f"allowed after: pip install 'conservative-rotation[{extra}]'"
+        super().__init__(f"{what}: got an environment without {packages}; {allowed}")
+
+
 class IntegrationFailed(ArithmeticError):
     """A run did not reach its end. Attribute: `outcome`, which trajectories and tables carry."""
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from .attitude import Array
-from .errors import BadInput, MissingEngine
+from .errors import BadInput
+from .extras import require_extra
 from .invariants import Invariant, sizes
 from .outcome import Outcome
 from .scene import Scene
@@ -91,13 +92,12 @@ def table(trajectory: Motion) -> pandas.DataFrame:
 
     Raises
     ------
-    MissingEngine
-        pandas is not installed.
+    MissingExtra
+        pandas, of the extra `report`, is not installed.
     """
-    try:
-        import pandas as pd
-    except ImportError:
-        raise MissingEngine("pandas", "pandas") from None
+    require_extra("Trajectory.to_pandas", "report", "pandas")
+    import pandas as pd
+
     frame = pd.DataFrame(samples(trajectory), columns=list(COLUMNS))
     frame.attrs = {"scene": trajectory.scene.name, "method": trajectory.label, "outcome": str(trajectory.outcome)}
     return frame
@@ -110,13 +110,12 @@ def picture(trajectory: Motion) -> altair.VConcatChart:
     ------
     BadInput
         The trajectory has no samples.
-    MissingEngine
-        Altair or pandas is not installed.
+    MissingExtra
+        Altair or pandas, of the extra `report`, is not installed.
     """
-    try:
-        import altair as alt
-    except ImportError:
-        raise MissingEngine("altair", "altair") from None
+    require_extra("Trajectory.plot", "report", "altair", "pandas")
+    import altair as alt
+
     if not len(trajectory):
         raise BadInput("trajectory", repr(trajectory), "one with a sample or more")
     rates = {f"about axis {number}": rate for number, rate in enumerate(trajectory.w_WB_B.T, start=1)}

@@ -132,8 +132,8 @@ class Trajectory:
 
         Raises
         ------
-        MissingEngine
-            pandas is not installed.
+        MissingExtra
+            pandas, of the extra `report`, is not installed.
         """
         return presentation.table(self)
 
@@ -144,8 +144,8 @@ class Trajectory:
         ------
         BadInput
             There are no samples.
-        MissingEngine
-            Altair or pandas is not installed.
+        MissingExtra
+            Altair or pandas, of the extra `report`, is not installed.
         """
         return presentation.picture(self)
 

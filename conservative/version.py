@@ -1,3 +1,3 @@
 """The version, which every label of ours carries."""
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"

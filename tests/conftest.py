@@ -1,6 +1,11 @@
 """Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip."""
 
+import os
+import tarfile
+
 import pytest
+
+from .environments import ROOT, build
 
 
 def pytest_addoption(parser):
@@ -9,6 +14,8 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "browser: needs chromium; runs with --browser")
+    for name in [name for name in os.environ if name.startswith("PYTEST_XDIST")]:
+        del os.environ[name]  # a pytest that a test starts is no worker, and pytest-benchmark would take it for one
 
 
 def pytest_collection_modifyitems(config, items):
@@ -17,3 +24,19 @@ def pytest_collection_modifyitems(config, items):
     for item in items:
         if item.get_closest_marker("browser"):
             item.add_marker(pytest.mark.skip(reason="needs chromium and its driver: runs with --browser"))
+
+
+@pytest.fixture(scope="session")
+def sdist(tmp_path_factory):
+    """The source distribution of this checkout."""
+    return build(ROOT, "sdist", tmp_path_factory.mktemp("sdist"))
+
+
+@pytest.fixture(scope="session")
+def wheel(sdist, tmp_path_factory):
+    """The wheel that pip builds from the source distribution."""
+    folder = tmp_path_factory.mktemp("source")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    (source,) = folder.iterdir()
+    return build(source, "wheel", tmp_path_factory.mktemp("wheel"))

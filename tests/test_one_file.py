@@ -10,12 +10,13 @@ import pytest
 
 import conservative as cv
 from conservative import entry_points, registry
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import automatic
 from conservative.reports.charts import style
-from conservative.reports.tables import claims
+from conservative.reports.tables import claims, orders
 
 from .reports.rows import row
 
@@ -150,9 +151,11 @@ def test_its_claims_are_checked(installed, drift, order, verdict):
     common = {"scene": "brick_flip"}
     rows = [row("convergence", "borrowed:parts=2", "attitude error max", dt**order, dt, **common) for dt in steps]
     rows += [row("paper", "borrowed", f"{quantity} drift max", drift, 0.01, **common) for quantity in ("energy", "momentum")]
-    assert not claims.findings(frame(rows), [cv.scenes.brick_flip()])
+    table, scenes = frame(rows), [cv.scenes.brick_flip()]
+    fits = orders.fits(orders.errors(table, Measure.ATTITUDE_MAX))
+    assert not claims.findings(table, fits, scenes)
     installed(SOURCE)
-    found = {each.claim: each for each in claims.findings(frame(rows), [cv.scenes.brick_flip()])}
+    found = {each.claim: each for each in claims.findings(table, fits, scenes)}
     assert {claim: each.verdict for claim, each in found.items()} == {
         "borrowed keeps energy to round-off (brick_flip)": verdict,
         "borrowed:parts=2 is of order 2 (brick_flip)": verdict,
@@ -187,10 +190,12 @@ NEEDY = SOURCE.replace(
 
 def test_a_method_without_what_it_needs_breaks_nothing(installed):
     top = cv.scenes.asymmetric_top()
-    before = automatic.candidates(top), claims.findings(frame([]), [])
+    nothing = frame([])
+    fits = orders.fits(orders.errors(nothing, Measure.ATTITUDE_MAX))
+    before = automatic.candidates(top), claims.findings(nothing, fits, [])
     installed(NEEDY)
     assert "borrowed" in registry.list_families()
-    assert (automatic.candidates(top), claims.findings(frame([]), [])) == before
+    assert (automatic.candidates(top), claims.findings(nothing, fits, [])) == before
     missing = [point.method for point in points.points() if point.method.name == "borrowed"]
     assert {type(method) for method in missing} == {selection.Missing}
 

@@ -7,45 +7,14 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, THEIRS, TOP, X1, X2
-
+from ..tables.lines import ANALYTICAL
 from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, styled
 
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
 
 
-ANALYTICAL = "analytical"
-
-
-def _lines(samples: pd.DataFrame, scene: str, quantities: tuple[str, ...]) -> pd.DataFrame:
-    rows = samples[(samples["study"] == "paper_figures") & (samples["scene"] == scene)]
-    return rows[rows["quantity"].isin(quantities)]
-
-
-def body_rates(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return figure 1(a), columns t (s), component, rate (rad/s): body rates of the brick, dt = 0.01, eps = 1e-8."""
-    rows = _lines(samples, BRICK, RATES)
-    return rows[rows["method"] == THEIRS].rename(columns={"quantity": "component", "value": "rate"})
-
-
-def conservation(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return figures 1(b), 1(c), columns t (s), method, energy and momentum: errors of energy and |L|, relative, signed."""
-    return _wide(_lines(samples, BRICK, (ENERGY, MOMENTUM)), "method")
-
-
-def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return figures 2(b), 2(c), columns t (s), run, x1, x2 (m): centre of mass of the top for two steps, and exact."""
-    rows = _lines(samples, TOP, (X1, X2))
-    names = [ANALYTICAL if who == EXACT else f"Δt = {dt:g} s" for who, dt in zip(rows["method"], rows["dt"], strict=True)]
-    return _wide(rows.assign(run=names), "run")
-
-
-def _wide(rows: pd.DataFrame, line: str) -> pd.DataFrame:
-    return rows.pivot(index=[line, "t"], columns="quantity", values="value").reset_index()
-
-
 def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
-    """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `paper` for the columns."""
+    """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
     b = _error_panel(errors, "energy", "(b) Energy", "relative error of energy")
     c = _error_panel(errors, "momentum", "(c) Length of the angular momentum", "relative error of |L|")
     return styled(alt.hconcat(_rates_panel(rates), alt.vconcat(b, c)).resolve_scale(color="independent"))

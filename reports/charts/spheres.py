@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 
-from conservative.benchmarks.studies.sphere_curves import AXES, pick
-from conservative.method import Method
-
-from ..labels import shown
 from .style import GREY, colours
 from .vega_embed import Spec, as_csv
 
@@ -18,32 +12,12 @@ TURN, TILT = 35, 25
 """Where the spheres are looked at from at first, degrees."""
 
 
-def absent(found: pd.DataFrame, scene: str, methods: Sequence[Method]) -> list[str]:
-    """Return the names of the methods that should be drawn on a scene and could not."""
-    drawn = set(found[found["scene"] == scene]["method"])
-    return [method.name for method in pick(methods) if method.name not in drawn]
+def chart(curves: pd.DataFrame, scene: str, series: str) -> Spec:
+    """Return one sphere, from `lines.curves`, as a Vega-Lite specification with parameters `turn` and `tilt`, degrees.
 
-
-def curves(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return curves: columns scene, method, series, and the point x, y, z, in units of the sphere's radius at the start."""
-    rows = samples[samples["study"] == "sphere_curves"]
-    lines = [line for _, line in rows.groupby(["scene", "method"], sort=False)]
-    return pd.concat(map(_curve, lines), ignore_index=True) if lines else pd.DataFrame(columns=list(COLUMNS))
-
-
-COLUMNS = ("scene", "method", "series", *AXES)
-
-
-def _curve(line: pd.DataFrame) -> pd.DataFrame:
-    first = line.iloc[0]
-    names = {"scene": first["scene"], "method": first["method"], "series": shown(first["method"], first["label"])}
-    points = {axis: line[line["quantity"] == axis]["value"].to_numpy() for axis in AXES}
-    return pd.DataFrame(names | points, columns=list(COLUMNS))
-
-
-def chart(found: pd.DataFrame, scene: str, series: str) -> Spec:
-    """Return one sphere as a Vega-Lite specification with the parameters `turn` and `tilt`, degrees; the far side is faint."""
-    rows = found[(found["scene"] == scene) & (found["series"] == series)]
+    The far side is faint.
+    """
+    rows = curves[(curves["scene"] == scene) & (curves["series"] == series)]
     points = [
         {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(rows[["x", "y", "z"]].round(4).to_numpy().tolist())
     ]

@@ -36,6 +36,11 @@ class Provenance:
         """Versions of what can change a number, by package."""
         return {name: self.packages.get(name, "not installed") for name in COMPARED}
 
+    @property
+    def others(self) -> list[str]:
+        """Name and version of every other package."""
+        return [f"{name} {version}" for name, version in self.packages.items() if name not in COMPARED]
+
 
 def provenance(arguments: list[str] | None = None) -> Provenance:
     """Return the provenance of this process; `arguments` are those of the command, default this process's."""

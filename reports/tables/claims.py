@@ -14,19 +14,22 @@ from typing import Any
 import pandas as pd
 
 from conservative import registry
-from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measure import Measure, key
 from conservative.declarations import BetterEnergy, Claims, Comparison, SameErrors
 from conservative.errors import MissingEngine
 from conservative.method import Method
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
-from . import orders
-from .overview import Cell, Cells
-from .tables import keyed, number
+from .cells import Cell, Grade, Table, number
+from .rows import keyed
 
-HOLDS, FAILS, OPEN = Cell("✓ holds", "good"), Cell("✗ does not hold", "bad"), Cell("– not measured here", "none")
-ENERGY = "energy drift max"
+HOLDS, FAILS, OPEN = (
+    Cell("✓ holds", Grade.GOOD),
+    Cell("✗ does not hold", Grade.BAD),
+    Cell("– not measured here", Grade.NONE),
+)
+ENERGY, ATTITUDE = key(Measure.DRIFT_MAX, "energy"), key(Measure.ATTITUDE_MAX)
 ROUND_OFF = 1e-12
 """Relative drift up to which a quantity is taken to be kept to round-off over the paper's runs."""
 NO_TRUNCATION = 1e-11
@@ -50,16 +53,16 @@ class Finding:
     verdict: Cell
 
 
-def findings(table: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
-    """Return every claim that the report can say something about."""
+def findings(table: pd.DataFrame, fits: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
+    """Return every claim that the report can say something about; `fits` are those of the attitude's error, see `orders`."""
     by_name = {scene.name: scene for scene in scenes}
-    of_methods = [*_conservation(table, by_name), *_orders(table), *_exactness(table)]
+    of_methods = [*_conservation(table, by_name), *_orders(fits), *_exactness(table)]
     return [*of_methods, *_comparisons(table, by_name), *_factor_four(table)]
 
 
-def as_cells(found: list[Finding]) -> Cells:
+def as_table(findings: list[Finding]) -> Table:
     """Return the findings as a table."""
-    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in found]
+    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in findings]
 
 
 def _judge(holds: bool) -> Cell:
@@ -75,10 +78,10 @@ def _claimed(settings: Settings) -> Iterator[tuple[Method, Claims]]:
     """Yield settings of each family; none of one whose engine is not installed."""
     for family, claims in _families():
         try:
-            found = tuple(settings(family))
+            methods = tuple(settings(family))
         except MissingEngine:
             continue
-        yield from ((method, claims) for method in found)
+        yield from ((method, claims) for method in methods)
 
 
 def _default(family: type[Method]) -> tuple[Method, ...]:
@@ -118,13 +121,12 @@ def _worst(rows: pd.DataFrame) -> float:
     return math.inf if rows["value"].isna().any() else float(rows["value"].max())
 
 
-def _orders(table: pd.DataFrame) -> Iterator[Finding]:
+def _orders(fits: pd.DataFrame) -> Iterator[Finding]:
     claimed = {method.name: (method.order, claims.source) for method, claims in _claimed(lambda cls: cls.audit_settings())}
-    rows = table[(table["study"] == "convergence") & table["method"].isin(list(claimed))]
-    for (method, scene), members in rows.groupby(["method", "scene"], sort=False):
-        fits, (order, source) = orders.fits(orders.errors(members)), claimed[str(method)]
-        if order is not None and len(fits):
-            yield _order(f"{method} is of order {order} ({scene})", source, order, fits.iloc[0])
+    for _, fit in fits[fits["method"].isin(list(claimed))].iterrows():
+        order, source = claimed[fit["method"]]
+        if order is not None:
+            yield _order(f"{fit['method']} is of order {order} ({fit['scene']})", source, order, fit)
 
 
 def _order(claim: str, where: str, order: int, fit: pd.Series[Any]) -> Finding:
@@ -139,7 +141,7 @@ def _exactness(table: pd.DataFrame) -> Iterator[Finding]:
     for method, claims in _claimed(_default):
         if method.candidacy is None or not method.candidacy.exact:
             continue
-        for scene, members in _measured(table, method.name, orders.ERROR).groupby("scene", sort=False):
+        for scene, members in _measured(table, method.name, ATTITUDE).groupby("scene", sort=False):
             worst, claim = _worst(members), f"{method.name} has no truncation error ({scene})"
             measured = f"largest attitude error {number(worst)} rad, bound {NO_TRUNCATION:g}"
             yield Finding(claim, claims.source, measured, _judge(worst <= NO_TRUNCATION))
@@ -159,7 +161,7 @@ def _compare(claim: Comparison, source: str, table: pd.DataFrame, scenes: Scenes
 
 
 def _compare_errors(claim: SameErrors, source: str, table: pd.DataFrame, scenes: Scenes) -> Iterator[Finding]:
-    one, other = (_measured(table, method, orders.ERROR)[["scene", "dt", "value"]] for method in claim.methods)
+    one, other = (_measured(table, method, ATTITUDE)[["scene", "dt", "value"]] for method in claim.methods)
     both = one.merge(other, on=["scene", "dt"], suffixes=("", "_other")).dropna()
     for scene, rows in both.groupby("scene", sort=False):
         if claim.free and not scenes[str(scene)].free:

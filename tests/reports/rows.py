@@ -4,7 +4,6 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, frame
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.reports.tables.work_precision import ERROR, TIME
 
 
 def row(study, method, measure, value, dt=0.1, **fields):
@@ -33,7 +32,10 @@ def row(study, method, measure, value, dt=0.1, **fields):
 def point(line, role, error, time, dt=0.1, scene="made_up", label=None, method=None, outcome="ok"):
     method = method or line
     common = {"dt": dt, "scene": scene, "label": label or method, "role": role, "series": line, "outcome": outcome}
-    return [row("work_precision", method, ERROR, error, **common), row("work_precision", method, TIME, time, **common)]
+    return [
+        row("work_precision", method, Measure.ATTITUDE_MAX, error, **common),
+        row("work_precision", method, Measure.TIME, time, **common),
+    ]
 
 
 def table(*groups):

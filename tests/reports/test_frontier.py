@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.tables import headline, work_precision
 
 from .rows import point, row, table
@@ -37,7 +38,7 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
 
 def test_nothing_is_claimed_below_what_the_truth_is_known_to():
     def agreement(label):
-        return [row("paper", "truth", work_precision.AGREEMENT, 1e-5, label=label, role="truth")]
+        return [row("paper", "truth", Measure.AGREEMENT, 1e-5, label=label, role="truth")]
 
     checked = work_precision.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
     assert [c.error for c in work_precision.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]

@@ -2,6 +2,7 @@ import json
 import re
 import xml.etree.ElementTree as ET
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -11,8 +12,11 @@ from conservative import BadInput, MissingEngine, NotConverged, Reduced, registr
 from conservative.benchmarks.measures.measurement import COLUMNS, frame
 from conservative.reports import document
 from conservative.reports.charts import style
-from conservative.reports.cli.main import _listed, main
+from conservative.reports.cli.main import main
+from conservative.reports.cli.options import split_names
+from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
+from conservative.reports.tables import runs
 
 from .rows import row
 
@@ -41,8 +45,8 @@ def test_progress_is_off_where_there_is_no_terminal(made):
 
 
 def test_progress_never_goes_back_and_ends_near_the_whole():
-    made = document.plan([], ["reduced", "mujoco:RK4"], quick=True)
-    spans = list(made.spans(made.pieces).values())
+    made = plan_report([], ["reduced", "mujoco:RK4"], quick=True)
+    spans = list(made.spans(made.names).values())
     assert spans[0][0] == 0
     assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
     assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
@@ -100,7 +104,7 @@ def test_report_that_is_stopped_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
+        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -111,7 +115,7 @@ def test_folder_is_checked_before_any_work(tmp_path):
         pytest.fail("work was begun")
 
     with pytest.raises(BadInput, match=r"out: got .*mine.txt"):
-        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path, fail)
+        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path, fail)
 
 
 @pytest.mark.parametrize(
@@ -139,8 +143,8 @@ def test_missing_engine_stops_the_plan_unless_it_is_skipped(monkeypatch):
 
     monkeypatch.setattr(type(registry.method("mujoco")), "label", property(missing))
     with pytest.raises(MissingEngine, match="pip install mujoco"):
-        document.plan(["brick_flip"], ["mujoco"])
-    assert len(document.plan(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
+        plan_report(["brick_flip"], ["mujoco"])
+    assert len(plan_report(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
 
 
 def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypatch):
@@ -151,8 +155,8 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
 
     monkeypatch.setattr(registry, "method", method)
     with pytest.raises(MissingEngine, match="pip install pin"):
-        document.plan(["brick_flip"], [])
-    assert "pinocchio" in [method.name for method in document.plan(["brick_flip"], [], skip_missing=True).methods]
+        plan_report(["brick_flip"], [])
+    assert "pinocchio" in [method.name for method in plan_report(["brick_flip"], [], skip_missing=True).methods]
 
 
 def test_failure_of_ours_is_told(monkeypatch):
@@ -161,17 +165,17 @@ def test_failure_of_ours_is_told(monkeypatch):
         row("paper", "reduced", "energy drift max", float("nan"), 0.01, scene="brick_flip", outcome=each)
         for each in (outcome, "unsupported")
     ]
-    measured = document.Measured(frame(found), pd.DataFrame())
-    assert document.failed(measured) == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
-    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: measured)
+    failed = runs.failures_of_ours(frame(found))
+    assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
+    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed))
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr
 
 
 def test_names_with_settings_are_kept_together():
-    assert _listed("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
-    assert _listed("methods", ()) == []
+    assert split_names("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
+    assert split_names("methods", ()) == []
 
 
 @pytest.mark.parametrize("option", ["--scenes", "--methods"])

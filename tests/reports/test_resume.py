@@ -19,8 +19,9 @@ from conservative.method import Role
 from conservative.reports import document
 from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
+from conservative.reports.run.measure import measure
+from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.terminal.interrupts import Terminated, interruptible, unstoppable
 
 from .rows import row
 
@@ -95,9 +96,9 @@ def test_resume_does_the_rest_and_tidies_up(resumed):
 
 
 def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(resumed, tmp_path):
-    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
-    kept = checkpoint.begun(made, tmp_path / "report", provenance(SMALL), resume=False)
-    document.measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
+    made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    kept = checkpoint.begin(made, tmp_path / "report", provenance(SMALL), resume=False)
+    measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
     found, whole = (pd.read_csv(path) for path in (resumed[0] / "report" / "measurements.csv", tmp_path / "whole.csv"))
     assert len(found) > 100
     timed = found["unit"].isin(TIMES)
@@ -122,12 +123,12 @@ def test_a_resumed_report_says_so(resumed):
     made = json.loads((folder / "report" / "measurements.json").read_text())
     assert len(made["resumed"]) == 1
     assert made["resumed"][0].startswith(f"{', '.join(content['pieces'])}: measured by an earlier process")
-    assert by["begun"] in made["resumed"][0]
+    assert by["start"] in made["resumed"][0]
     assert made["command"].endswith("--resume")
     for name in ("report.md", "index.html"):
         text = (folder / "report" / name).read_text()
         assert "interrupted and resumed" in text
-        assert by["begun"] in text
+        assert by["start"] in text
 
 
 def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
@@ -143,9 +144,9 @@ def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
 def unfinished(tmp_path, monkeypatch):
     """A folder with the file of a report that has finished one study."""
     monkeypatch.chdir(tmp_path)
-    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     source = provenance(SMALL)
-    kept = checkpoint.begun(made, Path("report"), source, resume=False)
+    kept = checkpoint.begin(made, Path("report"), source, resume=False)
     line = {"study": "paper", "scene": "brick_flip", "method": "reduced", "label": "reduced", "role": Role.OURS, "dt": 0.1}
     lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
     kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
@@ -216,7 +217,7 @@ def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finish
     def stop(share, what):
         raise KeyboardInterrupt
 
-    made = document.plan(["brick_flip"], ["reduced:order=4"], quick=True)
+    made = plan_report(["brick_flip"], ["reduced:order=4"], quick=True)
     with pytest.raises(KeyboardInterrupt):
         document.write(made, unfinished / "report", stop)
     assert (unfinished / "report.partial.json").read_text() == before
@@ -227,53 +228,11 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
         if what.startswith("convergence"):
             raise BadInput("dt", "0", "above 0")
 
-    made = document.plan(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+    made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         document.write(made, tmp_path / "report", fail)
     assert "1 of 8 studies are finished (paper)" in caught.value.__notes__[0]
     assert pieces(tmp_path / "report.partial.json") == ["paper"]
-
-
-@pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt, 130), (Terminated, 143)])
-def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
-    def stopping(*arguments):
-        raise stop
-
-    monkeypatch.setattr("conservative.reports.cli.recommend.run", stopping)
-    done = CliRunner().invoke(main, ["recommend", "brick_flip"])
-    assert (done.exit_code, done.stdout, done.stderr) == (code, "", "Interrupted\n")
-
-
-def test_sigterm_is_an_interrupt_only_inside():
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(Terminated), interruptible(signal.SIGTERM):
-        signal.raise_signal(signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) == before
-
-
-def lost(number):
-    try:
-        signal.raise_signal(number)
-    except BaseException as error:
-        other = SystemError("what numba makes of it while it loads compiled code")
-        other.add_note("kept")
-        raise other from error
-
-
-@pytest.mark.parametrize(("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated)])
-def test_an_interrupt_is_not_lost_in_another_exception(number, kind):
-    with pytest.raises(kind) as caught, interruptible(number):
-        lost(number)
-    assert caught.value.__notes__ == ["kept"]
-
-
-def test_what_is_ignored_stays_ignored():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with interruptible(signal.SIGINT):
-            signal.raise_signal(signal.SIGINT)
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])
@@ -284,9 +243,3 @@ def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
     found = (here / checkpoint.path_for(Path(out))).resolve()
     folder = (here / out).resolve()
     assert found == folder.parent / f"{folder.name}.partial.json"
-
-
-def test_interrupts_wait_outside_of_what_belongs_together():
-    with unstoppable():
-        signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
