@@ -1,17 +1,27 @@
 """What is public is documented, and what the documents show runs."""
 
 import importlib
+import importlib.util
 import inspect
 import pkgutil
 import re
-from pathlib import Path
+import subprocess
+import sys
+import tomllib
 
+import click
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 import conservative
+import conservative as cv
+from conservative import registry
+from conservative.reports.cli.main import main
 
-ROOT = Path(__file__).parent.parent
-BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+from .pages import ROOT, blocks, dead_links, links, pages, shell_lines
+
+NOTEBOOK = ROOT / "reports" / "documentation" / "from_body_to_verdict.ipynb"
 
 
 def modules():
@@ -52,7 +62,110 @@ def documented(module, name, member):
     return any(inspect.getdoc(vars(base)[attribute]) for base in vars(module)[owner].__mro__ if attribute in vars(base))
 
 
-@pytest.mark.parametrize("block", BLOCK.findall((ROOT / "README.md").read_text()))
-def test_code_in_the_readme_runs(block, tmp_path, monkeypatch):
+def cases(language):
+    """Return a parameter for each block of a language on each page."""
+    found = [(page, code) for page in pages() for code in blocks(page.read_text(encoding="utf-8"), language)]
+    return [pytest.param(page, code, id=f"{name_of(page)}-{number}") for number, (page, code) in enumerate(found)]
+
+
+def name_of(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize(("page", "block"), cases("python"))
+def test_code_on_a_page_runs(page, block, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    exec(compile(block, "README.md", "exec"), {"__name__": "__readme__"})
+    exec(compile(block, name_of(page), "exec"), {"__name__": "__page__"})
+
+
+@pytest.mark.parametrize(("page", "block"), cases("toml"))
+def test_toml_on_a_page_is_a_scene_or_entry_points(page, block, tmp_path):
+    if "[body]" in block:
+        (tmp_path / "my_body.toml").write_text(block)
+        assert cv.integrate(registry.scene(str(tmp_path / "my_body.toml")), t_end=0.05).ok
+    else:
+        assert set(tomllib.loads(block)["project"]["entry-points"]) <= {registry.METHODS, registry.SCENES}
+
+
+def test_the_pages_of_all_rooms_are_found():
+    names = {name_of(page) for page in pages()}
+    assert {"README.md", *(f"{room}/README.md" for room in ("conservative", "references", "benchmarks", "reports"))} <= names
+    assert len(pages()) == len({page.resolve() for page in pages()})
+
+
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_links_lead_somewhere(page):
+    assert not dead_links(page)
+
+
+def test_dead_links_are_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# One `word`, two\n[a](#one-word-two) [b](#three) [c](page.md#one-word-two) ![d](no.svg)\n\n    [e](x)\n")
+    assert dead_links(page) == ["#three", "no.svg"]
+
+
+@pytest.fixture(scope="module")
+def pytest_options():
+    told = subprocess.run([sys.executable, "-m", "pytest", "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(re.findall(r"--[\w-]+", told.stdout))
+
+
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_commands_on_a_page_are_known(page, pytest_options):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    for words in shell_lines(page.read_text(encoding="utf-8")):
+        check_command(words, pytest_options, extras)
+
+
+def check_command(words, options, extras):
+    """Raise where a command of ours has no such option, pytest has none, or there is no such module or extra."""
+    match words:
+        case ["conservative", name, *arguments]:
+            main.commands[name].make_context(name, arguments)
+        case ["python", "-m", module, *_]:
+            assert importlib.util.find_spec(module), module
+        case ["pytest", *arguments]:
+            assert {word.partition("=")[0] for word in arguments if word.startswith("--")} <= options, words
+        case ["pip", "install", *arguments]:
+            named = re.findall(r"\[([\w,]+)\]", " ".join(arguments))
+            assert {extra for names in named for extra in names.split(",")} <= set(extras), words
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "conservative report --fast",
+        "conservative conserve",
+        "python -m conservative.reports.nothing",
+        "pytest --benchmark --gait",
+        "pip install '.[evrything]'",
+    ],
+)
+def test_unknown_commands_are_found(line):
+    with pytest.raises((click.UsageError, KeyError, AssertionError)):
+        check_command(*(shell_lines(f"    {line}\n")), {"--benchmark", "--gate"}, {"all": []})
+
+
+def test_the_readme_is_short_and_leads_to_every_room():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 130
+    assert {"conservative/README.md", "references/README.md", "benchmarks/README.md", "reports/README.md"} <= set(links(text))
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def cells_with_outputs(notebook):
+    return [cell.id for cell in code_cells(notebook) if cell.outputs or cell.execution_count]
+
+
+def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    nbformat.validate(notebook)
+    assert not cells_with_outputs(notebook)
+    NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
+    assert cells_with_outputs(notebook)
+    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in code_cells(notebook) if cell.outputs}
+    assert "moser_veselov" in shown["cheapest"]
+    assert "mujoco" in shown["runs"]
