@@ -102,8 +102,10 @@ class Method(ABC):
         What is claimed of it, and where: reports check `order` and `conserves` against that. None where nobody claims anything.
     colour
         A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
+    module
+        Module of an engine, whose import reports time; "" for none.
     kernel
-        Module in `conservative.kernels` whose function `march` takes all steps of a run; "" where there is none.
+        Module in `conservative.kernels` whose function `enter` takes all steps of a run; "" where there is none.
     step_goals
         Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
     """
@@ -113,6 +115,7 @@ class Method(ABC):
     candidacy: ClassVar[Candidacy | None] = None
     claims: ClassVar[Claims | None] = None
     colour: ClassVar[str | None] = None
+    module: ClassVar[str] = ""
     kernel: ClassVar[str] = ""
     step_goals: ClassVar[tuple[tuple[str, float], ...]] = ()
 

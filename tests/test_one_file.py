@@ -12,7 +12,7 @@ import conservative as cv
 from conservative import entry_points, registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
-from conservative.benchmarks.studies import hard_cases, selection, sphere_curves
+from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import automatic
 from conservative.reports.charts import style
@@ -25,6 +25,7 @@ GENERIC = (
     "conservative/declarations.py",
     "conservative/methods/automatic.py",
     "benchmarks/studies/hard_cases.py",
+    "benchmarks/studies/import_time.py",
     "benchmarks/studies/selection.py",
     "benchmarks/studies/sphere_curves.py",
     "benchmarks/suite/points.py",
@@ -160,6 +161,14 @@ def test_its_claims_are_checked(installed, drift, order, verdict):
         "borrowed:parts=2 is of order 2 (brick_flip)": verdict,
     }
     assert {each.where for each in found.values()} == {"its manual"}
+
+
+def test_the_import_of_an_engine_is_timed(installed):
+    before = import_time.modules()
+    installed(
+        SOURCE.replace("Role.OURS", "Role.ENGINE").replace("    colour:", '    module: ClassVar[str] = "json"\n    colour:')
+    )
+    assert import_time.modules() == before | {"json": cv.Role.ENGINE}
 
 
 def test_a_method_need_not_say_anything(installed):

@@ -6,8 +6,9 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+from conservative import registry
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
 
@@ -15,29 +16,28 @@ from ..measures.measure import Measure
 from ..measures.measurement import Measurement
 from .study import Progress, Study
 
-MODULES: Mapping[str, Role] = {
-    "conservative": Role.OURS,
-    "mujoco": Role.ENGINE,
-    "pinocchio": Role.ENGINE,
-    "heyoka": Role.ENGINE,
-    "scipy.integrate": Role.ENGINE,
-}
 ROUNDS = 3
+
+
+def modules() -> dict[str, Role]:
+    """Return the modules that are timed: our own, and those that registered engines name."""
+    engines = [family for family in registry.list_families().values() if family.role is Role.ENGINE and family.module]
+    return {"conservative": Role.OURS} | {family.module: Role.ENGINE for family in engines}
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield a row for each library: the least of some rounds, of a quick study of one; its name stands for the method."""
-    bare = math.inf
-    found = dict.fromkeys(MODULES, math.inf)
+    bare, roles = math.inf, modules()
+    found = dict.fromkeys(roles, math.inf)
     rounds = 1 if study.quick else ROUNDS
     for number in range(rounds):  # interleaved, so that a slow spell of the machine hits all alike
         progress(number, rounds, "fresh interpreters")
         bare = min(bare, import_time(""))
         found = {name: min(seconds, import_time(name)) for name, seconds in found.items()}
-    yield from (row(study, name, seconds - bare) for name, seconds in found.items())
+    yield from (row(study, name, roles[name], seconds - bare) for name, seconds in found.items())
 
 
-def row(study: Study, module: str, seconds: float) -> Measurement:
+def row(study: Study, module: str, role: Role, seconds: float) -> Measurement:
     """Return the row of a library that took so long, s; inf stands for one that cannot be imported."""
     known = math.isfinite(seconds)
     return Measurement(
@@ -45,7 +45,7 @@ def row(study: Study, module: str, seconds: float) -> Measurement:
         scene="",
         method=module,
         label=module,
-        role=MODULES[module],
+        role=role,
         series=module,
         dt=math.nan,
         measure=Measure.IMPORT,

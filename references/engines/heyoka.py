@@ -55,6 +55,7 @@ class Heyoka(Method):
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
     colour: ClassVar[str] = "green"
+    module: ClassVar[str] = "heyoka"
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:

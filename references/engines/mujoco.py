@@ -80,6 +80,7 @@ class MuJoCo(Method):
         ),
     )
     colour: ClassVar[str] = "vermilion"
+    module: ClassVar[str] = "mujoco"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)

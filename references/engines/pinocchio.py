@@ -47,6 +47,7 @@ class Pinocchio(Method):
     family: ClassVar[str] = "pinocchio"
     role: ClassVar[Role] = Role.ENGINE
     colour: ClassVar[str] = "purple"
+    module: ClassVar[str] = "pinocchio"
 
     def __post_init__(self) -> None:
         choice("scheme", self.scheme, SCHEMES)

@@ -52,6 +52,7 @@ class SciPy(Method):
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
     colour: ClassVar[str] = "orange"
+    module: ClassVar[str] = "scipy.integrate"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
