@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass, replace
 
 from conservative.method import Grid, grid_for
@@ -75,8 +74,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         ready: dict[str, TimedRun] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
-            # A copy, as conversions are kept for each scene, and other studies have paid for this one's.
-            case = Case(study.name, copy(scene), method, grid)
+            scene.forget()  # or preparing would be free where another study has paid for it
+            case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
             if isinstance(outcome, Done):
                 ready[method.name] = TimedRun(*lengthen(case, outcome), outcome)

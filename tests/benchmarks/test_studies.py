@@ -229,3 +229,19 @@ def test_the_studies_of_a_report_share_their_truths():
     assert [study.name for study in found] == list(studies.CROSSED)
     assert len({id(study.truth) for study in found}) == 1
     assert studies.crossed((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
+
+
+def test_preparation_is_timed_as_if_for_the_first_time():
+    converted = []
+
+    @dataclass(frozen=True)
+    class Converting(Broken):
+        """A method that keeps what it makes of a scene with the scene."""
+
+        def prepare(self, scene, grid):
+            scene.derive(converted.append)
+            return cv.Reduced().prepare(scene, grid)
+
+    SCENE.derive(converted.append)
+    list(studies.rows(Study("speed", (SCENE,), (Converting("works"),), quick=True, truth=truth)))
+    assert converted == [SCENE, SCENE]
