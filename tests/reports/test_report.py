@@ -10,10 +10,12 @@ from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
 from conservative.benchmarks.measures.measurement import COLUMNS, frame
+from conservative.benchmarks.studies import studies
 from conservative.reports import document
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import split_names
+from conservative.reports.run import plan
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import runs
@@ -50,6 +52,10 @@ def test_progress_never_goes_back_and_ends_near_the_whole():
     assert spans[0][0] == 0
     assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
     assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
+
+
+def test_progress_knows_how_long_every_study_takes():
+    assert set(plan.SECONDS) == set(studies.MAKERS)
 
 
 def test_table_and_json_hold_the_same_rows_with_their_origin(made):
