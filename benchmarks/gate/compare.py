@@ -79,7 +79,7 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
 
     row = results.rows.get(id)
     if row is None:
-        names = list(_renamed(was, results))
+        names = list(_find_renames(was, results))
         yield violation("row", Status.PASSED, f"renamed {names[0]}" if names else "missing", Status.PASSED)
     elif row.status is not Status.PASSED:
         yield violation("row", Status.PASSED, row.status, Status.PASSED)
@@ -90,14 +90,14 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
     else:
         for name, allowed in was.measures.items():
             if not passes(name, row.values.get(name, math.nan), allowed):
-                yield violation(name, f"{allowed.value:.6g}", _shown(row.values.get(name)), _bound(name, allowed))
+                yield violation(name, f"{allowed.value:.6g}", _write_value(row.values.get(name)), _bound(name, allowed))
         ratio = was.time_ratios.get(results.machine)
         now = math.nan if row.time_ratio is None else row.time_ratio
         if ratio and not foreign and not passes(TIME_RATIO, now, ratio):
-            yield violation(TIME_RATIO, f"{ratio.value:.4g}", _shown(row.time_ratio), _bound(TIME_RATIO, ratio))
+            yield violation(TIME_RATIO, f"{ratio.value:.4g}", _write_value(row.time_ratio), _bound(TIME_RATIO, ratio))
 
 
-def _renamed(was: BaselineRow, results: Results) -> Iterator[str]:
+def _find_renames(was: BaselineRow, results: Results) -> Iterator[str]:
     for row in results.rows.values():
         if row.definition and (row.definition, row.scene, row.method) == (was.definition, was.scene, was.method):
             yield row.id
@@ -113,7 +113,7 @@ def _bound(measure: str, allowed: Allowed) -> str:
     return f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
 
 
-def _shown(value: float | None) -> str:
+def _write_value(value: float | None) -> str:
     return "missing" if value is None else f"{value:.6g}"
 
 

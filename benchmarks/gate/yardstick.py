@@ -60,7 +60,7 @@ def turn(n_steps: int, h: float) -> float:
     return a + x
 
 
-def elsewhere(scene: str, method: str) -> float:
+def time_ratio_elsewhere(scene: str, method: str) -> float:
     """Return the time ratio of a registered method at the step of a registered scene, measured in a process of its own."""
     command = [sys.executable, "-m", "conservative.benchmarks.gate.yardstick", scene, method]
     return float(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)

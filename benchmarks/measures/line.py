@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import linregress
 
 from conservative.attitude import Array
 
@@ -24,6 +23,8 @@ def fit_line(x: Array, y: Array) -> Line:
     The scatter is that of the residuals: the standard error that `linregress` makes of 1 - r^2 has lost its digits where the
     points lie on a line.
     """
+    from scipy.stats import linregress  # here, as importing it takes as long as everything else of a command
+
     found = linregress(x, y)
     residuals = (y - y.mean()) - found.slope * (x - x.mean())
     scatter = float(np.sqrt(np.sum(residuals**2) / (len(x) - 2)))

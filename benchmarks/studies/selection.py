@@ -12,7 +12,6 @@ from conservative.method import Grid, Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
-ROOMS = ("ours", "engine", "truth")
 TOLERANCES = ("tol", "rtol")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
 
@@ -89,11 +88,11 @@ def methods(
     wanted = registry.list_methods() if names is None else names
     found: dict[Method, None] = {}
     for name in wanted:
-        found.update(dict.fromkeys(_named(name, skip_missing, settings)))
-    return tuple(sorted(found, key=lambda method: ROOMS.index(method.role)))
+        found.update(dict.fromkeys(_resolve(name, skip_missing, settings)))
+    return tuple(sorted(found, key=lambda method: list(Role).index(Role(method.role))))
 
 
-def _named(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:
+def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:
     try:
         method = registry.method(name)
         return (method,) if ":" in name else settings(method)

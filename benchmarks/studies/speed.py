@@ -74,7 +74,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         ready: dict[str, TimedRun] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
-            scene.forget()  # or preparing would be free where another study has paid for it
+            scene.forget()  # what other studies have paid for
             case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
             if isinstance(outcome, Done):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from conservative.benchmarks.gate.stash import REPEAT
-from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
+from conservative.benchmarks.gate.yardstick import time_ratio, time_ratio_elsewhere
 from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
 from conservative.benchmarks.studies.case import Case, Done, attempt
 from conservative.benchmarks.studies.speed import end_only, lengthen
@@ -44,7 +44,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}
     if point.timed:
         benchmark.extra_info["time ratio"] = time_ratio(method, scene, scene.dt)
-        request.node.stash[REPEAT] = partial(elsewhere, scene.name, method.name)
+        request.node.stash[REPEAT] = partial(time_ratio_elsewhere, scene.name, method.name)
     benchmark(run)
 
 
