@@ -161,7 +161,8 @@ class Method(ABC):
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
         Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the same scene, which never changes. A run may be called many times and starts afresh each time.
+        of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
+        prepared apart may overlap, in threads; nobody calls one run twice at a time.
         """
 
     @classmethod
@@ -190,7 +191,7 @@ class Method(ABC):
         return ()
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
-        """Return the trajectory of steps dt to t_end, s, whatever its status; `integrate` is this with checks and exceptions.
+        """Return the trajectory of steps dt to t_end, s, whatever its outcome; `integrate` is this with checks and exceptions.
 
         Raises
         ------

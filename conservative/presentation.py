@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from .attitude import Array
-from .errors import BadInput
-from .extras import require_extra
+from .errors import BadInput, require_extra
 from .invariants import Invariant, sizes
 from .outcome import Outcome
 from .scene import Scene

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, TypeVarTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +35,16 @@ class _Fields:
     t_end: float
     potential: Potential | None
     dt: float
-    extra_invariants: tuple[Invariant, ...]
+    extra_invariants: tuple[Invariant, ...] = ()
+    group: str = "your own"
+    source: str = ""
+
+
+class Details(TypedDict, total=False):
+    """What a `Scene` can be given by keyword only."""
+
+    dt: float | None
+    extra_invariants: Iterable[Invariant]
     group: str
     source: str
 
@@ -59,11 +68,12 @@ class Scene(_Fields):
     potential
         What acts on the body; None for a free body, which then carries no torque code anywhere.
     dt
-        Step of the source, s: what commands and studies take when nobody says otherwise.
+        By keyword, as all that follow: step of the source, s, which commands and studies take unless told otherwise; default
+        a 20th of a radian of the start's rate, at most a hundredth of t_end.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
-        Heading under which `conservative list` shows the scene, and where it comes from.
+        Heading under which `conservative list` shows the scene, default "your own", and where it comes from.
 
     Raises
     ------
@@ -79,18 +89,16 @@ class Scene(_Fields):
         w_WB_B0: ArrayLike,
         t_end: float,
         potential: Potential | None = None,
-        *,
-        dt: float | None = None,
-        extra_invariants: tuple[Invariant, ...] = (),
-        group: str = "your own",
-        source: str = "",
+        **details: Unpack[Details],
     ) -> None:
         _check_parts(name, body, potential)
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
+        others: dict[str, Any] = {**details}
+        dt, more = others.pop("dt", None), tuple(others.pop("extra_invariants", ()))
         step = _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s")
         R = rotation("R_WB0", R_WB0)
-        super().__init__(name, body, R, rates, end, potential, step, tuple(extra_invariants), group, source)
+        super().__init__(name, body, R, rates, end, potential, step, more, **others)
 
     @property
     def free(self) -> bool:

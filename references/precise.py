@@ -164,7 +164,7 @@ class System:
         torque = forms.cross(forms.product(J, w), w)
         if self.field is not None:
             torque = [a + b for a, b in zip(torque, self.field.torque(q, rest), strict=True)]
-        return [*zip(q, forms.turned_by_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]
+        return [*zip(q, forms.kinematics_in_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]
 
 
 @lru_cache(maxsize=64)

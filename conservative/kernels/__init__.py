@@ -21,7 +21,7 @@ from typing import Any
 
 from numba import config, njit
 
-COMPILED = not config.DISABLE_JIT
+COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
 """Whether kernels are machine code; else they are plain Python."""
 
 kernel: Any = partial(njit, cache=True, error_model="numpy")

@@ -11,6 +11,6 @@ from . import COMPILED
 if COMPILED:
     from .simd_llvm import LANES, four, fuse, join, lane, larger_size, put, splat, spread
 else:
-    from .simd_numpy import LANES, four, fuse, join, lane, larger_size, put, splat, spread
+    from .simd_numpy import LANES, four, fuse, join, lane, larger_size, put, splat, spread  # type: ignore[assignment]
 
 __all__ = ["LANES", "four", "fuse", "join", "lane", "larger_size", "put", "splat", "spread"]

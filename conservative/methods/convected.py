@@ -94,7 +94,10 @@ def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
 
 
 def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
-    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did."""
+    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did.
+
+    The steps are taken in Python, where a singular tangent can be told from other errors; only its equations are compiled.
+    """
     samples, total = [u], 0
     for step in range(1, grid.n_steps + 1):
         u, corrections, norm = _take_step(linearise, u, tol)

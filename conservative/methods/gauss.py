@@ -94,9 +94,8 @@ class Gauss(Method):
         return (cls(2),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (label, start, model) = kernels("gauss"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(self.stages, *padded_tableau(self.stages), grid.dt)
-        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        label, start, model = scene.derive(convert, self)
+        return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))
 
 
 def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
@@ -106,8 +105,14 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     return replace(method, frame=frame).label, start, closed_system(start)
 
 
+@lru_cache(maxsize=256)
+def find_coefficients(stages: int, dt: float) -> Any:
+    """Return the kernel's coefficients of a step dt, s."""
+    return kernels("gauss").Coefficients(stages, *pad_tableau(stages), dt)
+
+
 @lru_cache(maxsize=MOST_STAGES)
-def padded_tableau(stages: int) -> tuple[Array, ...]:
+def pad_tableau(stages: int) -> tuple[Array, ...]:
     """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
     table = tableau(stages)
     extra = (0, -len(table.b) % kernels("simd").LANES)

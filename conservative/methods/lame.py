@@ -77,11 +77,12 @@ class Lame(Method):
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (start, model) = kernels("lame"), scene.derive(convert)
-        return prepare_run(scene, grid, self.label, start, kernel, model, kernel.Coefficients(grid.dt))
+        kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
+        return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 
 
-def convert(scene: Scene) -> tuple[PrincipalStart, Any]:
-    """Return the start in the frame that does not spin and the kernel's model of it."""
+def convert(scene: Scene, method: Lame) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in the frame that does not spin and the kernel's model of it."""
     start = principal_start(scene, "non_spinning")
-    return start, kernels("lame").Model(start.J[0], start.field.z if start.field else 0.0, start.q, start.L)
+    moment = start.field.z if start.field else 0.0
+    return method.label, start, kernels("lame").Model(start.J[0], moment, start.q, start.L)

@@ -98,12 +98,12 @@ class MoserVeselov(_Fields, Method):
         return (cls(4),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        start, model, coefficients = scene.derive(calibrate, self, grid.dt)
-        return prepare_run(scene, grid, self.label, start, kernels("moser_veselov"), model, coefficients)
+        label, start, model, coefficients = scene.derive(calibrate, self, grid.dt)
+        return prepare_run(scene, grid, label, start, kernels("moser_veselov"), model, coefficients)
 
 
-def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[PrincipalStart, Any, Any]:
-    """Return the start along `polhode_axes`, the kernel's model of it, and the coefficients of a step dt, s.
+def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, PrincipalStart, Any, Any]:
+    """Return the label of a run, its start along `polhode_axes`, the kernel's model of it and coefficients of a step dt, s.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[PrincipalS
     step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
     if not (math.isfinite(step.r0) and step.C > SMALLEST_CN):
         raise BadInput("dt", f"{dt:g}, for which {method.name} has no step", "a shorter step")
-    return start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
+    return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
 def require_short_step(scene: Scene, dt: float, exact: bool) -> None:

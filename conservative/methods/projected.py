@@ -54,18 +54,18 @@ class Projected(Method):
         return "it is for bodies in a field" if scene.free else None
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        kernel, (start, model) = kernels("projected"), scene.derive(convert)
+        kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
         coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, grid.dt)
-        return prepare_run(scene, grid, self.label, start, kernel, model, coefficients)
+        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
 
 
-def convert(scene: Scene) -> tuple[PrincipalStart, Any]:
-    """Return the start in principal axes and the kernel's model of it."""
+def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start = principal_start(scene)
     model = kernels("projected").Model(
         start.J_inverse, start.field, field_axis(scene), invariant_scales(scene), start.q, start.L
     )
-    return start, model
+    return method.label, start, model
 
 
 def field_axis(scene: Scene) -> Triple | None:

@@ -24,12 +24,14 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        done, *work, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
+        # The fields of `conservative.kernels.protocol.Result`.
+        done, stages, corrections, evaluations, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
         t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
         if failure is None and done < n_steps:
             kind = WrongBranch if elsewhere else NotConverged
             failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
-        return Trajectory(scene, t, R_WB, w_WB_B, label, Counters(done, *work), failure)
+        work = Counters(done, stages, corrections, evaluations)
+        return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
 
     return run
 
@@ -37,8 +39,9 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 def turn_back(
     start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
 ) -> tuple[Array, Array, Array, IntegrationFailed | None]:
-    """Return times, attitudes and rates, body axes, of the first n samples; and the failure, if some are not finite.
+    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure, if some are not finite.
 
+    They are made of the first n of q (., 4) and L (., 3), kg m^2/s, principal axes, up to the first that is not finite.
     The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
     """
     t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))

@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array, cayley, from_quaternion, rotation_about, triple
 from ..check import positive_number, read_only
 from ..errors import BadInput, PotentialFailed
-
-EnergyFunction = Callable[[Array], float]
-GradientFunction = Callable[[Array], Array]
+from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
@@ -27,52 +25,6 @@ _ROUND_OFF = 8 * 2.0**-53
 GIVEN, ANSWER = 27, 90
 """Numbers in a talk: what kernels ask about, the frame R_BP by rows and up to 18 of the state; and what they are told."""
 _Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
-
-
-@dataclass(frozen=True)
-class Energy:
-    """V in J: `at` one matrix (3, 3), and called with matrices (..., 3, 3)."""
-
-    function: EnergyFunction
-
-    def at(self, R: Array) -> float:
-        """Return V, J, at a matrix (3, 3)."""
-        return float(self.function(R.copy()))
-
-    def __call__(self, R_WB: Array) -> Array:
-        """Return V, (...), in J."""
-        R = np.asarray(R_WB, dtype=float)
-        return np.array([self.at(each) for each in R.reshape(-1, 3, 3)]).reshape(R.shape[:-2])
-
-
-@dataclass(frozen=True)
-class Gradient:
-    """dV/dR in J: `at` one matrix (3, 3), and called with matrices (..., 3, 3)."""
-
-    function: GradientFunction
-
-    def at(self, R: Array) -> Array:
-        """Return dV/dR, (3, 3), in J, at a matrix (3, 3). Raise `BadInput` where the function gives another shape."""
-        gradient = np.asarray(self.function(R.copy()), dtype=float)
-        if gradient.shape != (3, 3):
-            raise BadInput("gradient", f"shape {gradient.shape}", "a function that returns a matrix (3, 3)")
-        return gradient
-
-    def __call__(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J."""
-        R = np.asarray(R_WB, dtype=float)
-        return np.array([self.at(each) for each in R.reshape(-1, 3, 3)]).reshape(R.shape)
-
-
-@dataclass(frozen=True)
-class Size:
-    """A size of V: called, it gives itself, J."""
-
-    value: float
-
-    def __call__(self) -> float:
-        """Return the size, J."""
-        return self.value
 
 
 @dataclass(frozen=True, eq=False)

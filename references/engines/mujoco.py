@@ -103,7 +103,7 @@ class MuJoCo(Method):
         model = _model(mj, axes, grid.dt, self.integrator, scene.free)
         data = mj.MjData(model)
         start = _start(mj, model, data, axes)
-        march = _rolled_out if grid.every <= _ROLLOUT_UP_TO else _stepped
+        march = _roll_out if grid.every <= _ROLLOUT_UP_TO else _step_to_samples
 
         def run() -> Trajectory:
             with _quiet(mj):
@@ -163,7 +163,7 @@ def _start(mj: Any, model: Any, data: Any, axes: Axes) -> Array:
     return state
 
 
-def _rolled_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
+def _roll_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
     """Return quaternions, rates and a reason from one call that stores every step."""
     rollout = load("mujoco.rollout", "mujoco", "MuJoCo").rollout
     mj.mj_resetData(model, data)
@@ -179,7 +179,7 @@ def _rolled_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tup
     return states[:, nq - 4 : nq], states[:, nq + model.nv - 3 : nq + model.nv], reason
 
 
-def _stepped(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
+def _step_to_samples(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
     """Return quaternions, rates and a reason, stepping from sample to sample inside the engine."""
     mj.mj_resetData(model, data)
     mj.mj_setState(model, data, start, mj.mjtState.mjSTATE_FULLPHYSICS)

@@ -76,7 +76,7 @@ class SciPy(Method):
         atol = self.rtol * np.repeat([1.0, _rate_scale(axes)], [4, 3])
         span = (0.0, float(grid.t[-1]))
 
-        solver = _counting(getattr(integrate, self.integrator))
+        solver = _count_steps(getattr(integrate, self.integrator))
 
         def run() -> Trajectory:
             solver.steps = 0
@@ -99,7 +99,7 @@ class SciPy(Method):
         return (cls(rtol=1e-9),)
 
 
-def _counting(solver: Any) -> Any:
+def _count_steps(solver: Any) -> Any:
     """Return the solver class with a count of its steps, which `solve_ivp` does not tell."""
 
     def step(self: Any) -> Any:

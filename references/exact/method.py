@@ -26,11 +26,11 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 from conservative.version import VERSION
 
+from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
 from .motion import Motion, in_blocks, steady_turn
 from .start import Start
-from .theta import MP_LOCK
 
 
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from conservative.extras import require_extra
+from conservative.errors import require_extra
 
 from .options import epilog
 

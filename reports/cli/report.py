@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from conservative.extras import require_extra
+from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion

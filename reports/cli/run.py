@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from conservative.extras import require_extra
+from conservative.errors import require_extra
 
 from . import completion
 from .options import epilog

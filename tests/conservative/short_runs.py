@@ -70,7 +70,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
         for method in METHODS:
             if method.unsupported(scene):
                 continue
-            for factor, n in ((1, 12), (40, 5), (200, 3)):
+            for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", method.prepare(scene, Grid(dt, n, 2))
 
