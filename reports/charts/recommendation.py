@@ -47,9 +47,7 @@ def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
     data, prices, asked = points(recommendation), costs(recommendation), recommendation.conditions
     names = series_order(data["method"])
-    panels = [
-        _probes(part, str(kind), names, asked.error) for kind, part in data.groupby("kind", sort=True)
-    ]
+    panels = [_probes(part, str(kind), names, asked.error) for kind, part in data.groupby("kind", sort=True)]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, names))
