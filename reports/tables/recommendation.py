@@ -133,11 +133,11 @@ def tables(recommendation: Recommendation) -> Iterator[TerminalTable]:
     failing = [advice for advice in recommendation.advice if advice.best and not advice.reached]
     limit = f"What does not, at up to {recommendation.conditions.cost_limit:g} s of computing per simulated second"
     if reaching:
-        yield TerminalTable("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching])
+        yield TerminalTable("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching], True)
     if failing:
-        yield TerminalTable(limit, FAILING, [_failing(advice) for advice in failing])
+        yield TerminalTable(limit, FAILING, [_failing(advice) for advice in failing], True)
     probes = [row for advice in recommendation.advice for row in _probe_rows(advice)]
-    yield TerminalTable("The probe runs; <- is what is in the tables above", PROBES, probes)
+    yield TerminalTable("The probe runs; <- is what is in the tables above", PROBES, probes, True)
 
 
 def notes(recommendation: Recommendation) -> list[str]:

@@ -13,11 +13,12 @@ from rich.table import Table
 
 @dataclass(frozen=True)
 class TerminalTable:
-    """A table with a title."""
+    """A table with a title; `wrap_names` says whether the first column, too, may go on in the next line."""
 
     title: str
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
+    wrap_names: bool = False
 
 
 def print_tables(tables: Iterable[TerminalTable]) -> None:
@@ -35,7 +36,7 @@ def print_text(text: str, style: str = "") -> None:
 def _as_rich(content: TerminalTable) -> Table:
     table = Table(title=escape(content.title), box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
     for position, name in enumerate(content.header):
-        table.add_column(name, overflow="fold", no_wrap=position == 0)
+        table.add_column(name, overflow="fold", no_wrap=position == 0 and not content.wrap_names)
     for row in content.rows:
         table.add_row(*(escape(cell) for cell in row))
     return table
