@@ -60,7 +60,7 @@ def render(view: View, folder: Path, png: bool, announce: Callable[[str], None])
 
 def manifest(view: View, files: list[str]) -> str:
     """Return measurements.json; a value that could not be measured is null."""
-    rows = json.loads(view.table.to_json(orient="records", double_precision=15))
+    rows = view.table.astype(object).where(view.table.notna(), None).to_dict("records")  # pandas' own JSON cuts off digits
     return json.dumps({"schema": SCHEMA, **asdict(view.source), "files": files, "rows": rows}, indent=1, ensure_ascii=False)
 
 

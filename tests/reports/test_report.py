@@ -1,9 +1,11 @@
 import json
+import math
 import re
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
@@ -77,6 +79,10 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
         & (table["method"] == "reduced")
     ]
     assert energy["value"].max() < 1e-13  # measured 5e-16
+    values = [math.nan if row["value"] is None else row["value"] for row in stored["rows"]]
+    assert np.array_equal(
+        values, table["value"], equal_nan=True
+    )  # pandas' own JSON has 15 decimals, and 1.33e-15 is one of them
 
 
 def test_text_shows_every_picture_table_and_what_cannot_be_done(made):
