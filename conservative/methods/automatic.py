@@ -33,7 +33,7 @@ SAFETY = 0.5
 LARGEST_FACTOR = 30.0
 """Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
 ASYMPTOTIC = 0.2
-"""Difference of two runs, rad, from which on it says nothing about the error of either: angles end at pi."""
+"""Errors above this, rad, are saturated (angles end at pi) and are not used."""
 ATTEMPTS = 12
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""

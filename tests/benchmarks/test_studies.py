@@ -180,7 +180,7 @@ def test_a_bug_of_our_own_is_not_an_outcome():
 @pytest.mark.parametrize("name", [*CROSSING, "sphere_curves", "import_time"])
 def test_progress_counts_up_to_the_whole(name):
     seen = []
-    study = Study(name, (SCENE, SCENE.renamed("again")), (cv.Reduced(),), quick=True, truth=truth)
+    study = Study(name, (SCENE, SCENE.rename("again")), (cv.Reduced(),), quick=True, truth=truth)
     list(studies.findings(study, lambda *call: seen.append(call)))
     done, total, texts = zip(*seen, strict=True)
     assert list(done) == sorted(done)

@@ -122,7 +122,7 @@ def body_of(text):
 def test_shapes_turned_and_moved(written, text, shape):
     placed = f"\ncom_B = [0.1, -0.2, 0.3]\nR_BS.axis = {AXIS.tolist()}\nR_BS.angle = {ANGLE}"
     scene = scene_file.load(written(body_of(text + placed)))
-    expected = shape.turned(R).about((0.1, -0.2, 0.3)).inertia
+    expected = shape.rotate(R).about((0.1, -0.2, 0.3)).inertia
     np.testing.assert_allclose(scene.body.inertia, expected, atol=1e-14 * expected.max())  # measured 2e-16
     assert scene.free
     np.testing.assert_array_equal(scene_file.load(written(body_of(text))).body.inertia, shape.inertia)

@@ -44,9 +44,10 @@ class Composition:
     def __post_init__(self) -> None:
         if self.order < 2 or self.order % 2:
             raise BadInput("order", self.order, "an even number of 2 or more")
+        weights = self.weights
         for power in range(1, self.order, 2):
             wanted = 1 if power == 1 else 0
-            off: Fraction = abs(sum((w**power for w in self.weights), start=Fraction(-wanted)))
+            off: Fraction = abs(sum((w**power for w in weights), start=Fraction(-wanted)))
             if off > DIGITS:
                 got = f"{self.name} with sum w^{power} off by {float(off):.3g}"
                 raise BadInput("half", got, f"lengths whose sum of powers {power} is {wanted}")
