@@ -32,8 +32,7 @@ class Composition:
     ------
     BadInput
         The order is not even, or the lengths do not satisfy sum w = 1 and, below the order, sum w^k = 0 for odd k > 1: what the
-        composition of motions in one dimension asks for (Hairer, Lubich & Wanner 2006, III.3). What more the order asks for
-        is not checked here but by the observed order, in the tests.
+        composition of motions in one dimension asks for (Hairer, Lubich & Wanner 2006, III.3). Tests observe the order itself.
     """
 
     name: str
