@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 from . import baseline, compare, dashboards, results, yardstick
-from .stash import REPEAT
 from .results import TIME_RATIO, Results, Row
+from .stash import REPEAT
 
 
 class GateFailed(Exception):
