@@ -99,9 +99,12 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
     return from_quaternion(np.concatenate([[np.cos(half)], np.sin(half) * n]))
 
 
-def polished(R: Array) -> Array:
-    """Return the rotation (3, 3), orthonormal to round-off, next to a matrix (3, 3) that is one to `ROTATION_TOLERANCE`."""
-    return from_quaternion(to_quaternion(R))
+def axes_about(axis: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,); of e_z no rotation at all."""
+    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3]
+    first = np.cross(other, axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first), axis], axis=1)
 
 
 def triple(values: Array) -> Triple:

@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array
-from .check import finite_array
+from .check import finite_array, read_only
 from .errors import BadInput
 
 _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class _Fields:
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class RigidBody(_Fields):
     """A rigid body that turns about a fixed point.
 
     Parameters
@@ -31,15 +36,11 @@ class RigidBody:
         distribution has (J1 + J2 < J3) are let through: the equations hold for them, though some engines refuse them.
     """
 
-    inertia: Array
-
     def __init__(self, inertia: ArrayLike) -> None:
         value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
         tensor = np.diag(value) if value.ndim == 1 else value
         _check_tensor(tensor)
-        tensor = (tensor + tensor.T) / 2
-        tensor.flags.writeable = False
-        object.__setattr__(self, "inertia", tensor)
+        super().__init__(read_only((tensor + tensor.T) / 2))
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:

@@ -1,4 +1,9 @@
-"""Checks of arguments, made before any work. `value` may have any unit; `allowed` is what the message says of it."""
+"""Checks of arguments, made before any work. `value` may have any unit; `allowed` is what the message says of it.
+
+Frozen values whose constructors convert what they are given are written in two classes, here and everywhere: a frozen dataclass
+has the fields, and the public class derived from it has an `__init__` that checks, converts, and calls the generated one. So
+nothing is ever assigned to a frozen value, and `dataclasses.replace` works, as what is converted already converts to itself.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from .errors import BadInput
 
 
 def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...], ...], allowed: str) -> Array:
-    """Return `value` as a new array of one of `shapes`, such as (3,) or (3, 3), of finite numbers in any unit.
+    """Return `value` as a new read-only array of one of `shapes`, such as (3,) or (3, 3), of finite numbers in any unit.
 
     Raises
     ------
@@ -28,6 +33,12 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
         raise BadInput(argument, f"shape {array.shape}", allowed)
     if not np.isfinite(array).all():
         raise BadInput(argument, f"{array.tolist()}, not finite", allowed)
+    return read_only(array)
+
+
+def read_only(array: Array) -> Array:
+    """Return an array, (...) in and (...) out and of any unit, after closing it to writing: frozen values hold no others."""
+    array.flags.writeable = False
     return array
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from importlib.util import find_spec
+from types import MappingProxyType
 from typing import ClassVar
 
 from .outcome import Outcome, OutcomeKind
@@ -81,22 +83,6 @@ class WrongBranch(NotConverged):
     kind = OutcomeKind.WRONG_BRANCH
 
 
-def branch_ended(step: int, time: float, residual: float, elsewhere: bool) -> NotConverged:
-    """Return the failure of a step to which the state does not lead continuously, as the step grows from 0.
-
-    Parameters
-    ----------
-    step, time
-        Number of the step, from 1, and its start, s.
-    residual
-        What is left of its equations where the branch ends, relative to their unknowns.
-    elsewhere
-        Whether they have a solution on another branch.
-    """
-    failed = WrongBranch if elsewhere else NotConverged
-    return failed(step, time, residual, "no continuous solution")
-
-
 class Diverged(IntegrationFailed):
     """The state stopped being finite, or an engine gave up. Attributes: `time` (s, of the last good sample), `reason`."""
 
@@ -132,6 +118,38 @@ class AccuracyNotReached(UserWarning):
         super().__init__(
             f"error: got {error:g} rad; allowed: what round-off leaves on this scene, an estimated {estimate:.2g} rad"
         )
+
+
+EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "engines": ("mujoco", "pinocchio", "heyoka"),
+        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert"),
+        "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
+    }
+)
+"""Packages, under the names they are imported by, of each extra in pyproject.toml."""
+
+
+def require_extra(what: str, extra: str, *packages: str) -> None:
+    """Check that packages are there; none is imported.
+
+    Parameters
+    ----------
+    what
+        What needs them, such as `conservative report`.
+    extra
+        The extra that brings them, a key of `EXTRAS`.
+    packages
+        Their names as they are imported; by default all of the extra.
+
+    Raises
+    ------
+    MissingExtra
+        One of them is not installed.
+    """
+    missing = [package for package in packages or EXTRAS[extra] if find_spec(package) is None]
+    if missing:
+        raise MissingExtra(what, ", ".join(missing), extra)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

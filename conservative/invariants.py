@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .attitude import Array
-from .potentials.potential import UniformGravity
-
-if TYPE_CHECKING:
-    from .body import RigidBody
-    from .potentials.potential import Potential
-    from .scene import Scene
+from .body import RigidBody
+from .potentials.potential import Potential
+from .potentials.uniform_gravity import UniformGravity
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +46,25 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
     return (R_WB @ body.momentum(w_WB_B)[..., None])[..., 0]
 
 
-def invariants_of(scene: Scene) -> tuple[Invariant, ...]:
-    """Return what follows from the body and the potential alone.
+def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, energy_scale: float) -> tuple[Invariant, ...]:
+    """Return what follows from the body and the potential alone; drifts are relative to sizes at the start.
 
     Energy always. World momentum (a vector) for a free body, its component along the axis of a field that has one (the vertical
     in uniform gravity). The axial momentum where body and field are symmetric about one axis.
+
+    Parameters
+    ----------
+    body, potential
+        What moves, and what acts on it.
+    w_WB_B0
+        Angular velocity at the start (3,), rad/s, body axes.
+    energy_scale
+        What energy errors are relative to, J, above 0.
     """
-    body, potential = scene.body, scene.potential
-    found = [Invariant("energy", "J", scene.energy_scale, lambda R, w: energy(body, potential, R, w))]
+    found = [Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w))]
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
-    size = float(np.linalg.norm(body.momentum(scene.w_WB_B0)))
-    scale = size or float(np.sqrt(body.moments.max() * scene.energy_scale))
+    size = float(np.linalg.norm(body.momentum(w_WB_B0)))
+    scale = size or float(np.sqrt(body.moments.max() * energy_scale))
     if potential is None:
         found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:

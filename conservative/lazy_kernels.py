@@ -1,13 +1,13 @@
-"""Kernels, imported when they are first asked for: importing numba takes a second, and nobody should wait for it in vain."""
+"""Kernels, imported when first used: importing numba takes a second, which a command without an integration need not wait."""
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from importlib import import_module
 from typing import Any
 
 
-@cache
+@lru_cache(maxsize=32)
 def kernels(name: str) -> Any:
     """Return the module `conservative.kernels.<name>`. Asking again costs a twentieth of an import statement in a function."""
     return import_module(f"{__package__}.kernels.{name}")

@@ -1,4 +1,4 @@
-"""Methods, ours and the engines' alike: the protocol, the grid of steps and samples, and `integrate`."""
+"""Methods, ours and the engines' alike: the protocol, and the grid of steps and samples."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .attitude import Array
-from .check import choice, positive_integer, positive_number
-from .errors import BadInput, Unsupported
+from .check import positive_integer, positive_number
+from .declarations import Candidacy, Claims, Cost
+from .errors import BadInput
 from .scene import Scene
 from .trajectory import Trajectory
 from .version import VERSION
@@ -31,10 +32,6 @@ class Role(StrEnum):
     """Somebody else's code."""
     TRUTH = "truth"
     """Measured against, never a competitor."""
-
-
-DEFAULT_DT = 0.01
-"""Step, s, where nobody names one: the paper's."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,9 @@ class Grid:
     @property
     def t(self) -> Array:
         """Times (n,) of the samples, s."""
-        return self.steps * self.dt
+        t = self.steps
+        t *= self.dt
+        return t
 
     def kept(self, done: int) -> int:
         """Return how many samples a run of `done` steps has filled."""
@@ -89,11 +88,36 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
 class Method(ABC):
     """A way to integrate any scene it supports: a frozen value, one file, one line of registration.
 
-    Class attributes: `family` (its registered name) and `role`.
+    Only `family`, `role`, `order` and `prepare` have no default. All that others need to know about a method it says itself.
+
+    Attributes
+    ----------
+    family
+        The name that the class is registered with.
+    role
+        The side it is on.
+    candidacy
+        How the automatic choice considers it; None where it does not.
+    claims
+        What is claimed of it, and where: reports check `order` and `conserves` against that. None where nobody claims anything.
+    colour
+        A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
+    module
+        Module of an engine, whose import reports time; "" for none.
+    kernel
+        Module in `conservative.kernels` whose function `enter` takes all steps of a run; "" where there is none.
+    step_goals
+        Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
     """
 
     family: ClassVar[str]
     role: ClassVar[Role]
+    candidacy: ClassVar[Candidacy | None] = None
+    claims: ClassVar[Claims | None] = None
+    colour: ClassVar[str | None] = None
+    module: ClassVar[str] = ""
+    kernel: ClassVar[str] = ""
+    step_goals: ClassVar[tuple[tuple[str, float], ...]] = ()
 
     @property
     def name(self) -> str:
@@ -119,6 +143,11 @@ class Method(ABC):
         """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
         return frozenset()
 
+    @property
+    def cost(self) -> Cost:
+        """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
+        return Cost(step=340.0)
+
     def unsupported(self, scene: Scene) -> str | None:
         """Return why the scene cannot be done, None if it can."""
         return None
@@ -132,7 +161,8 @@ class Method(ABC):
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
         Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the same scene, which never changes. A run may be called many times and starts afresh each time.
+        of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
+        prepared apart may overlap, in threads; nobody calls one run twice at a time.
         """
 
     @classmethod
@@ -140,8 +170,28 @@ class Method(ABC):
         """Return the settings that tables and generic tests take up by themselves."""
         return (cls(),)
 
+    @classmethod
+    def candidate_settings(cls) -> tuple[Method, ...]:
+        """Return the settings that the automatic choice probes, where the first supports the scene; by default all variants."""
+        return cls.variants()
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        """Return the settings that the benchmark suite times; by default all variants."""
+        return cls.variants()
+
+    @classmethod
+    def audit_settings(cls) -> tuple[Method, ...]:
+        """Return the settings whose order `claims` are about; by default those of the suite."""
+        return cls.suite_settings()
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Method, ...]:
+        """Return the settings whose motion a report draws, where it has them; by default the first that it has."""
+        return ()
+
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
-        """Return the trajectory of steps dt to t_end, s, whatever its status; `integrate` is this with checks and exceptions.
+        """Return the trajectory of steps dt to t_end, s, whatever its outcome; `integrate` is this with checks and exceptions.
 
         Raises
         ------
@@ -170,87 +220,3 @@ def settings_text(value: Any) -> str:
     """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
     settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
     return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)
-
-
-def require_support(method: Method, scene: Scene) -> None:
-    """Raise `Unsupported` if the method cannot do the scene."""
-    reason = method.unsupported(scene)
-    if reason:
-        raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene it can do ({reason})")
-
-
-def integrate(
-    scene: Scene,
-    dt: float | None = None,
-    method: Method | None = None,
-    t_end: float | None = None,
-    sample_every: int = 1,
-    *,
-    error: float | None = None,
-    on_failure: Literal["raise", "return"] = "raise",
-) -> Trajectory:
-    """Integrate a scene.
-
-    Parameters
-    ----------
-    scene
-        What moves.
-    dt
-        Step, s, by default 0.01. For adaptive methods, and with `error`, the distance of samples.
-    method
-        Default `Reduced()`, the paper's map in three unknowns.
-    t_end
-        Duration, s; default the scene's. The run ends with the first step at or past it.
-    sample_every
-        Keep every so many steps (and the first and last state).
-    error
-        Attitude error over the run, rad, instead of a method and a step: both are chosen, `trajectory.choice` says which and
-        what error is estimated (`conservative.methods.automatic`); a warning `AccuracyNotReached` where round-off is in the way.
-    on_failure
-        "raise" or, to get what was reached with a status that says what failed, "return".
-
-    Raises
-    ------
-    BadInput
-        An argument cannot be used.
-    Unsupported
-        The method cannot do the scene.
-    NotConverged
-        The equations of a step could not be solved.
-    Diverged
-        The state stopped being finite, or an engine gave up.
-    """
-    if not isinstance(scene, Scene):
-        raise BadInput("scene", repr(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    choice("on_failure", on_failure, ("raise", "return"))
-    if error is not None:
-        trajectory = _integrated_to(scene, error, dt, method, t_end, sample_every)
-    else:
-        method = _default() if method is None else method
-        if not isinstance(method, Method):
-            raise BadInput("method", repr(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
-        grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
-        require_support(method, scene)
-        trajectory = method.prepare(scene, grid)()
-    if trajectory.failure is not None and on_failure == "raise":
-        raise trajectory.failure
-    return trajectory
-
-
-def _default() -> Method:
-    from .methods.reduced import Reduced
-
-    return Reduced()
-
-
-def _integrated_to(
-    scene: Scene, error: float, dt: float | None, method: Method | None, t_end: float | None, sample_every: int
-) -> Trajectory:
-    from .methods.automatic import chosen
-
-    positive_number("error", error, "a finite attitude error above 0, rad")
-    if method is not None:
-        raise BadInput("method", repr(method), "None together with error, which chooses the method")
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    spacing = None if dt is None else grid_for(scene, dt, end).dt
-    return chosen(scene, error, end, spacing, positive_integer("sample_every", sample_every))

@@ -18,6 +18,7 @@ class OutcomeKind(StrEnum):
     UNSUPPORTED = "unsupported"
     MISSING = "missing"
     SKIPPED = "skipped"
+    NO_ORDER = "no order"
 
 
 @dataclass(frozen=True)

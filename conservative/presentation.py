@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from .errors import BadInput
-from .extras import require_extra
-from .invariants import sizes
+from .attitude import Array
+from .errors import BadInput, require_extra
+from .invariants import Invariant, sizes
+from .outcome import Outcome
+from .scene import Scene
 
 if TYPE_CHECKING:
     import altair
     import pandas
-
-    from .attitude import Array
-    from .trajectory import Trajectory
 
 COLUMNS = (
     "t",
@@ -36,13 +35,58 @@ MOST_DRAWN = 1000
 _WIDTH, _HEIGHT = 480, 160
 
 
-def samples(trajectory: Trajectory) -> Array:
+class Motion(Protocol):
+    """What is presented: a `Trajectory`, whose methods call these functions."""
+
+    @property
+    def scene(self) -> Scene:
+        """What was integrated."""
+
+    @property
+    def t(self) -> Array:
+        """Times (n,), s."""
+
+    @property
+    def R_WB(self) -> Array:
+        """Attitudes (n, 3, 3), body to world."""
+
+    @property
+    def w_WB_B(self) -> Array:
+        """Angular velocities (n, 3), rad/s, body axes."""
+
+    @property
+    def energy(self) -> Array:
+        """Energies (n,), J."""
+
+    @property
+    def momentum_W(self) -> Array:
+        """Angular momenta (n, 3), kg m^2/s, world axes."""
+
+    @property
+    def label(self) -> str:
+        """Who made it."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended."""
+
+    @property
+    def work(self) -> dict[str, int]:
+        """Counts of work by their names."""
+
+    def drift(self, invariant: Invariant) -> Array:
+        """Return the relative drift of an invariant, (n,) or (n, 3)."""
+
+    def __len__(self) -> int: ...
+
+
+def samples(trajectory: Motion) -> Array:
     """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
     return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
 
 
-def table(trajectory: Trajectory) -> pandas.DataFrame:
+def table(trajectory: Motion) -> pandas.DataFrame:
     """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and outcome.
 
     Raises
@@ -58,7 +102,7 @@ def table(trajectory: Trajectory) -> pandas.DataFrame:
     return frame
 
 
-def picture(trajectory: Trajectory) -> altair.VConcatChart:
+def picture(trajectory: Motion) -> altair.VConcatChart:
     """Return the body rates, and under them the drift of every invariant, over time; zoom and hover for values.
 
     Raises
@@ -86,7 +130,7 @@ def picture(trajectory: Trajectory) -> altair.VConcatChart:
     return chart
 
 
-def _lines(trajectory: Trajectory, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
+def _lines(trajectory: Motion, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
     """Return one line for each of `series`, (n,), over time."""
     import altair as alt
     import pandas as pd
@@ -114,9 +158,9 @@ def _lines(trajectory: Trajectory, series: dict[str, Array], quantity: str, scal
     return chart
 
 
-def card(trajectory: Trajectory) -> str:
+def card(trajectory: Motion) -> str:
     """Return a small HTML table: what was run, how it ended, what it cost and what drifted."""
-    work = [f"{count} {name}" for name, count in vars(trajectory.counters).items() if count is not None]
+    work = [f"{count} {name}" for name, count in trajectory.work.items()]
     end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"
     rows = [
         ("scene", trajectory.scene.name),

@@ -16,39 +16,22 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .entry_points import METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
 
-if TYPE_CHECKING:
-    from .shapes import MassDistribution
 
-METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
-
-
-@cache
-def registered(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group such as `SCENES` by name, in order of their names; nothing is imported."""
-    return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+def list_scenes() -> tuple[str, ...]:
+    """Return the names of all registered scenes, in their order; none is imported."""
+    return tuple(list_entries(SCENES))
 
 
-def _load(group: str, argument: str, name: str) -> Any:
-    known = registered(group)
-    if name not in known:
-        files = ", or a file whose name ends with .toml" if group == SCENES else ""
-        raise BadInput(argument, repr(name), nearest(name, known) + files)
-    entry = known[name]
-    try:
-        return entry.load()
-    except MissingEngine:
-        raise
-    except Exception as error:
-        raise NotLoadable(argument, name, entry.value, error) from error
+def list_methods() -> tuple[str, ...]:
+    """Return the names of all registered methods, in their order; none is imported."""
+    return tuple(list_entries(METHODS))
 
 
 def scene(text: str) -> Scene:
@@ -57,7 +40,8 @@ def scene(text: str) -> Scene:
     Raises
     ------
     BadInput
-        The name or a parameter is unknown, a value cannot be used, or the file (see `conservative.scene_files.scene_file`) cannot.
+        The name or a parameter is unknown, a value cannot be used, or the file cannot: see
+        `conservative.scene_files.scene_file`.
     NotLoadable
         It is registered, but importing what is registered fails.
     """
@@ -66,7 +50,7 @@ def scene(text: str) -> Scene:
 
         return load(text)
     name, settings = _split(text)
-    builder: Callable[..., Scene] = _load(SCENES, "scene", name)
+    builder: Callable[..., Scene] = load_entry(SCENES, "scene", name)
     return builder(**_arguments(f"scene {name}", builder, settings))
 
 
@@ -83,25 +67,26 @@ def method(text: str) -> Method:
         The engine is not installed.
     """
     name, settings = _split(text)
-    family: type[Method] = _load(METHODS, "method", name)
+    family: type[Method] = load_entry(METHODS, "method", name)
     if getattr(family, "family", None) != name:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
     return family(**_arguments(f"method {name}", family, settings))
 
 
-def body_file(kind: str) -> Callable[[Path, str], MassDistribution]:
-    """Return the function that reads a named body out of a file of a kind such as `mjcf` or `urdf`.
+def list_families() -> dict[str, type[Method]]:
+    """Return the registered classes of methods by name; what cannot be loaded, or is no method of that name, is left out."""
+    found = {name: _load_family(name) for name in list_methods()}
+    return {name: family for name, family in found.items() if family is not None}
 
-    Raises
-    ------
-    BadInput
-        The kind is unknown.
-    NotLoadable
-        It is registered, but importing what is registered fails.
-    """
-    loader: Callable[[Path, str], MassDistribution] = _load(BODY_FILES, "kind of file", kind)
-    return loader
+
+def _load_family(name: str) -> type[Method] | None:
+    try:
+        family = load_entry(METHODS, "method", name)
+    except (MissingEngine, NotLoadable):
+        return None
+    whole = isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name
+    return family if whole else None
 
 
 def _split(text: str) -> tuple[str, list[str]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, TypeVarTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,15 +14,43 @@ from .attitude import Array
 from .body import RigidBody
 from .check import finite_array, positive_number, rotation
 from .errors import BadInput
-from .invariants import Invariant, invariants_of
+from .invariants import Invariant, axial_direction, invariants_of
 from .potentials.potential import Potential
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+T = TypeVar("T")
+Settings = TypeVarTuple("Settings")
+MOST_DERIVATIONS = 64
+"""Results that `Scene.derive` keeps at most."""
+
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class _Fields:
+    name: str
+    body: RigidBody
+    R_WB0: Array
+    w_WB_B0: Array
+    t_end: float
+    potential: Potential | None
+    dt: float
+    extra_invariants: tuple[Invariant, ...] = ()
+    group: str = "your own"
+    source: str = ""
+
+
+class Details(TypedDict, total=False):
+    """What a `Scene` can be given by keyword only."""
+
+    dt: float | None
+    extra_invariants: Iterable[Invariant]
+    group: str
+    source: str
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Scene(_Fields):
     """A rigid body turning about a fixed point, from a start, for a time.
 
     Parameters
@@ -39,28 +68,18 @@ class Scene:
     potential
         What acts on the body; None for a free body, which then carries no torque code anywhere.
     dt
-        Step of the source, s: what commands and studies take when nobody says otherwise.
+        By keyword, as all that follow: step of the source, s, which commands and studies take unless told otherwise; default
+        a 20th of a radian of the start's rate, at most a hundredth of t_end.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
-        Heading under which `conservative list` shows the scene, and where it comes from.
+        Heading under which `conservative list` shows the scene, default "your own", and where it comes from.
 
     Raises
     ------
     BadInput
         An argument is not finite, has another shape, or is not a rotation.
     """
-
-    name: str
-    body: RigidBody
-    R_WB0: Array
-    w_WB_B0: Array
-    t_end: float
-    potential: Potential | None
-    dt: float
-    extra_invariants: tuple[Invariant, ...]
-    group: str
-    source: str
 
     def __init__(
         self,
@@ -70,35 +89,16 @@ class Scene:
         w_WB_B0: ArrayLike,
         t_end: float,
         potential: Potential | None = None,
-        *,
-        dt: float | None = None,
-        extra_invariants: tuple[Invariant, ...] = (),
-        group: str = "your own",
-        source: str = "",
+        **details: Unpack[Details],
     ) -> None:
-        if not isinstance(name, str) or not name:
-            raise BadInput("name", repr(name), "a text of one character or more")
-        if not isinstance(body, RigidBody):
-            raise BadInput("body", repr(body), "a RigidBody")
-        if potential is not None and not isinstance(potential, Potential):
-            raise BadInput("potential", repr(potential), "None or a Potential such as UniformGravity")
+        _check_parts(name, body, potential)
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        self._set("name", name)
-        self._set("body", body)
-        self._set("R_WB0", rotation("R_WB0", R_WB0))
-        self._set("w_WB_B0", rates)
-        self._set("t_end", end)
-        self._set("potential", potential)
-        self._set("dt", _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s"))
-        self._set("extra_invariants", tuple(extra_invariants))
-        self._set("group", group)
-        self._set("source", source)
-
-    def _set(self, name: str, value: Any) -> None:
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False
-        object.__setattr__(self, name, value)
+        others: dict[str, Any] = {**details}
+        dt, more = others.pop("dt", None), tuple(others.pop("extra_invariants", ()))
+        step = _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s")
+        R = rotation("R_WB0", R_WB0)
+        super().__init__(name, body, R, rates, end, potential, step, more, **others)
 
     @property
     def free(self) -> bool:
@@ -122,7 +122,32 @@ class Scene:
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
         """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
-        return (*invariants_of(self), *self.extra_invariants)
+        return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
+
+    @cached_property
+    def symmetry_axis_B(self) -> Array | None:
+        """Unit vector (3,), body axes, about which body and field are symmetric; None where they are not."""
+        return axial_direction(self.body, self.potential)
+
+    @cached_property
+    def _derivations(self) -> dict[Any, Any]:
+        return {}
+
+    def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
+        """Return `function(self, *settings)`, kept as long as the scene is: a scene never changes. Settings are hashable."""
+        known, key = self._derivations, (function, settings)
+        try:
+            return known[key]
+        except KeyError:
+            found = function(self, *settings)
+            if len(known) >= MOST_DERIVATIONS:
+                known.clear()
+            known[key] = found
+        return found
+
+    def forget(self) -> None:
+        """Drop what `derive` has kept, so that whoever times the preparation of a run times all of it."""
+        self._derivations.clear()
 
     def renamed(self, name: str, **changes: Any) -> Scene:
         """Return the scene under another name and with other fields where `changes` says so."""
@@ -130,6 +155,15 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({self.name!r}, {self.body!r}, potential={self.potential!r}, t_end={self.t_end:g})"
+
+
+def _check_parts(name: object, body: object, potential: object) -> None:
+    if not isinstance(name, str) or not name:
+        raise BadInput("name", repr(name), "a text of one character or more")
+    if not isinstance(body, RigidBody):
+        raise BadInput("body", repr(body), "a RigidBody")
+    if potential is not None and not isinstance(potential, Potential):
+        raise BadInput("potential", repr(potential), "None or a Potential such as UniformGravity")
 
 
 def _usual_step(w_WB_B0: Array, t_end: float) -> float:

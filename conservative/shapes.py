@@ -21,7 +21,7 @@ from .attitude import Array
 from .body import RigidBody
 from .check import finite_array, finite_number, positive_number, rotation
 from .errors import BadInput
-from .potentials.potential import UniformGravity
+from .potentials.uniform_gravity import UniformGravity
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -31,7 +31,14 @@ _LENGTH = "a finite length above 0, m"
 
 
 @dataclass(frozen=True, eq=False)
-class MassDistribution:
+class _Fields:
+    mass: float
+    com_B: Array
+    inertia_com: Array
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class MassDistribution(_Fields):
     """Mass, centre of mass and inertia about it: what a shape or an engine's model file says of a body.
 
     Parameters
@@ -49,15 +56,12 @@ class MassDistribution:
         The mass is not a finite number above 0, `com_B` not three finite numbers, or the inertia none that a `RigidBody` takes.
     """
 
-    mass: float
-    com_B: Array
-    inertia_com: Array
-
     def __init__(self, mass: float, com_B: ArrayLike, inertia_com: ArrayLike) -> None:
-        object.__setattr__(self, "mass", positive_number("mass", mass, "a finite mass above 0, kg"))
-        object.__setattr__(self, "com_B", finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"))
-        self.com_B.flags.writeable = False
-        object.__setattr__(self, "inertia_com", RigidBody(inertia_com).inertia)
+        super().__init__(
+            positive_number("mass", mass, "a finite mass above 0, kg"),
+            finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
+            RigidBody(inertia_com).inertia,
+        )
 
     @property
     def inertia(self) -> Array:

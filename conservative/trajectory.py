@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import invariants
+from . import invariants, presentation
 from .attitude import Array
 from .errors import IntegrationFailed
+from .invariants import Invariant
 from .outcome import OK, Outcome
 from .scene import Scene
 
 if TYPE_CHECKING:
     import altair
     import pandas
-
-    from .invariants import Invariant
-    from .methods.automatic import Choice
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,34 @@ class Counters:
     stages: int | None = None
     iterations: int | None = None
     evaluations: int | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `integrate(scene, error=...)` chose.
+
+    Attributes
+    ----------
+    method, dt
+        The `Method` that made the trajectory, and its step, s.
+    error
+        Attitude error asked for over the run, rad.
+    estimate
+        Estimated attitude error over the run, rad, from the same run at twice the step.
+    attempts
+        Steps tried on the whole run, s, with the estimate of each, rad.
+    """
+
+    method: Any  # a `Method`; that file imports this one
+    dt: float
+    error: float
+    estimate: float
+    attempts: tuple[tuple[float, float], ...]
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimate is within what was asked for."""
+        return self.estimate <= self.error
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +114,11 @@ class Trajectory:
         """Angular momentum about the fixed point (n, 3), kg m^2/s, world axes."""
         return invariants.momentum_W(self.scene.body, self.R_WB, self.w_WB_B)
 
+    @property
+    def work(self) -> dict[str, int]:
+        """Counts of work by their names, those that the method has."""
+        return {name: count for name, count in vars(self.counters).items() if count is not None}
+
     def drift(self, invariant: Invariant) -> Array:
         """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
 
@@ -104,9 +135,7 @@ class Trajectory:
         MissingExtra
             pandas, of the extra `report`, is not installed.
         """
-        from .presentation import table
-
-        return table(self)
+        return presentation.table(self)
 
     def plot(self) -> altair.VConcatChart:
         """Return a chart of the body rates and of the drift of every invariant over time.
@@ -118,14 +147,10 @@ class Trajectory:
         MissingExtra
             Altair or pandas, of the extra `report`, is not installed.
         """
-        from .presentation import picture
-
-        return picture(self)
+        return presentation.picture(self)
 
     def _repr_html_(self) -> str:
-        from .presentation import card
-
-        return card(self)
+        return presentation.card(self)
 
     def __len__(self) -> int:
         return len(self.t)

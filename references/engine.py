@@ -11,23 +11,23 @@ Source of the mass model: our own, see `mass_model`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from importlib import import_module, metadata
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, axes_about, to_quaternion
 from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
 from conservative.invariants import axial_direction
 from conservative.method import Grid
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix
 
 
-@cache
+@lru_cache(maxsize=32)
 def version(package: str, engine: str) -> str:
     """Return the version of an installed package; the engine itself is not imported.
 
@@ -42,7 +42,7 @@ def version(package: str, engine: str) -> str:
         raise MissingEngine(engine, package) from None
 
 
-@cache
+@lru_cache(maxsize=32)
 def load(module: str, package: str, engine: str) -> Any:
     """Return an engine's module, imported at the first call.
 
@@ -120,10 +120,7 @@ def symmetric_axes(scene: Scene) -> Axes | None:
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    R_BF = np.column_stack([first, np.cross(axis, first), axis])
+    R_BF = axes_about(axis)
     return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 
 

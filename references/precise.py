@@ -1,14 +1,17 @@
 """Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers.
 
-Source: heyoka's documentation and Biscani & Izzo (2021); the equations are those of `conservative.references.heyoka_equations.forms`.
+Source: heyoka's documentation and Biscani & Izzo (2021); the parts of the equations are those of
+`conservative.references.heyoka_equations.forms`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
+from threading import RLock
 from typing import Any, ClassVar
 
 import mpmath
@@ -19,7 +22,7 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -55,6 +58,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "grey"
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)
@@ -71,7 +75,8 @@ class Precise(Method):
     def unsupported(self, scene: Scene) -> str | None:
         if scene.potential is None or type(scene.potential) in FIELDS:
             return None
-        return f"no multi-precision expressions for {type(scene.potential).__name__}; add them to conservative.references.heyoka_equations.torques.FIELDS"
+        kind, table = type(scene.potential).__name__, "conservative.references.heyoka_equations.torques.FIELDS"
+        return f"no multi-precision expressions for {kind}; add them to {table}"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         field = None if scene.potential is None else FIELDS[type(scene.potential)]
@@ -131,8 +136,8 @@ def states(
     field = None if moment_B is None else FIELDS[UniformGravity]
     solve = _solver(inertia, q0, w0, field, () if moment_B is None else moment_B, bits)
     _, _, found = solve(_reals([0, *t], bits))
-    with mpmath.workprec(bits):
-        rows = [[mpmath.mpf(str(x)) for x in row] for row in found[1:]]
+    with _digits(bits) as mp:
+        rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in found[1:]]
     return [row[:4] for row in rows], [row[4:] for row in rows]
 
 
@@ -142,70 +147,77 @@ def _check_bits(bits: object) -> None:
         raise BadInput("bits", repr(bits), allowed)
 
 
-def _equations(field: Field | None) -> Callable[[Sequence[forms.Expression]], forms.Equations]:
-    return _free if field is None else _in_field(field)
+@dataclass(frozen=True)
+class System:
+    """The equations q' = q w / 2 and w' = J^-1 (J w x w + torque) of a field or none.
+
+    State (q, w), parameters J (9), J^-1 (9) and the field's.
+    """
+
+    field: Field | None
+
+    def __call__(self, parameters: Sequence[forms.Expression]) -> forms.Equations:
+        """Return the equations with these parameters."""
+        hy = forms.heyoka()
+        q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
+        J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
+        torque = forms.cross(forms.product(J, w), w)
+        if self.field is not None:
+            torque = [a + b for a, b in zip(torque, self.field.torque(q, rest), strict=True)]
+        return [*zip(q, forms.kinematics_in_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]
 
 
-def _free(parameters: Sequence[forms.Expression]) -> forms.Equations:
-    return _system(parameters, None)
-
-
-@cache
-def _in_field(field: Field) -> Callable[[Sequence[forms.Expression]], forms.Equations]:
-    return lambda parameters: _system(parameters, field)
-
-
-def _system(parameters: Sequence[forms.Expression], field: Field | None) -> forms.Equations:
-    """Return q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w), parameters J (9), J^-1 (9) and the field's."""
-    hy = forms.heyoka()
-    q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
-    J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
-    torque = forms.cross(forms.product(J, w), w)
-    if field is not None:
-        torque = [a + b for a, b in zip(torque, field.torque(q, rest), strict=True)]
-    return [*zip(q, forms.turned_by_body(q, w), strict=True), *zip(w, forms.product(K, torque), strict=True)]
-
-
-@cache
-def _compiled(form: forms.Form, bits: int) -> Any:
+@lru_cache(maxsize=64)
+def _compile(form: forms.Form, bits: int) -> forms.Integrators:
     hy = forms.heyoka()
     equations = form.build()
+    zeros = _reals([0] * len(equations), bits)
     # Compact mode: the code of some 90 orders would take minutes to compile written out, and is no faster on these numbers.
-    return hy.taylor_adaptive(equations, _reals([0] * len(equations), bits), fp_type=hy.real, prec=bits, compact_mode=True)
+    return forms.Integrators(hy.taylor_adaptive(equations, zeros, fp_type=hy.real, prec=bits, compact_mode=True))
 
 
 def _solver(
     inertia: Sequence[Any], q0: Any, w0: Any, field: Field | None, values: Sequence[Number], bits: int
 ) -> Callable[[Reals], tuple[Any, int, Reals]]:
     """Return the function that takes times, the first 0, to outcome, number of steps and states (n, 7)."""
-    with mpmath.workprec(bits + 32):
-        J = mpmath.matrix(
-            [[_mpf(x) for x in row] for row in inertia] if np.ndim(inertia) == 2 else mpmath.diag(list(map(_mpf, inertia)))
-        )
-        quaternion = [_mpf(x) for x in q0]
-        norm = mpmath.sqrt(mpmath.fsum(x * x for x in quaternion))
+    with _digits(bits + 32) as mp:
+        J = _tensor(mp, inertia)
+        quaternion = [_mpf(mp, x) for x in q0]
+        norm = mp.sqrt(mp.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
-        form, used = forms.form_of(_equations(field), [*J, *J**-1, *map(_mpf, values)])
+        form, used = forms.form_of(System(field), [*J, *J**-1, *(_mpf(mp, x) for x in values)])
         parameters = _reals(used, bits)
-    integrator = _compiled(form, bits)
+    integrators = _compile(form, bits)
 
     def solve(t: Reals) -> tuple[Any, int, Reals]:
-        integrator.time = _real(0, bits)
-        integrator.state[:], integrator.pars[:] = start, parameters
-        outcome, _, _, steps, _, found = integrator.propagate_grid(t)
+        with integrators.borrow() as integrator:
+            integrator.time = _real(0, bits)
+            integrator.state[:], integrator.pars[:] = start, parameters
+            outcome, _, _, steps, _, found = integrator.propagate_grid(t)
         return outcome, int(steps), found
 
     return solve
 
 
-def _tensor(inertia: Sequence[Any]) -> mpmath.matrix:
+_mp = mpmath.MPContext()
+_mp_lock = RLock()
+
+
+@contextmanager
+def _digits(bits: int) -> Iterator[Any]:
+    """Lend mpmath in as many bits: a context of our own, as that of the user has one precision for all threads."""
+    with _mp_lock, _mp.workprec(bits):
+        yield _mp
+
+
+def _tensor(mp: Any, inertia: Sequence[Any]) -> Any:
     if np.ndim(inertia) == 1:
-        return mpmath.diag([_mpf(x) for x in inertia])
-    return mpmath.matrix([[_mpf(x) for x in row] for row in inertia])
+        return mp.diag([_mpf(mp, x) for x in inertia])
+    return mp.matrix([[_mpf(mp, x) for x in row] for row in inertia])
 
 
-def _mpf(x: Number) -> mpmath.mpf:
-    return mpmath.mpf(float(x) if isinstance(x, np.floating) else x)
+def _mpf(mp: Any, x: Number) -> Any:
+    return mp.mpf(float(x) if isinstance(x, np.floating) else x)
 
 
 def _real(x: Number, bits: int) -> Any:
@@ -213,8 +225,8 @@ def _real(x: Number, bits: int) -> Any:
     hy = forms.heyoka()
     if isinstance(x, float | int):
         return hy.real(x, bits)
-    with mpmath.workprec(bits + 32):
-        return hy.real(mpmath.nstr(_mpf(x), math.ceil(bits * 0.30103) + 5), bits)
+    with _digits(bits + 32) as mp:
+        return hy.real(mp.nstr(_mpf(mp, x), math.ceil(bits * 0.30103) + 5), bits)
 
 
 def _reals(values: Sequence[Number], bits: int) -> Reals:

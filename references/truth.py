@@ -12,7 +12,7 @@ motion amplifies errors. Source: our own.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -112,8 +112,17 @@ def _pair(scene: Scene) -> tuple[Method, Method, float]:
     return SciPy("DOP853", TIGHTEST), SciPy("LSODA", 1e-12), 1e-6
 
 
-@lru_cache(maxsize=64)
+_AGREEMENTS: WeakKeyDictionary[Scene, tuple[tuple[Method, Method, float], float]] = WeakKeyDictionary()
+"""The last check of each scene that is in use: grids change more often than scenes."""
+
+
 def _agreement(scene: Scene, first: Method, second: Method, until: float) -> float:
-    """Return the difference over the first `until` s; kept, as grids change more often than scenes."""
+    """Return the difference over the first `until` s."""
+    key = first, second, until
+    known = _AGREEMENTS.get(scene)
+    if known is not None and known[0] == key:
+        return known[1]
     grid = Grid(until / CHECKED_SAMPLES, CHECKED_SAMPLES)
-    return difference(first.prepare(scene, grid)(), second.prepare(scene, grid)())
+    found = difference(first.prepare(scene, grid)(), second.prepare(scene, grid)())
+    _AGREEMENTS[scene] = key, found
+    return found

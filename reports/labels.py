@@ -13,7 +13,7 @@ def family(name: str) -> str:
     return re.split("[: ]", name, maxsplit=1)[0]
 
 
-def shown(method: str, label: str) -> str:
+def display_name(method: str, label: str) -> str:
     """Return what to call a method: `mujoco 4.0.0 RK4`; ours without the version, which the end of the report has."""
     package, equals, rest = label.partition("==")
     version, _, setting = rest.partition("/")
@@ -26,6 +26,6 @@ def shown(method: str, label: str) -> str:
 
 def without_tolerance(name: str) -> str:
     """Return what to call a line of points that differ in tolerance alone."""
-    *words, setting = name.split(" ")
-    kept = ",".join(part for part in setting.split(",") if not _TOLERANCE.match(part))
-    return " ".join(filter(None, (*words, kept)))
+    *words, settings = name.split(" ")
+    others = ",".join(part for part in settings.split(",") if not _TOLERANCE.match(part))
+    return " ".join(filter(None, (*words, others)))

@@ -168,7 +168,3 @@ def test_command_line(line, tmp_path, monkeypatch):
         assert piece in outcome.stderr
     assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
     assert (tmp_path / "kept.txt").read_text() == "mine"
-
-
-def test_the_table_is_as_long_as_it_was_meant_to_be():
-    assert len(API) + len(COMMANDS) >= 60

@@ -28,7 +28,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import conservative
-from conservative import check, errors, registry
+from conservative import check, entry_points, errors, registry
 from conservative.attitude import Array
 from conservative.check import positive_number
 from conservative.errors import BadInput, MissingEngine
@@ -169,7 +169,7 @@ def test_shapes_units_and_errors_are_documented(name):
 def test_everything_in_all_is_walked():
     walked = {n.partition(".")[0] for name in public_modules() for n, *_ in members(importlib.import_module(name))}
     functions = {name for name in conservative.__all__ if inspect.isfunction(getattr(conservative, name))}
-    methods = {entry.load().__name__ for entry in registry.registered(registry.METHODS).values()}
+    methods = {entry.load().__name__ for entry in entry_points.list_entries(entry_points.METHODS).values()}
     assert functions | methods <= walked
 
 
@@ -178,8 +178,11 @@ def test_everything_in_all_is_walked():
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
     "conservative.lazy_kernels": "imports",
+    "conservative.declarations": "values",
+    "conservative.entry_points": "names",
     "conservative.errors": "exceptions",
     "conservative.method": "the protocol",
+    "conservative.outcome": "an enum and a value",
     "conservative.presentation": "tables and cards",
     "conservative.registry": "names",
     "conservative.scene": "a value",
@@ -212,7 +215,7 @@ def words_of(module):
     return "\n".join([module.__doc__ or "", *(inspect.getdoc(found) or "" for found in own)])
 
 
-@pytest.mark.parametrize("name", sorted(registry.registered(registry.SCENES)))
+@pytest.mark.parametrize("name", sorted(registry.list_scenes()))
 def test_scenes_name_their_source(name):
     assert registry.scene(name).source
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.benchmarks.gate import baseline, compare, dashboards, results, yardstick
-from conservative.benchmarks.gate.results import Results, Row
+from conservative.benchmarks.gate.results import Results, Row, Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.verification.gate_false_alarms import Slower
 from conservative.registry import method, scene
@@ -31,7 +31,7 @@ class NoGyroscopicTerm(cv.Method):
     """A negative control: the body keeps its rates."""
 
     family: ClassVar[str] = "control"
-    role: ClassVar[str] = "ours"
+    role: ClassVar[cv.Role] = cv.Role.OURS
 
     @property
     def order(self):
@@ -43,14 +43,33 @@ class NoGyroscopicTerm(cv.Method):
         return lambda: cv.Trajectory(scene, grid.t, scene.R_WB0 @ turns, np.tile(w, (len(turns), 1)), self.label)
 
 
+COMPILED_TURN = yardstick.compiled_turn
+STEP, TURN = 1e-7, 2e-8
+"""Time, s, of a step of any method and of a turn of the yardstick on a clock that only counts them."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def clock():
+    """Time as the gate sees it, without the machine: each step takes as long as all others."""
+
+    def wall_time(run, calls=1):
+        done = run()
+        return calls * (done * TURN if isinstance(done, int) else done.counters.steps * STEP)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(yardstick, "wall_time", wall_time)
+        patch.setattr(yardstick, "compiled_turn", lambda: lambda n_steps, h: n_steps)
+        yield
+
+
 def measured(name, instead=None):
     """The row of a method; with `instead`, measured with another one that goes by its name."""
     point = points.Point(BRICK, method(name))
     labels = point.labels
-    found = points.gated(replace(point, method=instead or point.method))
+    found = points.measure(replace(point, method=instead or point.method))
     values, spreads = ({key: getattr(each, kind) for key, each in found.items()} for kind in ("value", "spread"))
     ratio = yardstick.time_ratio(instead or point.method, BRICK, BRICK.dt) if name == SECOND and not instead else None
-    return Row(point.id, BRICK.name, name, "passed", labels["engine"], labels["definition"], values, spreads, ratio)
+    return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads, ratio)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +80,7 @@ def untouched():
 
 @pytest.fixture(scope="module")
 def kept(untouched):
-    return baseline.updated(None, [untouched], "the first one")
+    return baseline.update_baseline(None, [untouched], "the first one")
 
 
 def with_row(untouched, name, **changes):
@@ -74,24 +93,40 @@ def with_row(untouched, name, **changes):
 
 def failures(kept, found, times="required"):
     """The violations as (measure, method), and their text."""
-    verdict = compare.judged(kept, found, times)
+    verdict = compare.judge(kept, found, times)
     assert verdict.passed == (not verdict.violations)
     return {(each.measure, each.method) for each in verdict.violations}, str(verdict)
 
 
 def test_an_untouched_run_passes(kept, untouched):
-    limits = {row.method: row.time_ratios for row in kept.rows.values()}
     again = [measured(name) for name in METHODS]
-    ratio = yardstick.confirmed(again[0].time_ratio, limits[SECOND][MACHINE].limit, lambda: measured(SECOND).time_ratio)
-    again[0] = replace(again[0], time_ratio=ratio)
+    assert again[0].time_ratio == pytest.approx(STEP / TURN, rel=1e-12)
     assert failures(kept, Results(MACHINE, {row.id: row for row in again}))[0] == set()
 
 
-def test_a_kernel_1_3_times_slower(kept, untouched):
-    slow = yardstick.time_ratio(Slower(method(SECOND), 1.3), BRICK, BRICK.dt)
+@pytest.mark.parametrize(("factor", "caught"), [(1.05, False), (1.3, True)])
+def test_a_slower_kernel(kept, untouched, factor, caught):
+    slow = yardstick.time_ratio(Slower(method(SECOND), factor), BRICK, BRICK.dt)
+    assert slow == pytest.approx(factor * STEP / TURN, rel=1e-3)  # measured 1e-4 off: steps are whole
     found, text = failures(kept, with_row(untouched, SECOND, time_ratio=slow))
-    assert found == {("time ratio", SECOND)}  # measured 1.30 times the baseline's; 1.10 is allowed
-    assert "time ratio, brick_flip, reduced: was " in text
+    assert found == ({("time ratio", SECOND)} if caught else set())  # 1.10 is allowed
+    assert ("time ratio, brick_flip, reduced: was " in text) == caught
+
+
+def test_the_yardstick_is_compiled_from_the_loop_that_is_hashed():
+    assert COMPILED_TURN()(3, 0.1) == pytest.approx(yardstick.turn(3, 0.1), rel=1e-14)  # measured 0
+    assert "def turn" in yardstick.definition()
+
+
+@pytest.mark.parametrize(
+    ("repeats", "taken", "least"), [([9.0, 9.0, 9.0], 3, 9.0), ([0.9, 9.0, 9.0], 1, 0.9), ([1.5, 1.2, 1.1], 3, 1.1)]
+)
+def test_what_looks_too_slow_is_measured_again(repeats, taken, least, monkeypatch):
+    monkeypatch.setattr(yardstick, "sleep", lambda pause: None)
+    rest = iter(repeats)
+    assert yardstick.confirm(9.5, 1.0, lambda: next(rest)) == least
+    assert len(list(rest)) == len(repeats) - taken
+    assert yardstick.confirm(0.5, 1.0, lambda: pytest.fail("within its limit")) == 0.5
 
 
 def test_one_more_newton_iteration(kept, untouched):
@@ -154,7 +189,7 @@ def test_a_row_removed_or_renamed(kept, untouched):
 
 @pytest.mark.parametrize("status", ["skipped", "failed", "error", "xfailed"])
 def test_a_row_that_did_not_pass(kept, untouched, status):
-    found, text = failures(kept, with_row(untouched, SECOND, status=status))
+    found, text = failures(kept, with_row(untouched, SECOND, status=Status(status)))
     assert found == {("row", SECOND)}
     assert f"was passed, is {status}" in text
 
@@ -180,7 +215,7 @@ def test_a_baseline_of_a_foreign_machine(kept, untouched):
     assert "note: unbaselined machine" in text
     worse = replace(with_row(untouched, SECOND, values={"rate error max": 1.0}), machine="another")
     assert failures(kept, worse, "known")[0] == {("rate error max", SECOND)}  # all but time is gated everywhere
-    both = baseline.updated(kept, [elsewhere], "a second machine")
+    both = baseline.update_baseline(kept, [elsewhere], "a second machine")
     assert failures(both, elsewhere)[0] == failures(both, untouched)[0] == set()
 
 
@@ -228,11 +263,12 @@ def test_the_command_compares_and_accepts(kept, untouched, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "changes", [{"status": "failed"}, {"values": {"rate error max": float("nan")}}, {"values": {"iterations": float("inf")}}]
+    "changes",
+    [{"status": Status.FAILED}, {"values": {"rate error max": float("nan")}}, {"values": {"iterations": float("inf")}}],
 )
 def test_what_failed_cannot_be_accepted(kept, untouched, changes):
     with pytest.raises(cv.BadInput):
-        baseline.updated(kept, [with_row(untouched, SECOND, **changes)], "no")
+        baseline.update_baseline(kept, [with_row(untouched, SECOND, **changes)], "no")
 
 
 def test_the_limit_of_a_time_follows_from_repeats():

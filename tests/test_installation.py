@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from conservative.extras import EXTRAS
+from conservative.errors import EXTRAS
 
 from .environments import ROOT, variables
 

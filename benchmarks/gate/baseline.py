@@ -7,20 +7,23 @@ import json
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from conservative.errors import BadInput
+from conservative.trajectory import Counters
 
-from .results import PASSED, Results, Row
+from ..measures.measure import Measure
+from .results import Results, Row, Status
 
 PATH = Path("benchmarks") / "baseline.json"
 """Where a project keeps its baseline, relative to its root."""
 FORMAT = 1
-ORDER = "observed order"
-COUNTS = ("steps", "stages", "iterations", "evaluations")
+ORDER = Measure.ORDER.text
+COUNTS = tuple(field.name for field in fields(Counters))
+"""Measures that are whole numbers: the work that a method counts."""
 SPREADS = 5.0
 """How many times its measured spread a value may move."""
 ROUND_OFF = 8 * 2.0**-52
@@ -99,7 +102,7 @@ def time_limit(ratios: Sequence[float], rows: int) -> Allowed:
     return Allowed(value, spread * value, n, value * (1 + margin))
 
 
-def updated(old: Baseline | None, runs: Sequence[Results], reason: str) -> Baseline:
+def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) -> Baseline:
     """Return the baseline that accepts runs of one commit, with the reason in its history.
 
     Time ratios of machines that took no part stay. Rows that were not run, or skipped, are dropped, which the history says.
@@ -112,11 +115,11 @@ def updated(old: Baseline | None, runs: Sequence[Results], reason: str) -> Basel
     if not reason.strip():
         raise BadInput("update", repr(reason), "the reason for the change, which goes into the history of the baseline")
     before = old.rows if old else {}
-    failed = [row.id for run in runs for row in run.rows.values() if row.status in ("failed", "error")]
+    failed = [row.id for run in runs for row in run.rows.values() if row.status in (Status.FAILED, Status.ERROR)]
     if failed:
         raise BadInput("results", f"rows that failed: {', '.join(failed)}", "runs without failures: a failure is not accepted")
     timed = sum(row.time_ratio is not None for row in runs[0].rows.values())
-    rows = {row.id: _row(row, runs, before.get(row.id), timed) for row in runs[0].rows.values() if row.status == PASSED}
+    rows = {row.id: _row(row, runs, before.get(row.id), timed) for row in runs[0].rows.values() if row.status is Status.PASSED}
     entry = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "reason": reason.strip(),

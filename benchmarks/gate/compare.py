@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .baseline import ORDER, Allowed, Baseline, BaselineRow
-from .results import PASSED, TIME_RATIO, Results, Row
+from .results import TIME_RATIO, Results, Row, Status
 
 Times = Literal["required", "known"]
 """required: the baseline has to know times on this machine. known: where it does not, time is not gated, and that is said."""
@@ -48,10 +48,12 @@ class Verdict:
         return "\n".join([head, *map(str, self.violations), *(f"note: {note}" for note in self.notes)])
 
 
-def judged(baseline: Baseline, results: Results, times: Times = "required") -> Verdict:
+def judge(baseline: Baseline, results: Results, times: Times = "required") -> Verdict:
     """Return the verdict on results. A baseline without rows, which would let everything pass, is a violation."""
     violations = [] if baseline.rows else [Violation("rows", "all", "all", "none", "none", "one or more")]
-    notes = [f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status == PASSED]
+    notes = [
+        f"unbaselined: {id}" for id, row in results.rows.items() if id not in baseline.rows and row.status is Status.PASSED
+    ]
     known = {machine for row in baseline.rows.values() for machine in row.time_ratios}
     foreign = bool(known) and results.machine not in known
     if foreign and times == "required":
@@ -77,10 +79,10 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
 
     row = results.rows.get(id)
     if row is None:
-        names = list(_renamed(was, results))
-        yield violation("row", PASSED, f"renamed {names[0]}" if names else "missing", PASSED)
-    elif row.status != PASSED:
-        yield violation("row", PASSED, row.status, PASSED)
+        names = list(_find_renames(was, results))
+        yield violation("row", Status.PASSED, f"renamed {names[0]}" if names else "missing", Status.PASSED)
+    elif row.status is not Status.PASSED:
+        yield violation("row", Status.PASSED, row.status, Status.PASSED)
     elif row.definition != was.definition:
         yield violation("definition", was.definition, row.definition, was.definition)
     elif row.engine != was.engine:
@@ -88,14 +90,14 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
     else:
         for name, allowed in was.measures.items():
             if not passes(name, row.values.get(name, math.nan), allowed):
-                yield violation(name, f"{allowed.value:.6g}", _shown(row.values.get(name)), _bound(name, allowed))
+                yield violation(name, f"{allowed.value:.6g}", _write_value(row.values.get(name)), _bound(name, allowed))
         ratio = was.time_ratios.get(results.machine)
         now = math.nan if row.time_ratio is None else row.time_ratio
         if ratio and not foreign and not passes(TIME_RATIO, now, ratio):
-            yield violation(TIME_RATIO, f"{ratio.value:.4g}", _shown(row.time_ratio), _bound(TIME_RATIO, ratio))
+            yield violation(TIME_RATIO, f"{ratio.value:.4g}", _write_value(row.time_ratio), _bound(TIME_RATIO, ratio))
 
 
-def _renamed(was: BaselineRow, results: Results) -> Iterator[str]:
+def _find_renames(was: BaselineRow, results: Results) -> Iterator[str]:
     for row in results.rows.values():
         if row.definition and (row.definition, row.scene, row.method) == (was.definition, was.scene, was.method):
             yield row.id
@@ -111,7 +113,7 @@ def _bound(measure: str, allowed: Allowed) -> str:
     return f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
 
 
-def _shown(value: float | None) -> str:
+def _write_value(value: float | None) -> str:
     return "missing" if value is None else f"{value:.6g}"
 
 

@@ -9,10 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ..measures.measure import Measure
 from .baseline import ORDER
 from .compare import Verdict
-from .results import PASSED, TIME_RATIO, Results, Row
+from .results import TIME_RATIO, Results, Row, Status
 
+UNITS = {measure.text: measure.unit for measure in Measure}
 SMALLER_IS_BETTER, BMF, SUMMARY = "custom_smaller_is_better.json", "bencher.json", "summary.md"
 
 
@@ -27,7 +29,7 @@ def smaller_is_better(results: Results) -> list[dict[str, Any]]:
     return [
         {"name": f"{_name(row)} / {measure}", "unit": _unit(measure), "value": value, "extra": row.engine or results.commit}
         for row in results.rows.values()
-        if row.status == PASSED
+        if row.status is Status.PASSED
         for measure, value in _values(row)
         if measure != ORDER
     ]
@@ -35,7 +37,7 @@ def smaller_is_better(results: Results) -> list[dict[str, Any]]:
 
 def bmf(results: Results) -> dict[str, dict[str, dict[str, float]]]:
     """Return Bencher's metric format: benchmark, measure, value with its lower and upper ends where a spread is known."""
-    rows = [row for row in results.rows.values() if row.status == PASSED]
+    rows = [row for row in results.rows.values() if row.status is Status.PASSED]
     return {_name(row): {_slug(name): _metric(row, name, value) for name, value in _values(row)} for row in rows}
 
 
@@ -64,7 +66,7 @@ def _unit(measure: str) -> str:
         return "s"
     if measure == TIME_RATIO:
         return "steps of the yardstick"
-    return "rad" if measure.startswith("attitude error") else "1"
+    return UNITS.get(measure, "1")
 
 
 def markdown(verdict: Verdict) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
-import subprocess
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +15,9 @@ from typing import Any
 
 import pytest
 
+from ..measures.origin import commit, machine
 from . import baseline, compare, dashboards, results, yardstick
-from .results import TIME_RATIO, Results, Row
+from .results import TIME_RATIO, Results, Row, Status
 from .stash import REPEAT
 
 
@@ -78,7 +78,7 @@ class Gate:
                 if REPEAT in item.stash:
                     self.repeats[id] = item.stash[REPEAT]
             elif report.when == "teardown" and not report.passed:
-                self.rows[id] = replace(self.rows[id], status="error")
+                self.rows[id] = replace(self.rows[id], status=Status.ERROR)
         return report
 
     def finish(self) -> compare.Verdict:
@@ -89,13 +89,13 @@ class Gate:
         NoBaseline
             There is nothing to compare with.
         """
-        found = Results(results.machine(), self.rows, _commit(self.root))
+        found = Results(machine().times_key, self.rows, commit(self.root))
         results.write(found, self.folder / results.FILE)
         dashboards.write(found, self.folder)
         try:
             before = baseline.read(self.baseline)
-            found = self._confirmed(before, found)
-            self.verdict = compare.judged(before, found, self.times)
+            found = self._confirm(before, found)
+            self.verdict = compare.judge(before, found, self.times)
         except baseline.NoBaseline:
             self.without_baseline = True
             raise
@@ -106,13 +106,13 @@ class Gate:
                 file.write(text)
         return self.verdict
 
-    def _confirmed(self, before: baseline.Baseline, found: Results) -> Results:
+    def _confirm(self, before: baseline.Baseline, found: Results) -> Results:
         """Measure again what is too slow for the baseline, and keep the results that this leads to."""
         for id, again in self.repeats.items():
             limits = before.rows[id].time_ratios.get(found.machine) if id in before.rows else None
             ratio = self.rows[id].time_ratio
             if limits and ratio is not None:
-                self.rows[id] = replace(self.rows[id], time_ratio=yardstick.confirmed(ratio, limits.limit, again))
+                self.rows[id] = replace(self.rows[id], time_ratio=yardstick.confirm(ratio, limits.limit, again))
         found = replace(found, rows=self.rows)
         results.write(found, self.folder / results.FILE)
         return found
@@ -146,7 +146,7 @@ def row(item: pytest.Item, report: pytest.TestReport) -> Row:
         id=row_id(item),
         scene=str(info.get("scene", "")),
         method=str(info.get("method", "")),
-        status="xfailed" if hasattr(report, "wasxfail") else report.outcome,
+        status=Status.XFAILED if hasattr(report, "wasxfail") else Status(report.outcome),
         engine=str(info.get("engine", "")),
         definition=str(info.get("definition") or _source_hash(item)),
         values={name: float(info.get(name, "nan")) for name in spreads},
@@ -160,12 +160,3 @@ def _source_hash(item: pytest.Item) -> str:
     """Return the hash of a test's source and parameters: its definition, where it names none."""
     text = inspect.getsource(item.function) + item.name if isinstance(item, pytest.Function) else item.name
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _commit(folder: Path) -> str:
-    """Return the commit of a folder; "" outside git."""
-    try:
-        done = subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return done.stdout.strip()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import metadata
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,17 @@ from conservative.errors import BadInput
 FOLDER = Path(".benchmarks") / "gate"
 """Where a gated run leaves its results, relative to the root of the project."""
 FILE = "results.json"
-PASSED = "passed"
 TIME_RATIO = "time ratio"
+
+
+class Status(StrEnum):
+    """How a benchmark ended, as pytest calls it."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    SKIPPED = "skipped"
+    XFAILED = "xfailed"
+    ERROR = "error"
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,7 @@ class Row:
     id, scene, method
         What tells it apart: the test's name with its parameters; and what a reader looks for.
     status
-        "passed", or "failed", "skipped", "xfailed", "error".
+        How it ended.
     engine
         Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for what is itself under test.
     definition
@@ -44,7 +52,7 @@ class Row:
     id: str
     scene: str
     method: str
-    status: str
+    status: Status
     engine: str = ""
     definition: str = ""
     values: Mapping[str, float] = field(default_factory=dict)
@@ -60,23 +68,6 @@ class Results:
     machine: str
     rows: Mapping[str, Row]
     commit: str = ""
-
-
-def machine() -> str:
-    """Return what ratios of times depend on: processor and compiler, as far as they are known."""
-    numba = f"numba {metadata.version('numba')}"
-    return ", ".join((_processor(), platform.machine(), numba))
-
-
-def _processor() -> str:
-    """Return the processor's name, family and model."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
-    except OSError:  # no such file outside Linux
-        return platform.processor() or platform.machine()
-    known = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
-    parts = [f"{key} {known[key]}" for key in ("cpu family", "model") if key in known]
-    return " ".join([known.get("model name", platform.processor() or "unknown"), *parts])
 
 
 def write(results: Results, path: Path) -> None:
@@ -102,7 +93,7 @@ def read(path: Path) -> Results:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         content = content.get("conservative", content)
-        rows = [Row(**row) for row in content["rows"]]
+        rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
         return Results(content["machine"], {row.id: row for row in rows}, content["commit"])
     except OSError as error:
         raise BadInput("results", f"{path} ({error.strerror})", allowed) from None

@@ -25,7 +25,7 @@ from conservative import registry
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
-from ..measures.timing import collector_off, elapsed
+from ..measures.timing import wall_time, without_collector
 
 SAMPLE = 0.0004
 """Duration of a sample, s."""
@@ -60,13 +60,13 @@ def turn(n_steps: int, h: float) -> float:
     return a + x
 
 
-def elsewhere(scene: str, method: str) -> float:
+def time_ratio_elsewhere(scene: str, method: str) -> float:
     """Return the time ratio of a registered method at the step of a registered scene, measured in a process of its own."""
     command = [sys.executable, "-m", "conservative.benchmarks.gate.yardstick", scene, method]
     return float(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
 
 
-def confirmed(ratio: float, limit: float, measure: Callable[[], float]) -> float:
+def confirm(ratio: float, limit: float, measure: Callable[[], float]) -> float:
     """Return the least of a ratio and, as long as it is above a limit, of what repeated measurements find."""
     for _ in range(AGAIN):
         if ratio <= limit:
@@ -77,7 +77,8 @@ def confirmed(ratio: float, limit: float, measure: Callable[[], float]) -> float
 
 
 @cache
-def _compiled() -> Any:
+def compiled_turn() -> Any:
+    """Return `turn`, compiled: once a process."""
     from numba import njit
 
     loop: Any = njit(cache=True, error_model="numpy")(turn)
@@ -92,7 +93,7 @@ def definition() -> str:
 
 def time_ratio(method: Method, scene: Scene, dt: float) -> float:
     """Return the time of a step of the method, in steps of the yardstick."""
-    loop = _compiled()
+    loop = compiled_turn()
     steps, run = _lasting(lambda n: method.prepare(scene, Grid(dt, n, n)))
     turns, reference = _lasting(lambda n: lambda: loop(n, 1e-3))
     again = [method.prepare(scene, Grid(dt, steps, steps)) for _ in range(PLACES - 1)]
@@ -106,7 +107,7 @@ def _lasting(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable
     while True:
         run = prepare(n)
         run()
-        spent = min(elapsed(run) for _ in range(5))
+        spent = min(wall_time(run) for _ in range(5))
         if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
             return n, run
         n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / max(spent, 1e-9))))
@@ -116,11 +117,11 @@ def settled_minimums(*runs: Callable[[], Any]) -> tuple[float, ...]:
     """Return the shortest time, s, of each run, sampled in turn until none gets shorter."""
     shortest = [math.inf for _ in runs]
     taken, quiet = 0, 0
-    with collector_off():
+    with without_collector():
         while quiet < GOES and taken < MOST_ROUNDS:
             before = list(shortest)
             for _ in range(ROUNDS):
-                shortest = [min(best, elapsed(run)) for best, run in zip(shortest, runs, strict=True)]
+                shortest = [min(best, wall_time(run)) for best, run in zip(shortest, runs, strict=True)]
             taken += ROUNDS
             calm = all(best > (1 - SETTLED) * old for best, old in zip(shortest, before, strict=True))
             quiet = quiet + 1 if calm else 0

@@ -13,6 +13,8 @@ from conservative.attitude import Array
 from conservative.check import finite_array
 from conservative.errors import BadInput
 
+from .line import fit_line
+
 MIN_POINTS = 3
 SHRINKING = 1 / 3
 """An error is still shrinking with the step where its local slope is above this part of the steepest slope seen."""
@@ -80,7 +82,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     BadInput
         The shapes differ, or a step is not finite, not above 0, or there twice.
     """
-    h, e = _checked(steps, errors)
+    h, e = check_points(steps, errors)
     order = [int(i) for i in np.argsort(-h) if math.isfinite(e[i])]
     if len(order) < MIN_POINTS:
         return _none(float("nan"), f"{len(order)} runs with an error; a fit takes {MIN_POINTS}")
@@ -92,15 +94,16 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     used = _without_preasymptotic(x, y, _without_bend(x, y, used) if math.isnan(floor) else used)
     if len(used) < MIN_POINTS:
         return _none(floor, f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}")
-    slope, stderr, _ = _fit(x[used], y[used])
-    return Order(slope, stderr, tuple(order[i] for i in used), floor)
+    line = fit_line(x[used], y[used])
+    return Order(line.slope, line.stderr, tuple(order[i] for i in used), floor)
 
 
 def _none(floor: float, reason: str) -> Order:
     return Order(float("nan"), float("nan"), (), floor, reason)
 
 
-def _checked(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
+def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
+    """Return both as arrays (n,); raise `BadInput` where no order can be fitted to them."""
     e = np.array(errors, dtype=float)
     h = finite_array("steps", steps, (e.shape,), f"as many finite steps as there are errors, {e.shape}")
     if h.ndim != 1 or (h <= 0).any() or len(np.unique(h)) < len(h):
@@ -126,15 +129,15 @@ def _descent(x: Array, y: Array) -> tuple[int, int]:
 def _without_bend(x: Array, y: Array, used: list[int]) -> list[int]:
     if len(used) <= MIN_POINTS:
         return used
-    rest, _, _ = _fit(x[used[:-1]], y[used[:-1]])
-    return used[:-1] if _pair(x, y, used[-2:]) < rest / 2 else used
+    rest = fit_line(x[used[:-1]], y[used[:-1]])
+    return used[:-1] if _pair(x, y, used[-2:]) < rest.slope / 2 else used
 
 
 def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
     while len(used) > MIN_POINTS:
-        _, _, scatter = _fit(x[used], y[used])
-        rest, _, rest_scatter = _fit(x[used[1:]], y[used[1:]])
-        if abs(_pair(x, y, used[:2]) - rest) <= BEND * abs(rest) or scatter <= CALMER * rest_scatter:
+        every, rest = fit_line(x[used], y[used]), fit_line(x[used[1:]], y[used[1:]])
+        bend = abs(_pair(x, y, used[:2]) - rest.slope)
+        if bend <= BEND * abs(rest.slope) or every.scatter <= CALMER * rest.scatter:
             break
         used = used[1:]
     return used
@@ -143,11 +146,3 @@ def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
 def _pair(x: Array, y: Array, pair: Sequence[int]) -> float:
     i, j = pair
     return float((y[i] - y[j]) / (x[i] - x[j]))
-
-
-def _fit(x: Array, y: Array) -> tuple[float, float, float]:
-    """Return the least-squares slope of three points or more, its standard error, and the points' scatter about the line."""
-    dx, dy = x - x.mean(), y - y.mean()
-    slope = float(dx @ dy / (dx @ dx))
-    scatter = math.sqrt(float(np.sum((dy - slope * dx) ** 2)) / (len(x) - 2))
-    return slope, scatter / math.sqrt(float(dx @ dx)), scatter

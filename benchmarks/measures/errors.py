@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,12 @@ import numpy as np
 from conservative.attitude import Array, angle_between, orthonormality
 from conservative.errors import BadInput
 from conservative.invariants import sizes
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-Value = tuple[str, float, str]
-"""Measure, value, unit."""
+from .line import fit_line
+from .measure import Measure, Value
 
 
 class Slope(NamedTuple):
@@ -24,8 +25,8 @@ class Slope(NamedTuple):
     stderr: float
 
 
-def measure(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
-    """Return every measure of a trajectory; `names(trajectory.scene)` has the same measures and units in the same order.
+def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
+    """Return every measure of a trajectory; `blanks(trajectory.scene)` has the same in the same order, without values.
 
     Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity also the
     distance of the centre of mass from where it should be, m. For each invariant of the scene: |I - I0| / scale, I0 that of the
@@ -48,21 +49,21 @@ def measure(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     R_ref, w_ref = truth.R_WB[:n], truth.w_WB_B[:n]
     attitude = angle_between(R_ref, trajectory.R_WB)
     rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=-1) / (np.linalg.norm(truth.w_WB_B, axis=-1).max() or 1.0)
-    found: list[Value] = [
-        ("attitude error max", float(attitude.max()), "rad"),
-        ("attitude error final", float(attitude[-1]), "rad"),
-        ("attitude error rms", float(np.sqrt(np.mean(attitude**2))), "rad"),
-        ("rate error max", float(rates.max()), "1"),
-        ("rate error final", float(rates[-1]), "1"),
+    found = [
+        Value(Measure.ATTITUDE_MAX, float(attitude.max())),
+        Value(Measure.ATTITUDE_FINAL, float(attitude[-1])),
+        Value(Measure.ATTITUDE_RMS, float(np.sqrt(np.mean(attitude**2)))),
+        Value(Measure.RATES_MAX, float(rates.max())),
+        Value(Measure.RATES_FINAL, float(rates[-1])),
     ]
     potential = trajectory.scene.potential
     if isinstance(potential, UniformGravity):
         position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=-1)
-        found += [("position error max", float(position.max()), "m"), ("position error final", float(position[-1]), "m")]
-    return found + drifts(trajectory)
+        found += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
+    return found + measure_drifts(trajectory)
 
 
-def drifts(trajectory: Trajectory) -> list[Value]:
+def measure_drifts(trajectory: Trajectory) -> list[Value]:
     """Return the measures that need no truth: drift of each invariant of the scene, and orthonormality."""
     found: list[Value] = []
     for invariant in trajectory.scene.invariants:
@@ -70,18 +71,18 @@ def drifts(trajectory: Trajectory) -> list[Value]:
         size = sizes(relative)
         slope = secular_slope(trajectory.t, relative)
         found += [
-            (f"{invariant.name} drift max", float(size.max()), "1"),
-            (f"{invariant.name} drift final", float(size[-1]), "1"),
-            (f"{invariant.name} drift slope", slope.value, "1/s"),
-            (f"{invariant.name} drift slope stderr", slope.stderr, "1/s"),
+            Value(Measure.DRIFT_MAX, float(size.max()), invariant.name),
+            Value(Measure.DRIFT_FINAL, float(size[-1]), invariant.name),
+            Value(Measure.DRIFT_SLOPE, slope.value, invariant.name),
+            Value(Measure.DRIFT_SLOPE_STDERR, slope.stderr, invariant.name),
         ]
-    return [*found, ("orthonormality max", float(orthonormality(trajectory.R_WB).max()), "1")]
+    return [*found, Value(Measure.ORTHONORMALITY, float(orthonormality(trajectory.R_WB).max()))]
 
 
-def names(scene: Scene) -> list[tuple[str, str]]:
-    """Return (measure, unit) of all that `measure` finds for a scene: what a run that failed has no values of."""
+def blanks(scene: Scene) -> list[Value]:
+    """Return all that `measure_errors` finds for a scene, without values: what a run that failed has."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
-    return [(name, unit) for name, _, unit in measure(start, start)]
+    return [found.blank for found in measure_errors(start, start)]
 
 
 def secular_slope(t: Array, drift: Array) -> Slope:
@@ -90,17 +91,12 @@ def secular_slope(t: Array, drift: Array) -> Slope:
     Of a vector (n, 3) the length of the three slopes. The standard error takes the residuals as independent; a drift that only
     oscillates has a slope within a few of them, or one that shrinks as the run gets longer.
     """
-    n = len(t)
-    if n < 3:
+    if len(t) < 3:
         return Slope(float("nan"), float("nan"))
-    columns = drift.reshape(n, -1)
-    centred = t - t.mean()
-    square = float(centred @ centred)
-    slopes = centred @ columns / square
-    residuals = columns - columns.mean(axis=0) - np.outer(centred, slopes)
-    variances = np.sum(residuals**2, axis=0) / (n - 2) / square
-    value = float(slopes[0]) if drift.ndim == 1 else float(np.linalg.norm(slopes))
-    return Slope(value, float(np.sqrt(variances.sum())))
+    if drift.ndim == 1:
+        return Slope(*fit_line(t, drift)[:2])
+    lines = [fit_line(t, column) for column in drift.T]
+    return Slope(math.hypot(*(line.slope for line in lines)), math.hypot(*(line.stderr for line in lines)))
 
 
 def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:

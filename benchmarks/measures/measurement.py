@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from conservative.method import Role
+from conservative.outcome import OK, Outcome, OutcomeKind
+
+from .measure import Measure
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Measurement:
     """One measured value.
 
     Attributes
     ----------
     study, scene
-        Names of the study that made the row and of the scene.
+        Names of the study that made the row and of the scene; the latter empty for what belongs to none.
     method
         Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
     role
-        "ours", "engine" or "truth".
+        Which side the method is on.
+    series
+        What one line of a picture is called: the method without its tolerance.
     dt
         Step, s, or distance of samples of an adaptive method; nan for what belongs to no single step.
-    measure, value, unit
-        What was measured, such as `energy drift max`, and how much of it; nan where nothing could be measured.
-    status
-        "ok", "missing", "unsupported", or what failed and when.
+    quantity
+        Name of the invariant that a drift is of; else empty.
+    measure, value
+        What was measured, and how much of it in the measure's unit; nan where nothing could be measured.
+    outcome
+        How the run ended, or why there was none.
     detail
         What a reader may want beside the value; may be empty.
     """
@@ -38,22 +48,64 @@ class Measurement:
     scene: str
     method: str
     label: str
-    role: str
+    role: Role
+    series: str
     dt: float
-    measure: str
+    quantity: str = ""
+    measure: Measure
     value: float
-    unit: str
-    status: str
+    outcome: Outcome = OK
     detail: str = ""
 
 
-COLUMNS = tuple(field.name for field in fields(Measurement))
-_NUMBERS = frozenset({"dt", "value"})
+COLUMNS = (
+    *("study", "scene", "method", "label", "role", "series", "dt", "quantity", "measure", "value", "unit"),
+    *("outcome", "reason", "step", "time", "residual", "detail"),
+)
+"""Columns of the table, in order."""
+_NUMBERS = frozenset({"dt", "value", "step", "time", "residual"})
+_AS_THEY_ARE = ("study", "scene", "method", "label", "series", "dt", "quantity", "value", "detail")
+
+
+def flat(row: Measurement) -> dict[str, str | float]:
+    """Return a row as text and numbers by column: enums as their texts, the outcome as its fields, nan where it has none."""
+    outcome = row.outcome
+    found = {
+        **{name: getattr(row, name) for name in _AS_THEY_ARE},
+        "role": row.role.value,
+        "measure": row.measure.text,
+        "unit": row.measure.unit,
+        "outcome": outcome.kind.value,
+        "reason": outcome.reason,
+        **{name: _number(getattr(outcome, name)) for name in ("step", "time", "residual")},
+    }
+    return {name: found[name] for name in COLUMNS}
+
+
+def from_flat(record: Mapping[str, Any]) -> Measurement:
+    """Return the row that `flat` made a record of; `KeyError` or `ValueError` for what is none."""
+    return Measurement(
+        **{name: record[name] for name in _AS_THEY_ARE},
+        role=Role(record["role"]),
+        measure=Measure.named(record["measure"]),
+        outcome=outcome_of(record),
+    )
+
+
+def outcome_of(record: Mapping[str, Any] | pd.Series[Any]) -> Outcome:
+    """Return the outcome of a record, or of a row of the table."""
+    step, time, residual = (None if math.isnan(record[name]) else float(record[name]) for name in ("step", "time", "residual"))
+    kind = OutcomeKind(record["outcome"])
+    return Outcome(kind, record["reason"], None if step is None else int(step), time, residual)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
 
 
 def frame(rows: Iterable[Measurement]) -> pd.DataFrame:
-    """Return the rows as a table: columns in the order of `Measurement`, text as `string`, numbers as `float64`."""
+    """Return the rows as a table: columns as `COLUMNS` has them, text as `string`, numbers as `float64`."""
     import pandas as pd  # here, so that the command line answers --help without it
 
-    table = pd.DataFrame([astuple(row) for row in rows], columns=list(COLUMNS))
+    table = pd.DataFrame([flat(row) for row in rows], columns=list(COLUMNS))
     return table.astype({name: "float64" if name in _NUMBERS else "string" for name in COLUMNS})

@@ -32,7 +32,7 @@ class Timing:
 
 
 @contextmanager
-def collector_off() -> Iterator[None]:
+def without_collector() -> Iterator[None]:
     """Collect garbage now and not before the end of the block."""
     enabled = gc.isenabled()
     gc.collect()
@@ -44,7 +44,7 @@ def collector_off() -> Iterator[None]:
             gc.enable()
 
 
-def elapsed(run: Callable[[], Any], calls: int = 1) -> float:
+def wall_time(run: Callable[[], Any], calls: int = 1) -> float:
     """Return the wall time of `calls` calls, s."""
     start = perf_counter_ns()
     for _ in range(calls):
@@ -52,17 +52,17 @@ def elapsed(run: Callable[[], Any], calls: int = 1) -> float:
     return (perf_counter_ns() - start) * 1e-9
 
 
-def calls_per_sample(run: Callable[[], Any], min_time: float) -> int:
+def count_calls(run: Callable[[], Any], min_time: float) -> int:
     """Return how many calls last min_time s. The first call is not counted unless it alone lasts ten times as long."""
-    if elapsed(run) > 10 * min_time:
+    if wall_time(run) > 10 * min_time:
         return 1
     calls = 1
-    while (spent := elapsed(run, calls)) < min_time:
+    while (spent := wall_time(run, calls)) < min_time:
         calls = max(2 * calls, math.ceil(calls * min_time / spent) if spent > min_time / 10 else 0)
     return calls
 
 
-def interleaved(
+def time_interleaved(
     runs: Mapping[str, Callable[[], Any]], rounds: int = 7, min_time: float = 0.01, budget: float = math.inf, seed: int = 0
 ) -> dict[str, Timing]:
     """Time several runs against each other.
@@ -91,15 +91,15 @@ def interleaved(
     """
     positive_integer("rounds", rounds)
     positive_number("min_time", min_time, "a finite duration above 0, s")
-    calls = {name: calls_per_sample(run, min_time) for name, run in runs.items()}
+    calls = {name: count_calls(run, min_time) for name, run in runs.items()}
     samples: dict[str, list[float]] = {name: [] for name in runs}
     shuffled = random.Random(seed)
-    with collector_off():
+    with without_collector():
         for _ in range(rounds):
             for name in shuffled.sample(list(runs), len(runs)):
                 taken = samples[name]
                 if len(taken) < MIN_ROUNDS or sum(taken) * (1 + 1 / len(taken)) * calls[name] <= budget:
-                    taken.append(elapsed(runs[name], calls[name]) / calls[name])
+                    taken.append(wall_time(runs[name], calls[name]) / calls[name])
     return {name: Timing(min(taken), statistics.median(taken), len(taken), calls[name]) for name, taken in samples.items()}
 
 
@@ -116,7 +116,7 @@ class Preparation:
         return self.prepare + self.first_call
 
 
-def prepared(prepare: Callable[[], Callable[[], Any]]) -> tuple[Callable[[], Any], Any, Preparation]:
+def prepare_and_run(prepare: Callable[[], Callable[[], Any]]) -> tuple[Callable[[], Any], Any, Preparation]:
     """Return the run that `prepare` gives, the result of its first call, and what both cost."""
     start = perf_counter_ns()
     run = prepare()

@@ -48,7 +48,7 @@ class Drift:
     secular: bool
 
 
-def drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
+def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
     """Return the drift of every invariant of a run, and what to expect of it over `duration` s."""
     found = []
     for invariant in trajectory.scene.invariants:
@@ -63,7 +63,7 @@ def drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
 
 
 @dataclass(frozen=True)
-class Growth:
+class ErrorLaw:
     """The law by which an error is carried from a run to the duration.
 
     Attributes
@@ -108,7 +108,7 @@ class Growth:
         """Whether nothing needs to be extrapolated."""
         return not self.scaled and self.length >= duration * (1 - 1e-9)
 
-    def finer(self, factor: float, how: str) -> Growth:
+    def finer(self, factor: float, how: str) -> ErrorLaw:
         """Return the law for a setting with `factor` times the error; `how` says in words where the factor comes from."""
         linear, quadratic = self.linear * factor, self.quadratic * factor
         return replace(self, error=self.error * factor, linear=linear, quadratic=quadratic, scaled=how)
@@ -128,7 +128,7 @@ class Growth:
         return f"{run} (grew as t^{self.exponent:.1f}), extrapolated {kind} to {duration:g} s{times}"
 
 
-def growth(t: Array, error: Array, phase_acceleration: float, excess: float) -> Growth:
+def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) -> ErrorLaw:
     """Return the law of an error.
 
     With E1 and E2 the largest error over the first half of the run and over all of it, a t + b t^2 goes through both where the
@@ -143,14 +143,14 @@ def growth(t: Array, error: Array, phase_acceleration: float, excess: float) -> 
     phase_acceleration
         Rate at which a steady drift of an invariant changes the rate of the phase, rad/s^2.
     excess
-        See `Growth`.
+        See `ErrorLaw`.
     """
     length, whole = float(t[-1]), float(error.max())
     half = float(error[t <= length / 2 * (1 + 1e-9)].max())
     exponent = math.log2(whole / half) if half > 0 else 0.0
     b = min(max(2 * (whole - 2 * half) / length**2, 0.0), whole / length**2)
     a = max(whole / length - b * length, 0.0)
-    return Growth(length, whole, exponent, a, max(b, phase_acceleration / 2), excess)
+    return ErrorLaw(length, whole, exponent, a, max(b, phase_acceleration / 2), excess)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a recommendation stands on: how fast the body turns, the truth, and what the motion makes of a small disturbance."""
+"""The motion that a recommendation is for: how fast it is, its truth, and what it makes of a small disturbance."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
-from conservative.method import Grid, Method, integrate
+from conservative.integration import integrate
+from conservative.method import Grid, Method
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.timing import elapsed
+from ..measures.timing import wall_time
 from ..studies import step_ladder
 from .extrapolation import Amplification
-from .probe import STEPS, Bench
+from .probe import STEPS, Conditions
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0
 """Length of short probes, rad turned, with a closed form for a truth and with multi-precision, which costs a second for ten."""
@@ -33,44 +34,44 @@ AFFORDABLE = 0.3
 DENSE = 256
 
 
-def prepared(scene: Scene, error: float, duration: float, cost_limit: float) -> tuple[Bench, Truth]:
+def prepare_conditions(scene: Scene, error: float, duration: float, cost_limit: float) -> tuple[Conditions, Truth]:
     """Return what all probes have in common, and the truth that errors are measured against."""
-    rate = fastest(scene, duration)
+    rate = find_largest_rate(scene, duration)
     closed = Exact().unsupported(scene) is None
     length = min(duration, (CLOSED_RADIANS if closed else RADIANS) / rate)
-    spacing = round_number(min(length / SAMPLES, step_ladder.RADIANS / rate))
+    spacing = round_down(min(length / SAMPLES, step_ladder.RADIANS / rate))
     samples = math.ceil(length / spacing * (1 - 1e-9))
     # Steps longer than the spacing end up to an eighth later.
     truth = reference(scene, Grid(spacing, samples + samples // 8 + 1))
     until = max(duration, truth.trajectory.t[-1]) if closed else samples * spacing
-    attitudes = closed_form(scene) if closed else picked(truth.trajectory, spacing)
+    attitudes = sample_closed_form(scene) if closed else sample_truth(truth.trajectory, spacing)
     nothing = Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, "")
-    bench = Bench(scene, error, duration, cost_limit, spacing, samples, attitudes, float(until), rate, nothing)
-    return replace(bench, amplification=amplification(bench)), truth
+    conditions = Conditions(scene, error, duration, cost_limit, spacing, samples, attitudes, float(until), rate, nothing)
+    return replace(conditions, amplification=measure_amplification(conditions)), truth
 
 
-def fastest(scene: Scene, duration: float) -> float:
+def find_largest_rate(scene: Scene, duration: float) -> float:
     """Return the largest angular speed, rad/s, of a trial run, and at least a turn by one radian in the whole duration."""
     bound = math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-    trial = quietly_chosen(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound))
+    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound))
     return max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)
 
 
-def quietly_chosen(scene: Scene, error: float, t_end: float) -> Trajectory:
+def integrate_quietly(scene: Scene, error: float, t_end: float) -> Trajectory:
     """Return our own trajectory for an error; that it was not reached shows in its `choice` alone."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyNotReached)
         return integrate(scene, error=error, t_end=t_end, on_failure="return")
 
 
-def round_number(value: float) -> float:
+def round_down(value: float) -> float:
     """Return the largest of 1, 2 and 5 times a power of ten that is at most `value`."""
     power = math.floor(math.log10(value))
     digit = max(digit for digit in (1, 2, 5) if digit <= value / 10.0**power * (1 + 1e-9))
     return float(f"{digit}e{power}")
 
 
-def closed_form(scene: Scene) -> Callable[[Grid], Array]:
+def sample_closed_form(scene: Scene) -> Callable[[Grid], Array]:
     """Return the function from a grid to exact attitudes; each grid is computed once."""
     known: dict[Grid, Array] = {}
 
@@ -82,21 +83,21 @@ def closed_form(scene: Scene) -> Callable[[Grid], Array]:
     return attitudes
 
 
-def picked(truth: Trajectory, spacing: float) -> Callable[[Grid], Array]:
+def sample_truth(truth: Trajectory, spacing: float) -> Callable[[Grid], Array]:
     """Return the function from a grid of multiples of the spacing to the attitudes of a truth that has them all."""
     return lambda grid: truth.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
 
 
-def amplification(bench: Bench) -> Amplification:
+def measure_amplification(conditions: Conditions) -> Amplification:
     """Return how far a start with slightly other rates leads away: by closed forms, else by our own method."""
-    scene = bench.scene
-    size = float(np.linalg.norm(scene.w_WB_B0)) or bench.rate
+    scene = conditions.scene
+    size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
     off = scene.renamed(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
     exact = Exact().unsupported(scene) is None and Exact().unsupported(off) is None
-    method, dt = (Exact(), bench.duration) if exact else our_choice(bench, DISTURBANCE / 100)
-    until = bench.duration if exact else min(bench.duration, affordable(bench, method, dt))
+    method, dt = (Exact(), conditions.duration) if exact else choose_ours(conditions, DISTURBANCE / 100)
+    until = conditions.duration if exact else min(conditions.duration, affordable_duration(conditions, method, dt))
     times, factors = [], []
-    for end in sorted({min(until, bench.short), until}):
+    for end in sorted({min(until, conditions.short), until}):
         n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
         grid = Grid(end / n, n, max(1, n // DENSE))
         pair = [method.prepare(each, grid)() for each in (scene, off)]
@@ -108,17 +109,17 @@ def amplification(bench: Bench) -> Amplification:
     return Amplification(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)
 
 
-def our_choice(bench: Bench, error: float) -> tuple[Method, float]:
+def choose_ours(conditions: Conditions, error: float) -> tuple[Method, float]:
     """Return the method and the longest round step, s, that our own chooser takes for an error, rad, over a short window."""
-    length = bench.short
-    choice = quietly_chosen(bench.scene, error, length).choice
+    length = conditions.short
+    choice = integrate_quietly(conditions.scene, error, length).choice
     assert choice is not None  # an error was asked for
-    return choice.method, bench.step_at_most(min(choice.dt, length / STEPS))
+    return choice.method, conditions.step_at_most(min(choice.dt, length / STEPS))
 
 
-def affordable(bench: Bench, method: Method, dt: float) -> float:
+def affordable_duration(conditions: Conditions, method: Method, dt: float) -> float:
     """Return how far, s, a method gets in the wall time `AFFORDABLE`."""
-    n = max(1, math.ceil(bench.short / dt))
-    run = method.prepare(bench.scene, Grid(dt, n, n))
+    n = max(1, math.ceil(conditions.short / dt))
+    run = method.prepare(conditions.scene, Grid(dt, n, n))
     run()
-    return AFFORDABLE * n * dt / elapsed(run)
+    return AFFORDABLE * n * dt / wall_time(run)

@@ -15,11 +15,12 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.method import Grid, Method
+from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..studies.case import Case, Done, attempt
 from ..studies.selection import tolerance_setting
-from .extrapolation import LOST, Amplification, Drift, Growth, drifts, growth
+from .extrapolation import LOST, Amplification, Drift, ErrorLaw, extrapolate_drifts, fit_law
 
 SAFETY = 0.5
 """Share of the wanted error that settings are chosen for."""
@@ -46,17 +47,17 @@ class Probe:
     length, error
         Of the run, s, and its largest attitude error against the truth, rad; nan where it failed.
     expected, law
-        Largest error to expect over the whole duration, rad, infinite where the attitude is lost; in words how that follows.
+        Expected largest error over the whole duration, rad, infinite where the attitude is lost; and the reason, in words.
     holds
-        For how long the wanted error may be expected to hold, s.
-    growth
-        The law; None where the run failed.
+        How long the error is expected to stay within the one that is wanted, s.
+    error_law
+        How the error grows; None where the run failed.
     drifts
         Of the invariants.
     cost
         Wall time per simulated second of this one run, s/s, to plan with; nan where it failed. Not interleaved.
-    status
-        "ok", or what failed.
+    outcome
+        How it ended.
     """
 
     method: Method
@@ -66,10 +67,10 @@ class Probe:
     expected: float
     law: str
     holds: float
-    growth: Growth | None
+    error_law: ErrorLaw | None
     drifts: tuple[Drift, ...]
     cost: float
-    status: str
+    outcome: Outcome
 
     @property
     def setting(self) -> float:
@@ -79,8 +80,8 @@ class Probe:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
-    """What all probes of a scene have in common.
+class Conditions:
+    """The conditions under which all probes of a scene run.
 
     Attributes
     ----------
@@ -166,27 +167,27 @@ class Bench:
         outcome = attempt(Case("recommendation", self.scene, method, grid))
         length = samples.dt * samples.n_steps
         if not isinstance(outcome, Done):
-            reason = f"{outcome.status}: {outcome.detail}" if outcome.detail else outcome.status
-            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, reason)
-        return self._measured(method, grid, samples, outcome, before)
+            why = outcome.outcome
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, why)
+        return self._evaluate(method, grid, samples, outcome, before)
 
-    def _measured(self, method: Method, grid: Grid, samples: Grid, outcome: Done, before: Sequence[Probe]) -> Probe:
+    def _evaluate(self, method: Method, grid: Grid, samples: Grid, outcome: Done, before: Sequence[Probe]) -> Probe:
         trajectory = outcome.trajectory
         error = angle_between(self.truth(samples), trajectory.R_WB)
-        found = drifts(trajectory, self.duration)
+        found = extrapolate_drifts(trajectory, self.duration)
         length, largest = float(trajectory.t[-1]), float(error.max())
         # A steady change of energy or momentum is one of the speed at which the body goes round.
         phase = self.rate * max((abs(drift.slope) for drift in found if drift.secular), default=0.0)
-        law = growth(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
-        law = self._carried(method, grid.dt, length, before) or law
+        law = fit_law(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
+        law = self._carry_over(method, grid.dt, length, before) or law
         exceeded = error > self.error
         holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.holds(self.error))
         expected, cost = law.at(self.duration), outcome.cost.first_call / length
         return Probe(
-            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, str(trajectory.outcome)
+            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, trajectory.outcome
         )
 
-    def _carried(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> Growth | None:
+    def _carry_over(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> ErrorLaw | None:
         """Return the law of the coarser setting that ran longest, carried to a finer one by the method's order.
 
         A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. None
@@ -199,7 +200,7 @@ class Bench:
         enough = min(base.length / MUCH_LONGER, self.duration)
         if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
             return None
-        assert base.growth is not None  # or it would tell nothing
+        assert base.error_law is not None  # or it would tell nothing
         if name is not None:
             factor, how = (
                 getattr(method, name) / base.setting,
@@ -208,7 +209,7 @@ class Bench:
         else:
             order = method.order or 0
             factor, how = (dt / base.dt) ** order, f" at dt = {base.dt:.3g} s, carried here by order {order}"
-        carried = base.growth.finer(factor, how)
+        carried = base.error_law.finer(factor, how)
         # What rounding leaves: a random walk of the rate, a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
@@ -216,4 +217,4 @@ class Bench:
     def tells(self, probe: Probe) -> bool:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
-        return whole and probe.growth is not None and not probe.growth.scaled and probe.error < LOST
+        return whole and probe.error_law is not None and not probe.error_law.scaled and probe.error < LOST

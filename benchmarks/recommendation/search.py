@@ -5,24 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.benchmarks.studies.case import OK
 from conservative.errors import BadInput
 from conservative.method import Method
 
 from ..measures.convergence_order import MIN_POINTS
 from ..studies.selection import at_tolerance, tolerance_setting
 from .extrapolation import LOST
-from .probe import RUN_LIMIT, Bench, Probe
+from .probe import RUN_LIMIT, Conditions, Probe
 
 ATTEMPTS = 12
 BOLDEST, BLINDLY = 1 / 16, 1 / 8
 """Largest cut of a step from one probe to the next, and the cut where a probe says nothing."""
-FURTHER = 8
-"""How much longer than the step in question the step of a run is that shows how errors grow later on."""
+LONGER = 8
+"""Ratio of two steps: that of a long run, which shows how errors grow later on, and the step in question."""
 TIGHTEST = -16
 """Smallest tolerance asked for, power of ten: a rounding unit."""
 BOLDEST_TOLERANCE = 4
@@ -34,7 +34,7 @@ Aim = Callable[[Probe], float]
 
 
 @dataclass(frozen=True)
-class Climb:
+class Refinement:
     """The probes of a method, coarse to fine: over a short part of the motion, then over as much of it as a run may take."""
 
     short: tuple[Probe, ...]
@@ -64,77 +64,89 @@ class Climb:
         return np.array(list(found)), np.array(list(found.values()))
 
 
-def climbed(bench: Bench, method: Method, dt: float) -> Climb:
+def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     """Return the probes of a method from a step, or the tolerance it has, on, until one may be expected to have the error.
 
     Where the truth is known for longer, short probes only have to be good enough for an error that grows linearly, and long
-    ones find out. There a longer step is tried, too, where the error has turned out far smaller than wanted.
+    ones find out.
     """
-    more = bench.truth_until > bench.short * (1 + 1e-9) and bench.duration > bench.short
+    more = conditions.truth_until > conditions.short * (1 + 1e-9) and conditions.duration > conditions.short
+    aim = partial(expect_linear, conditions) if more else expect
+    short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], aim, long=False)
+    if not more or aim(short[-1]) > conditions.target:
+        return Refinement(tuple(short), ())
+    return Refinement(tuple(short), tuple(refine_long(conditions, short)))
 
-    def linear(probe: Probe) -> float:
-        law = probe.growth
-        return law.error * max(1.0, bench.duration / law.length) if law and law.error < LOST else math.inf
 
-    aim = linear if more else lambda probe: probe.expected
-    short = _refined(bench, [bench.probe(method, dt, math.nan, long=False)], aim, long=False)
+def expect(probe: Probe) -> float:
+    """Return the error, rad, that a probe makes expect over the duration."""
+    return probe.expected
+
+
+def expect_linear(conditions: Conditions, probe: Probe) -> float:
+    """Return the error, rad, to expect over the duration if that of a probe grows linearly."""
+    law = probe.error_law
+    return law.error * max(1.0, conditions.duration / law.length) if law and law.error < LOST else math.inf
+
+
+def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
+    """Return the long probes that follow short ones; the last has a longer step where the error is far below the wanted one."""
     last = short[-1]
-    if not more or aim(last) > bench.target:
-        return Climb(tuple(short), ())
-    long = [bench.probe(last.method, last.dt, last.cost, True, short)]
-    if method.order is not None and long[0].length < bench.duration * (1 - 1e-9):
+    method = last.method
+    long = [conditions.probe(method, last.dt, last.cost, True, short)]
+    if method.order is not None and long[0].length < conditions.duration * (1 - 1e-9):
         # The affordable run is shorter than the duration: one at a longer step, which gets further, shows how errors grow.
-        longer = min(FURTHER * last.dt, dt)
-        ahead = bench.probe(method, longer, last.cost * last.dt / longer, True)
-        long = [ahead, bench.probe(last.method, last.dt, last.cost, True, (ahead,))]
+        longer = min(LONGER * last.dt, short[0].dt)
+        ahead = conditions.probe(method, longer, last.cost * last.dt / longer, True)
+        long = [ahead, conditions.probe(method, last.dt, last.cost, True, (ahead,))]
     first = long[-1]
-    long = _refined(bench, long, lambda probe: probe.expected, long=True)
-    if method.order is not None and first.expected < COARSER * bench.target:
+    long = _refine_until(conditions, long, expect, long=True)
+    if method.order is not None and first.expected < COARSER * conditions.target:
         # At most four times: the error must still shrink with its order where the step comes from.
-        factor = min(4.0, (bench.target / max(first.expected, 1e-300)) ** (1 / method.order))
-        longer = bench.step_at_most(first.dt * factor)
-        long += [bench.probe(method, longer, first.cost * first.dt / longer, True)] if longer > first.dt else []
-    return Climb(tuple(short), tuple(long))
+        factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / method.order))
+        longer = conditions.step_at_most(first.dt * factor)
+        long += [conditions.probe(method, longer, first.cost * first.dt / longer, True)] if longer > first.dt else []
+    return long
 
 
-def _refined(bench: Bench, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
+def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
     adaptive = tolerance_setting(probes[0].method) is not None
-    while len(probes) < ATTEMPTS and aim(probes[-1]) > bench.target and not hopeless(probes):
-        finer = (_tighter if adaptive else _shorter)(bench, probes, aim(probes[-1]))
+    while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target and not at_round_off(probes):
+        finer = (_tighten_tolerance if adaptive else _shorten_step)(conditions, probes, aim(probes[-1]))
         if finer is None:
             break
-        probes.append(bench.probe(*finer, long, tuple(probes)))
+        probes.append(conditions.probe(*finer, long, tuple(probes)))
     return probes
 
 
-def hopeless(probes: Sequence[Probe]) -> bool:
+def at_round_off(probes: Sequence[Probe]) -> bool:
     """Whether finer settings have stopped helping where they once did: round-off."""
     found = [probe.expected for probe in probes if probe.expected < LOST]
     return len(found) >= 3 and min(found[-2:]) > 0.7 * found[-3]
 
 
-def _shorter(bench: Bench, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
+def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
     """Return method, next step and its cost; None where the cost allows none."""
     last = probes[-1]
-    per_step = min((probe.cost * probe.dt for probe in probes if probe.status == OK), default=math.nan)
+    per_step = min((probe.cost * probe.dt for probe in probes if probe.outcome.ok), default=math.nan)
     factor = BLINDLY
     if expected < math.inf and last.method.order is not None:
-        factor = min(0.8, max(BOLDEST, (bench.target / expected) ** (1 / last.method.order)))
-    telling = sum(bench.tells(probe) for probe in probes)
-    if bench.tells(last) and telling < MIN_POINTS and per_step * bench.short <= RUN_LIMIT * last.dt / 2:
+        factor = min(0.8, max(BOLDEST, (conditions.target / expected) ** (1 / last.method.order)))
+    telling = sum(conditions.tells(probe) for probe in probes)
+    if conditions.tells(last) and telling < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that there is an order to be seen
-    dt = bench.step_at_most(last.dt * factor)
-    if dt < per_step / bench.cost_limit:
-        dt = bench.step_at_least(per_step / bench.cost_limit)
+    dt = conditions.step_at_most(last.dt * factor)
+    if dt < per_step / conditions.cost_limit:
+        dt = conditions.step_at_least(per_step / conditions.cost_limit)
     return (last.method, dt, per_step / dt) if dt < last.dt * (1 - 1e-9) else None
 
 
-def _tighter(bench: Bench, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
+def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
     """Return method with the next tolerance, a power of ten, and its cost; None where there is none or cost allows none."""
     last = probes[-1]
     name = tolerance_setting(last.method)
-    wanted = math.floor(math.log10(bench.target / expected)) if expected < math.inf else -2
-    if name is None or last.cost > bench.cost_limit:
+    wanted = math.floor(math.log10(conditions.target / expected)) if expected < math.inf else -2
+    if name is None or last.cost > conditions.cost_limit:
         return None
     power = round(math.log10(last.setting))
     for cut in range(max(-BOLDEST_TOLERANCE, min(-1, wanted)), 0):

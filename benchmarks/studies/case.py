@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.method import Grid, Method, Role, Run
+from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..measures.measure import Value
 from ..measures.measurement import Measurement
-from ..measures.timing import Preparation, prepared
-
-OK = "ok"
-MISSING, UNSUPPORTED, ENGINE_ERROR = "missing", "unsupported", "engine error"
-SKIPPED, NO_ORDER = "skipped", "no order"
+from ..measures.samples import Samples
+from ..measures.timing import Preparation, prepare_and_run
+from .selection import series
 
 
 @dataclass(frozen=True)
@@ -27,26 +28,40 @@ class Case:
     method: Method
     grid: Grid
 
-    def row(self, measure: str, value: float, unit: str, status: str = OK, detail: str = "") -> Measurement:
+    def row(self, value: Value, outcome: Outcome = OK, detail: str = "") -> Measurement:
         """Return one row."""
-        method, who = self.method, label_of(self.method)
         return Measurement(
-            self.study,
-            self.scene.name,
-            method.name,
-            who,
-            method.role,
-            self.grid.dt,
-            measure,
-            float(value),
-            unit,
-            status,
-            detail,
+            study=self.study,
+            scene=self.scene.name,
+            method=self.method.name,
+            label=label_of(self.method),
+            role=Role(self.method.role),
+            series=series(self.method),
+            dt=self.grid.dt,
+            quantity=value.quantity,
+            measure=value.measure,
+            value=float(value.value),
+            outcome=outcome,
+            detail=detail,
         )
 
-    def blanks(self, measures: Iterable[tuple[str, str]], status: str, detail: str = "") -> list[Measurement]:
-        """Return a row without a value for each (measure, unit): what could not be measured is in the table, too."""
-        return [self.row(measure, float("nan"), unit, status, detail) for measure, unit in measures]
+    def samples(self, quantity: str, t: Array, value: Array) -> Samples:
+        """Return one line: values (n,) at times (n,), s."""
+        return Samples(
+            study=self.study,
+            scene=self.scene.name,
+            method=self.method.name,
+            label=label_of(self.method),
+            role=Role(self.method.role),
+            dt=self.grid.dt,
+            quantity=quantity,
+            t=t,
+            value=value,
+        )
+
+    def blanks(self, values: Iterable[Value], outcome: Outcome) -> list[Measurement]:
+        """Return a row without a value for each: what could not be measured is in the table, too."""
+        return [self.row(value.blank, outcome) for value in values]
 
 
 @dataclass(frozen=True)
@@ -60,10 +75,9 @@ class Done:
 
 @dataclass(frozen=True)
 class Failed:
-    """A case that did not: the status that its rows carry, and more words about it."""
+    """A case that did not: the outcome that its rows carry."""
 
-    status: str
-    detail: str = ""
+    outcome: Outcome
 
 
 def at_no_step(row: Measurement) -> Measurement:
@@ -79,10 +93,15 @@ def label_of(method: Method) -> str:
         return method.name
 
 
+def unsupported(reason: str) -> Failed:
+    """Return the failure of a case that the method cannot do."""
+    return Failed(Outcome(OutcomeKind.UNSUPPORTED, reason))
+
+
 def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     """Prepare and run a case once.
 
-    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become a status.
+    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become an outcome.
     Exceptions out of our own methods are bugs and are not caught.
 
     Raises
@@ -93,18 +112,18 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     try:
         reason = case.method.unsupported(case.scene)
         if reason:
-            return Failed(UNSUPPORTED, reason)
-        done = Done(*prepared(lambda: case.method.prepare(case.scene, case.grid)))
+            return unsupported(reason)
+        done = Done(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return Failed(MISSING, str(error))
+        return Failed(Outcome(OutcomeKind.MISSING, str(error)))
     except BadInput as error:  # a step that the method does not have
-        return Failed(UNSUPPORTED, str(error))
+        return unsupported(str(error))
     except IntegrationFailed as failure:
-        return Failed(str(failure.outcome))
+        return Failed(failure.outcome)
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
         if case.method.role != Role.ENGINE:
             raise
-        return Failed(ENGINE_ERROR, f"{type(error).__name__}: {error}")
-    return done if done.trajectory.ok else Failed(str(done.trajectory.outcome))
+        return Failed(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
+    return done if done.trajectory.ok else Failed(done.trajectory.outcome)

@@ -1,13 +1,12 @@
 """The study of the hard cases: every registered scene with every method, one or two settings of each.
 
-Rows are errors of attitude and rates, drifts of all that the scene conserves, and a status, over `TURN` rad of the motion at
+Rows are errors of attitude and rates, and drifts of all that the scene conserves, over `TURN` rad of the motion at
 the scene's own step. Nothing is left out because a method looks bad on it; what a method cannot do has rows that say so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,15 +14,12 @@ from conservative import registry
 from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
 
-from ..measures import errors
 from ..measures.measurement import Measurement
-from .case import Case, Failed, attempt
-from .paper import measured
-from .stability import TIMEOUT
-from .time_limit import TooLong, within
-
-if TYPE_CHECKING:
-    from .studies import Progress, Study
+from .case import Case
+from .paper import accuracy
+from .selection import Missing
+from .study import Progress, Study
+from .time_limit import attempt_within
 
 TURN = 60.0
 """Part of the motion that is looked at, rad turned by the body at its first rate: multi-precision truth costs seconds."""
@@ -33,20 +29,21 @@ LIMIT = 20.0
 
 def scenes() -> tuple[Scene, ...]:
     """Return every registered scene with its default parameters, by group."""
-    return tuple(sorted(map(registry.scene, registry.registered(registry.SCENES)), key=lambda scene: scene.group))
+    return tuple(sorted(map(registry.scene, registry.list_scenes()), key=lambda scene: scene.group))
 
 
 def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
     """Return one or two settings of each family: of ours the first and the last one listed, of an engine the first two."""
     families: dict[str, list[Method]] = {}
     for method in methods:
-        families.setdefault(method.name if method.family == "missing" else method.family, []).append(method)
-    found: list[Method] = []
-    for members in families.values():
-        if members[0].role != Role.TRUTH:
-            second = members[-1] if members[0].role == Role.OURS else members[min(1, len(members) - 1)]
-            found += dict.fromkeys((members[0], second))
-    return tuple(found)
+        if method.role != Role.TRUTH:
+            families.setdefault(method.name if isinstance(method, Missing) else method.family, []).append(method)
+    return tuple(method for members in families.values() for method in dict.fromkeys((members[0], _second(members))))
+
+
+def _second(members: list[Method]) -> Method:
+    """Return the other setting that stands for a family, which may be the first again."""
+    return members[-1] if members[0].role == Role.OURS else members[:2][-1]
 
 
 def grid(scene: Scene) -> Grid:
@@ -56,9 +53,9 @@ def grid(scene: Scene) -> Grid:
     return grid_for(scene, min(scene.dt, end), end)
 
 
-def hard_cases(study: Study, progress: Progress) -> Iterator[Measurement]:
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield all errors, drifts and work of every method on every scene."""
-    methods = [method for method in study.methods if method.role != Role.TRUTH]
+    methods = study.competitors
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
         progress(i * len(methods), total, f"{scene.name}: truth")
@@ -67,11 +64,4 @@ def hard_cases(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
-            try:
-                outcome = within(LIMIT, lambda case=case: attempt(case, study.skip_missing))  # type: ignore[misc]
-            except TooLong as late:
-                outcome = Failed(TIMEOUT, str(late))
-            if isinstance(outcome, Failed):
-                yield from case.blanks(errors.names(scene), outcome.status, outcome.detail)
-            else:
-                yield from measured(case, outcome, truth)
+            yield from accuracy(case, attempt_within(LIMIT, case, study.skip_missing), truth)

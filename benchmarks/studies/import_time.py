@@ -1,4 +1,4 @@
-"""What it costs to import a library: seconds from a fresh interpreter to the library ready, its own start taken off."""
+"""The study of imports: seconds from a fresh interpreter to the library ready, the interpreter's own start taken off."""
 
 from __future__ import annotations
 
@@ -6,36 +6,58 @@ import math
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-MODULES = {"conservative": "ours", "mujoco": "engine", "pinocchio": "engine", "heyoka": "engine", "scipy.integrate": "engine"}
+from conservative import registry
+from conservative.method import Role
+from conservative.outcome import OK, Outcome, OutcomeKind
+
+from ..measures.measure import Measure
+from ..measures.measurement import Measurement
+from .study import Progress, Study
+
 ROUNDS = 3
+OURS = "conservative.integration"
+"""What our own first run imports; `import conservative` alone imports nothing until a name is used."""
 
 
-@dataclass(frozen=True)
-class ImportCost:
-    """Seconds of an import, the smallest of some rounds; nan where the module cannot be imported."""
-
-    module: str
-    role: str
-    seconds: float
+def modules() -> dict[str, Role]:
+    """Return the modules that are timed: our own, and those that registered engines name."""
+    engines = [family for family in registry.list_families().values() if family.role is Role.ENGINE and family.module]
+    return {OURS: Role.OURS} | {family.module: Role.ENGINE for family in engines}
 
 
-def costs(rounds: int = ROUNDS) -> list[ImportCost]:
-    """Return the cost of importing each library, in interleaved rounds of fresh interpreters with warm file caches."""
-    found = dict.fromkeys(("", *MODULES), math.inf)
-    for _ in range(rounds):
-        for name in found:
-            found[name] = min(found[name], _seconds(name))
-    return [ImportCost(name, role, _above(found[""], found[name])) for name, role in MODULES.items()]
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield a row for each library: the least of some rounds, of a quick study of one; its name stands for the method."""
+    bare, roles = math.inf, modules()
+    found = dict.fromkeys(roles, math.inf)
+    rounds = 1 if study.quick else ROUNDS
+    for number in range(rounds):  # interleaved, so that a slow spell of the machine hits all alike
+        progress(number, rounds, "fresh interpreters")
+        bare = min(bare, import_time(""))
+        found = {name: min(seconds, import_time(name)) for name, seconds in found.items()}
+    yield from (row(study, name, roles[name], seconds - bare) for name, seconds in found.items())
 
 
-def _above(bare: float, seconds: float) -> float:
-    return max(seconds - bare, 0.0) if math.isfinite(seconds) else math.nan
+def row(study: Study, module: str, role: Role, seconds: float) -> Measurement:
+    """Return the row of a library that took so long, s; inf stands for one that cannot be imported."""
+    known = math.isfinite(seconds)
+    return Measurement(
+        study=study.name,
+        scene="",
+        method=module,
+        label=module,
+        role=role,
+        series=module,
+        dt=math.nan,
+        measure=Measure.IMPORT,
+        value=max(seconds, 0.0) if known else math.nan,
+        outcome=OK if known else Outcome(OutcomeKind.MISSING, f"{module} cannot be imported"),
+    )
 
 
-def _seconds(module: str) -> float:
-    """Return how long an interpreter that imports `module` lives; inf where that fails."""
+def import_time(module: str) -> float:
+    """Return how long, s, an interpreter that imports `module` lives; inf where that fails."""
     start = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", f"import {module}" if module else ""], capture_output=True, check=False)
     return time.perf_counter() - start if done.returncode == 0 else math.inf

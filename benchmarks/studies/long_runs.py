@@ -1,37 +1,47 @@
-"""Drift over time: runs longer than the scene's own, kept as the largest drift so far at evenly spaced times."""
+"""The study of long runs: drift over time, far beyond the scene's own duration."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-import pandas as pd
 
 from conservative.attitude import Array, orthonormality
 from conservative.invariants import sizes
 from conservative.method import Method, grid_for
-from conservative.reports.labels import shown
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.errors import drifts
-from ..measures.measurement import Measurement
+from ..measures.errors import measure_drifts
+from ..measures.measure import Measure, Value
 from .case import Case, Failed, attempt
+from .study import Finding, Progress, Study
 
-STUDY = "drift"
 DURATIONS = 10.0
 """Length of a run in durations of its scene."""
-KEPT = 120
-"""Samples of a picture."""
+SAMPLES = 120
+"""Samples of a line at most."""
+ORTHONORMALITY = "orthonormality"
+"""What is sampled beside the invariants of the scene."""
 
-COLUMNS = ("scene", "series", "t", "invariant", "drift")
+
+def findings(study: Study, progress: Progress) -> Iterator[Finding]:
+    """Yield drifts of every method at the scene's step, and the largest so far over time (relative), a line an invariant."""
+    methods = study.competitors
+    total = len(study.scenes) * len(methods)
+    for i, scene in enumerate(study.scenes):
+        for j, method in enumerate(methods):
+            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+            yield from long_run(case_for(study.name, scene, method), study.skip_missing)
 
 
-def case_for(scene: Scene, method: Method) -> Case:
+def case_for(study: str, scene: Scene, method: Method) -> Case:
     """Return the run of a method at the scene's step over `DURATIONS` durations, every step a sample."""
-    return Case(STUDY, scene, method, grid_for(scene, scene.dt, scene.t_end * DURATIONS))
+    return Case(study, scene, method, grid_for(scene, scene.dt, scene.t_end * DURATIONS))
 
 
-def measured(case: Case, skip_missing: bool) -> tuple[list[Measurement], pd.DataFrame]:
-    """Return the rows of one run, and its picture: columns scene, series, t (s), invariant, drift (relative, largest so far).
+def long_run(case: Case, skip_missing: bool) -> Iterator[Finding]:
+    """Yield the rows of one run, then its lines.
 
     Raises
     ------
@@ -40,31 +50,18 @@ def measured(case: Case, skip_missing: bool) -> tuple[list[Measurement], pd.Data
     """
     outcome = attempt(case, skip_missing)
     if isinstance(outcome, Failed):
-        names = [(f"{invariant.name} drift max", "1") for invariant in case.scene.invariants]
-        return case.blanks(names, outcome.status, outcome.detail), pd.DataFrame(columns=list(COLUMNS))
+        values = [Value(Measure.DRIFT_MAX, np.nan, invariant.name) for invariant in case.scene.invariants]
+        yield from case.blanks(values, outcome.outcome)
+        return
     detail = f"over {case.grid.t[-1]:g} s"
-    rows = [case.row(*value, detail=detail) for value in drifts(outcome.trajectory)]
-    return rows, samples(outcome.trajectory, shown(case.method.name, case.method.label))
+    yield from (case.row(value, detail=detail) for value in measure_drifts(outcome.trajectory))
+    for quantity, drift in every_drift(outcome.trajectory).items():
+        largest = np.maximum.accumulate(sizes(drift))
+        some = np.unique(np.linspace(0, len(largest) - 1, SAMPLES).round().astype(int))[1:]
+        yield case.samples(quantity, outcome.trajectory.t[some], largest[some])
 
 
-def samples(trajectory: Trajectory, series: str) -> pd.DataFrame:
-    """Return the picture of a run, a series by this name."""
-    kinds = {invariant.name: trajectory.drift(invariant) for invariant in trajectory.scene.invariants}
-    kinds["orthonormality"] = orthonormality(trajectory.R_WB)
-    return pd.concat([_largest_so_far(trajectory, kind, values, series) for kind, values in kinds.items()], ignore_index=True)
-
-
-def _largest_so_far(trajectory: Trajectory, kind: str, drift: Array, series: str) -> pd.DataFrame:
-    t = trajectory.t
-    size = np.maximum.accumulate(sizes(drift))
-    kept = np.unique(np.linspace(0, len(t) - 1, KEPT).round().astype(int))[1:]
-    return pd.DataFrame(
-        {
-            "scene": trajectory.scene.name,
-            "series": series,
-            "t": t[kept],
-            "invariant": kind,
-            "drift": size[kept],
-        },
-        columns=list(COLUMNS),
-    )
+def every_drift(trajectory: Trajectory) -> dict[str, Array]:
+    """Return what is sampled, by name: (n,) or (n, 3), no unit."""
+    invariants = {invariant.name: trajectory.drift(invariant) for invariant in trajectory.scene.invariants}
+    return invariants | {ORTHONORMALITY: orthonormality(trajectory.R_WB)}

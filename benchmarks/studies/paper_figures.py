@@ -1,76 +1,101 @@
-"""The data of the paper's figures 1 and 2, integrated anew."""
+"""The study of the paper's figures 1 and 2, integrated anew: the brick that flips, and the top.
+
+Lines, by quantity. Figure 1, of the brick: ω1, ω2, ω3 are its body rates, rad/s; energy and momentum the signed relative errors
+of the energy and of the length of the angular momentum. Figure 2, of the top: x1, x2 are coordinates of its centre of mass, m.
+"""
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.method import integrate
+from conservative.method import Method, grid_for
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-METHODS = ("convected", "reduced")
+from ..measures.measure import Measure, Value
+from ..measures.samples import Samples
+from .case import Case
+from .study import Finding, Progress, Study
+
+BRICK, TOP = "brick_flip", "lagrange_top"
+"""Scenes of the figures; a study without one of them is one without its figure."""
+THEIRS, OURS, EXACT = "convected", "reduced", "exact"
+"""The paper's map, ours, and the analytical solution."""
+BRICK_STEP = 0.01
 TOP_STEPS = (0.01, 0.005, 0.0025)
-ANALYTICAL = "analytical"
+"""Steps, s; of the top the figure shows the first two."""
+RATES = ("ω1", "ω2", "ω3")
+ENERGY, MOMENTUM = "energy", "momentum"
+X1, X2 = "x1", "x2"
 
 
-@cache
-def _trajectory(scene: str, method: str, dt: float) -> Trajectory:
-    return integrate(registry.scene(scene), dt, registry.method(method))
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the paper: the name of its study, and its scene."""
+
+    study: str
+    scene: Scene
+
+    def run(self, name: str, dt: float) -> tuple[Case, Trajectory]:
+        """Return the case and the trajectory of a method by name, at a step, s; raise what a run raises that failed."""
+        method: Method = registry.method(name)
+        case = Case(self.study, self.scene, method, grid_for(self.scene, dt))
+        trajectory = method.prepare(self.scene, case.grid)()
+        if trajectory.failure is not None:
+            raise trajectory.failure
+        return case, trajectory
 
 
-def body_rates() -> pd.DataFrame:
-    """Return figure 1(a), columns t (s), component, rate (rad/s): body rates of the brick, dt = 0.01, eps = 1e-8."""
-    trajectory = _trajectory("brick_flip", "convected", 0.01)
-    wide = pd.DataFrame(trajectory.w_WB_B, columns=["ω1", "ω2", "ω3"]).assign(t=trajectory.t)
-    return wide.melt("t", var_name="component", value_name="rate")
+def findings(study: Study, progress: Progress) -> Iterator[Finding]:
+    """Yield the lines of those figures whose scene is in the study, and the errors of the top's position as rows.
+
+    Scenes, methods and steps are the paper's, whatever the methods of the study.
+    """
+    figures = {BRICK: brick, TOP: top}
+    names = [scene.name for scene in study.scenes if scene.name in figures]
+    for k, name in enumerate(names):
+        progress(k, len(names), f"{name}: the paper's figure")
+        yield from figures[name](Figure(study.name, registry.scene(name)))
 
 
-def conservation() -> pd.DataFrame:
-    """Return figures 1(b), 1(c), columns t (s), method, energy and momentum: errors of energy and |L|, relative, signed."""
-    return pd.concat([_errors(_trajectory("brick_flip", method, 0.01), method) for method in METHODS], ignore_index=True)
+def brick(figure: Figure) -> Iterator[Samples]:
+    """Yield figure 1: rates by the paper's map; errors of energy and |L|, relative and signed, by both maps."""
+    for name in (THEIRS, OURS):
+        case, trajectory = figure.run(name, BRICK_STEP)
+        length = np.linalg.norm(trajectory.momentum_W, axis=1)
+        rates = dict(zip(RATES, trajectory.w_WB_B.T, strict=True)) if name == THEIRS else {}
+        relative = {ENERGY: trajectory.energy / trajectory.energy[0] - 1, MOMENTUM: length / length[0] - 1}
+        yield from (case.samples(quantity, trajectory.t, values) for quantity, values in (rates | relative).items())
 
 
-def _errors(trajectory: Trajectory, method: str) -> pd.DataFrame:
-    length = np.linalg.norm(trajectory.momentum_W, axis=1)
-    columns = {
-        "energy": trajectory.energy / trajectory.energy[0] - 1,
-        "momentum": length / length[0] - 1,
-    }
-    return pd.DataFrame({"t": trajectory.t, "method": method, **columns})
+def top(figure: Figure) -> Iterator[Finding]:
+    """Yield figure 2, the paper's map at two steps and the exact motion, then the errors after one period of precession."""
+    for name, dt in (*((THEIRS, dt) for dt in TOP_STEPS[:2]), (EXACT, TOP_STEPS[1])):
+        case, trajectory = figure.run(name, dt)
+        positions = com_W(figure.scene, trajectory.R_WB).T
+        yield from (case.samples(quantity, trajectory.t, x) for quantity, x in zip((X1, X2), positions, strict=False))
+    for dt in TOP_STEPS:
+        (case, ours), (_, exact) = figure.run(THEIRS, dt), figure.run(EXACT, dt)
+        yield from (case.row(value) for value in position_errors(ours, exact, round(figure.scene.t_end / dt)))
 
 
-def centre_of_mass() -> pd.DataFrame:
-    """Return figures 2(b), 2(c), columns t (s), run, x1, x2 (m): centre of mass of the top for two steps, and exact."""
-    runs = [(f"Δt = {dt:g} s", _trajectory("lagrange_top", "convected", dt)) for dt in TOP_STEPS[:2]]
-    runs.append((ANALYTICAL, _trajectory("lagrange_top", "exact", TOP_STEPS[1])))
-    return pd.concat([_positions(trajectory, name) for name, trajectory in runs], ignore_index=True)
-
-
-def _positions(trajectory: Trajectory, name: str) -> pd.DataFrame:
-    x = com_W(trajectory.scene, trajectory.R_WB)
-    return pd.DataFrame({"t": trajectory.t, "run": name, "x1": x[:, 0], "x2": x[:, 1]})
+def position_errors(ours: Trajectory, exact: Trajectory, step: int) -> tuple[Value, Value, Value]:
+    """Return the time of a step, and the errors of the centre of mass there: of the coordinate x1, and the distance."""
+    gap = com_W(ours.scene, ours.R_WB[step] - exact.R_WB[step])
+    return (
+        Value(Measure.PERIOD, float(ours.t[step])),
+        Value(Measure.PERIOD_X1, abs(float(gap[0]))),
+        Value(Measure.PERIOD_DISTANCE, float(np.linalg.norm(gap))),
+    )
 
 
 def com_W(scene: Scene, R_WB: Array) -> Array:
-    """Return the centre of mass (..., 3), m, world axes, of a scene in uniform gravity."""
-    return np.asarray(R_WB @ scene.potential.com_B)  # type: ignore[union-attr]
-
-
-def position_errors() -> pd.DataFrame:
-    """Return the errors of the top's centre of mass after the whole number of steps next to one period of precession.
-
-    Columns dt (s), t (s), x1 (m), the error of the coordinate that figure 2(b) draws, and distance (m).
-    """
-    return pd.DataFrame([_position_error(dt) for dt in TOP_STEPS])
-
-
-def _position_error(dt: float) -> dict[str, float]:
-    ours, exact = (_trajectory("lagrange_top", method, dt) for method in ("convected", "exact"))
-    step = round(ours.scene.t_end / dt)
-    gap = com_W(ours.scene, ours.R_WB[step] - exact.R_WB[step])
-    return {"dt": dt, "t": float(ours.t[step]), "x1": abs(float(gap[0])), "distance": float(np.linalg.norm(gap))}
+    """Return the centre of mass (..., 3), m, world axes, of a scene in uniform gravity at attitudes (..., 3, 3)."""
+    assert isinstance(scene.potential, UniformGravity)  # as the top is
+    return np.asarray(R_WB @ scene.potential.com_B)

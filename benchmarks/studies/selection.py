@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, NoReturn
 
@@ -12,9 +12,15 @@ from conservative.method import Grid, Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
-ROOMS = ("ours", "engine", "truth")
 TOLERANCES = ("tol", "rtol")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
+
+Settings = Callable[[Method], tuple[Method, ...]]
+"""Takes a method to the settings of its family that stand for it."""
+
+
+def _all_variants(method: Method) -> tuple[Method, ...]:
+    return method.variants()
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,9 @@ def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
     return tuple(registry.scene(name) for name in names)
 
 
-def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> tuple[Method, ...]:
+def methods(
+    names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = _all_variants
+) -> tuple[Method, ...]:
     """Return methods by name, ours first; a family's bare name, such as `mujoco`, stands for all its variants.
 
     Parameters
@@ -67,6 +75,8 @@ def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> t
         Default: every registered family.
     skip_missing
         A `Missing` method for each name whose engine is not installed, instead of an error.
+    settings
+        Which settings a family's bare name stands for; by default all its variants.
 
     Raises
     ------
@@ -75,17 +85,17 @@ def methods(names: Iterable[str] | None = None, skip_missing: bool = False) -> t
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    wanted = registry.registered(registry.METHODS) if names is None else names
+    wanted = registry.list_methods() if names is None else names
     found: dict[Method, None] = {}
     for name in wanted:
-        found.update(dict.fromkeys(_named(name, skip_missing)))
-    return tuple(sorted(found, key=lambda method: ROOMS.index(method.role)))
+        found.update(dict.fromkeys(_resolve(name, skip_missing, settings)))
+    return tuple(sorted(found, key=lambda method: list(Role).index(Role(method.role))))
 
 
-def _named(name: str, skip_missing: bool) -> tuple[Method, ...]:
+def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:
     try:
         method = registry.method(name)
-        return (method,) if ":" in name else method.variants()
+        return (method,) if ":" in name else settings(method)
     except MissingEngine as error:
         if not skip_missing:
             raise

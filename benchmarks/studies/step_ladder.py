@@ -1,4 +1,4 @@
-"""Steps and tolerances that a study walks along, all with samples at the same times."""
+"""Steps, long to short, and tolerances of a study: all runs are sampled at the same times."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .selection import tolerance_setting
 SAMPLES = 12
 """Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
 RADIANS = 1.0
-"""Turn of the body in the coarsest step of a ladder, rad."""
+"""Turn of the body in the longest step, rad."""
 LENGTH, FIRST_ORDER_LENGTH = 8, 12
-"""Steps of a ladder, each half of the one before. First-order methods begin to converge late."""
+"""Number of steps, each half of the one before. First-order methods begin to converge late."""
 HIGH_ORDER = 6
-"""From this order on one halving can lead from no accuracy to the round-off floor: steps are closer, and begin further out."""
+"""From this order on half a step can be all that lies between no accuracy and round-off: steps are closer, and begin longer."""
 HIGH_SAMPLES, HIGH_LENGTH = 4, 17
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 """Tolerances of adaptive methods, beside their own."""
 
 
 def intervals(method: Method) -> int:
-    """Return the number of intervals between a method's samples: with fewer, a step can be longer."""
+    """Return the number of intervals between the samples of a method: the fewer, the longer a step can be."""
     without_truncation = method.order is None and tolerance_setting(method) is None
     return HIGH_SAMPLES if without_truncation or (method.order or 0) >= HIGH_ORDER else SAMPLES
 

@@ -6,6 +6,10 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from conservative.outcome import Outcome, OutcomeKind
+
+from .case import Case, Done, Failed, attempt
+
 T = TypeVar("T")
 
 
@@ -45,3 +49,11 @@ def within(limit: float, work: Callable[[], T]) -> T:
     if raised:
         raise raised[0]
     return found[0]
+
+
+def attempt_within(limit: float, case: Case, skip_missing: bool) -> Done | Failed:
+    """Return the outcome of a case that is waited for `limit` s; see `attempt`."""
+    try:
+        return within(limit, lambda: attempt(case, skip_missing))
+    except TooLong as late:
+        return Failed(Outcome(OutcomeKind.TIMEOUT, str(late)))

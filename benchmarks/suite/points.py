@@ -5,12 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
@@ -19,33 +18,27 @@ from conservative.trajectory import Trajectory
 from ..gate import yardstick
 from ..measures import errors
 from ..measures.convergence_order import observed_order
-from ..studies import selection, step_ladder, studies
+from ..measures.measure import Measure
+from ..studies import selection, step_ladder
 from ..studies.case import Case, Done, attempt
+from ..studies.study import Truths
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
 PAPER = SCENES[:2]
 """Where orders are fitted and our kernels are timed against the yardstick."""
-SHORT = {
-    "gauss": ("gauss:stages=2", "gauss:stages=6"),
-    "moser_veselov": ("moser_veselov:order=2", "moser_veselov:order=exact"),
-    "reduced": ("reduced:order=2", "reduced:order=4", "reduced:order=6"),
-    "heyoka": ("heyoka:tol=1e-9", "heyoka:tol=1e-16"),
-    "mujoco": ("mujoco:Euler", "mujoco:RK4"),
-    "pinocchio": ("pinocchio:RK4",),
-    "scipy": ("scipy:rtol=1e-9",),
-}
-"""Settings that stand for families with many; every other registered family has its variants in the suite."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
 """Attitudes at which the energies of two potentials tell them apart."""
-RUNGS = 6
-"""Steps of the ladder that an observed order is fitted to; high orders need all of theirs, which are short."""
+STEPS = 6
+"""Number of steps that an observed order is fitted to; high orders need all of theirs, which are short."""
+LARGEST = {Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.DRIFT_MAX, Measure.ORTHONORMALITY}
+"""Measures that are gated."""
 
 
 @dataclass(frozen=True)
-class Gated:
+class GatedValue:
     """A value that should not change, and how much round-off alone changes it."""
 
     value: float
@@ -54,10 +47,11 @@ class Gated:
 
 @dataclass(frozen=True)
 class Point:
-    """A scene, a method, and the scene's own step."""
+    """A scene, a method, and the scene's own step; `truths` has the exact motions, for all points that share it."""
 
     scene: Scene
     method: Method
+    truths: Truths = field(default_factory=Truths, repr=False, compare=False)
 
     @cached_property
     def grid(self) -> Grid:
@@ -99,51 +93,46 @@ class Point:
 
 
 def points() -> Iterator[Point]:
-    """Yield the points: every registered method, those of other packages as well, on every scene of the suite."""
-    names = [name for family in registry.registered(registry.METHODS) for name in SHORT.get(family, (family,))]
-    methods = [method for method in selection.methods(names, skip_missing=True) if method.role != Role.TRUTH]
-    return (Point(scene, method) for scene in selection.scenes(SCENES) for method in methods)
+    """Yield the points: `suite_settings` of every registered method, of other packages as well, on every scene of the suite."""
+    found = selection.methods(skip_missing=True, settings=lambda method: method.suite_settings())
+    methods = [method for method in found if method.role != Role.TRUTH]
+    truths = Truths()
+    return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 
-@cache
-def truth(scene: Scene, grid: Grid) -> Trajectory:
-    """Return the exact motion, kept for all methods."""
-    exact: Trajectory = studies.reference(scene, grid).trajectory
-    return exact
-
-
-def gated(point: Point) -> dict[str, Gated]:
+def measure(point: Point) -> dict[str, GatedValue]:
     """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
-    exact = truth(point.scene, point.grid)
-    runs = [point.scene, *(nudged(point.scene, nudge) for nudge in NUDGES)]
-    found = [_measured(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
-    values = {name: Gated(found[0][name], _range([each[name] for each in found])) for name in found[0]}
-    return values | (observed(point) if point.scene.name in PAPER else {})
+    exact = point.truths(point.scene, point.grid).trajectory
+    runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
+    found = [_measure_run(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
+    values = {name: GatedValue(found[0][name], _range([each[name] for each in found])) for name in found[0]}
+    return values | (fit_order(point) if point.scene.name in PAPER else {})
 
 
-def nudged(scene: Scene, nudge: int) -> Scene:
-    """Return the scene with a start that differs by `nudge` units in the last place of its largest rate."""
+def nudge(scene: Scene, units: int) -> Scene:
+    """Return the scene with a start that differs by `units` units in the last place of its largest rate."""
     pattern = np.array([1.0, -1.0, 1.0]) * np.spacing(np.abs(scene.w_WB_B0).max())
-    return replace(scene, w_WB_B0=scene.w_WB_B0 + nudge * pattern)
+    return replace(scene, w_WB_B0=scene.w_WB_B0 + units * pattern)
 
 
-def _measured(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
+def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
     """Return errors and drifts at their largest, and the method's counters."""
     counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
-    return {name: value for name, value, _ in errors.measure(trajectory, exact) if name.endswith(" max")} | counters
+    found = errors.measure_errors(trajectory, exact)
+    return {value.key: value.value for value in found if value.measure in LARGEST} | counters
 
 
-def observed(point: Point) -> dict[str, Gated]:
+def fit_order(point: Point) -> dict[str, GatedValue]:
     """Return the observed order of the attitude; nothing where a method has or shows none."""
     scene, method = point.scene, point.method
     if method.order is None:
         return {}
-    exact = truth(scene, step_ladder.samples(scene, method))
-    grids = step_ladder.steps(scene, method)[: RUNGS if method.order < step_ladder.HIGH_ORDER else None]
+    exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
+    grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
     found = [attempt(Case("order", scene, method, grid)) for grid in grids]
-    sizes = [errors.measure(each.trajectory, exact)[0][1] if isinstance(each, Done) else np.nan for each in found]
+    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
     order = observed_order([grid.dt for grid in grids], sizes)
-    return {} if order.reason else {"observed order": Gated(order.slope, 0.0)}
+    return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 
 
 def _range(values: list[float]) -> float:

@@ -7,23 +7,23 @@ from typing import Any
 import pytest
 
 from conservative.benchmarks.gate.stash import REPEAT
-from conservative.benchmarks.gate.yardstick import elsewhere, time_ratio
-from conservative.benchmarks.measures.timing import interleaved, prepared
+from conservative.benchmarks.gate.yardstick import time_ratio, time_ratio_elsewhere
+from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
 from conservative.benchmarks.studies.case import Case, Done, attempt
-from conservative.benchmarks.studies.speed import end_only, stretched
+from conservative.benchmarks.studies.speed import end_only, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
+from conservative.integration import integrate
 from conservative.lazy_kernels import kernels
-from conservative.method import Method, Role, grid_for, integrate
+from conservative.method import Method, Role, grid_for
+from conservative.registry import list_families
 from conservative.registry import method as named
 from conservative.registry import scene as registered
 from conservative.scene import Scene
 
 POINTS = [pytest.param(point, id=point.id) for point in points.points()]
-GOALS = {"mujoco:Euler": 25, "mujoco:RK4": 100, "convected": 100}
-"""How many times cheaper than these a step of `reduced` is meant to be on the brick."""
-KERNELS = {"reduced": "march", "gauss": "gauss", "moser_veselov": "moser_veselov", "lame": "lame", "projected": "projected"}
-"""Modules in `conservative.kernels` by the families that they take the steps of."""
+RATIOS, CALLS = "33f1e1d237a63627", "b069cf647739a756"
+"""Definitions of the rows of ratios and of calls: nothing of them is gated, so a change of their source is none of theirs."""
 FEW_STEPS, OVERHEAD_GOAL = 5, 20
 
 
@@ -34,68 +34,79 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     if reason:
         pytest.skip(reason)
     benchmark.group = scene.name
-    run, last, cost = prepared(lambda: method.prepare(scene, end_only(point.grid)))
+    run, last, cost = prepare_and_run(lambda: method.prepare(scene, end_only(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
-    gated = points.gated(point)
+    values = points.measure(point)
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
-    benchmark.extra_info.update({name: found.value for name, found in gated.items()})
-    benchmark.extra_info["spreads"] = {name: found.spread for name, found in gated.items()}
+    benchmark.extra_info.update({name: found.value for name, found in values.items()})
+    benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}
     if point.timed:
         benchmark.extra_info["time ratio"] = time_ratio(method, scene, scene.dt)
-        request.node.stash[REPEAT] = partial(elsewhere, scene.name, method.name)
+        request.node.stash[REPEAT] = partial(time_ratio_elsewhere, scene.name, method.name)
     benchmark(run)
 
 
 def test_step_ratios(benchmark: Any) -> None:
-    """Times per step on the brick relative to ours, from one interleaved run, beside the goals; nothing is asserted."""
-    scene = registered("brick_flip")
-    ready = {name: long_run(scene, named(name)) for name in ("reduced", *GOALS)}
-    timings = interleaved({name: done.run for name, (_, done) in ready.items()}, rounds=15)
+    """Times per step of a free body relative to the methods that state goals, in one interleaved run; nothing is asserted."""
+    scene = registered(points.PAPER[0])
+    methods = [family() for family in list_families().values() if family.step_goals]
+    names = dict.fromkeys(name for method in methods for name in (method.name, *dict(method.step_goals)))
+    ready = {name: long_run(scene, named(name)) for name in names}
+    timings = time_interleaved({name: done.run for name, (_, done) in ready.items()}, rounds=15)
     per_step = {name: timings[name].minimum / case.grid.n_steps for name, (case, _) in ready.items()}
+    labels = {name: case.method.label for name, (case, _) in ready.items()}
     benchmark.group = f"{scene.name}, ratios"
-    for name, goal in GOALS.items():
-        label = ready[name][0].method.label
-        benchmark.extra_info[f"{label} / reduced (goal {goal})"] = per_step[name] / per_step["reduced"]
-    benchmark.extra_info["reduced, s a step"] = per_step["reduced"]
-    benchmark(ready["reduced"][1].run)
+    benchmark.extra_info["definition"] = RATIOS
+    for method in methods:
+        benchmark.extra_info.update(compare_steps(method, per_step, labels))
+    benchmark(ready[methods[0].name][1].run)
+
+
+def compare_steps(method: Method, per_step: dict[str, float], labels: dict[str, str]) -> dict[str, float]:
+    """Return how many times longer than a step of a method those of its goals take, and its own time, s."""
+    own = per_step[method.name]
+    found = {f"{labels[name]} / {method.name} (goal {goal:g})": per_step[name] / own for name, goal in method.step_goals}
+    return found | {f"{method.name}, s a step": own}
 
 
 def test_call_overhead(benchmark: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a call of `integrate` costs beside its kernel, us, a few steps with a sample of each; nothing is asserted."""
     runs: dict[str, Callable[[], Any]] = {}
-    for method in compiled():
+    for method in compiled_methods():
         scene = next(scene for scene in map(registered, points.PAPER) if not method.unsupported(scene))
         call = partial(integrate, scene, scene.dt, method, FEW_STEPS * scene.dt)
         runs[method.name] = call
         runs[f"kernel of {method.name}"] = kernel_alone(call, method, monkeypatch)
-    timings = interleaved(runs, rounds=15, min_time=0.002)
+    timings = time_interleaved(runs, rounds=15, min_time=0.002)
     benchmark.group = "calls"
-    for method in compiled():
+    benchmark.extra_info["definition"] = CALLS
+    for method in compiled_methods():
         over = timings[method.name].minimum - timings[f"kernel of {method.name}"].minimum
         benchmark.extra_info[f"{method.name}, us (goal {OVERHEAD_GOAL})"] = 1e6 * over
-    benchmark(runs["reduced"])
+    scene = registered(points.PAPER[0])
+    benchmark(partial(integrate, scene, scene.dt, t_end=FEW_STEPS * scene.dt))  # with the default method
 
 
-def compiled() -> list[Method]:
-    """Return the settings of those families of ours whose steps are one call of a kernel."""
-    return [method for family in KERNELS for method in type(named(family)).variants()]
+def compiled_methods() -> list[Method]:
+    """Return the settings of the families whose steps are one call of a kernel."""
+    return [method for family in list_families().values() if family.kernel for method in family.variants()]
 
 
 def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.MonkeyPatch) -> Callable[[], Any]:
     """Return the kernel with what `call` hands to it."""
-    module = kernels(KERNELS[method.family])
-    march, handed = module.march, []
+    module = kernels(method.kernel)
+    enter, handed = module.enter, []
 
-    def recorded(*arguments: Any) -> Any:
+    def record(*arguments: Any) -> Any:
         handed.append(arguments)
-        return march(*arguments)
+        return enter(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "march", recorded)
+        patch.setattr(module, "enter", record)
         call()
-    return partial(march, *handed[0])
+    return partial(enter, *handed[0])
 
 
 def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
@@ -103,4 +114,4 @@ def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
     case = Case("ratios", scene, method, end_only(grid_for(scene, scene.dt)))
     done = attempt(case)
     assert isinstance(done, Done), done
-    return stretched(case, done)
+    return lengthen(case, done)

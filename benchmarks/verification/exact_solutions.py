@@ -23,7 +23,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between, from_quaternion, to_quaternion
 from conservative.body import RigidBody
-from conservative.potentials.potential import UniformGravity
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references import precise
 from conservative.references.exact import method
 from conservative.references.exact.lagrange_top import top, top_motion
@@ -40,7 +40,7 @@ Random = np.random.Generator
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Trial:
     """A body, a field or none, a start, times (n,), s, and the bits that an integration needs."""
 
     kind: str
@@ -57,7 +57,7 @@ class Case:
             return method.free_body(self.body, self.R_WB0, self.w_WB_B0, self.t)
         return method.lagrange_top(self.body, self.potential, self.R_WB0, self.w_WB_B0, self.t)
 
-    def integrated(self) -> tuple[Array, Array]:
+    def integrate(self) -> tuple[Array, Array]:
         """Return the same by multi-precision integration."""
         moment = None if self.potential is None else self.potential.moment_B.tolist()
         q0, w0 = to_quaternion(self.R_WB0).tolist(), self.w_WB_B0.tolist()
@@ -66,7 +66,7 @@ class Case:
 
     def errors(self) -> tuple[float, float]:
         """Return the largest attitude error, rad, and the largest error of the rates relative to the largest rate."""
-        (R, w), (R_true, w_true) = self.solution(), self.integrated()
+        (R, w), (R_true, w_true) = self.solution(), self.integrate()
         fastest = np.abs(w_true).max() or 1.0
         return float(angle_between(R_true, R).max()), float(np.abs(w - w_true).max() / fastest)
 
@@ -82,7 +82,7 @@ def log_uniform(rng: Random, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def oriented(rng: Random, moments: Array) -> tuple[RigidBody, Array]:
+def turn_axes(rng: Random, moments: Array) -> tuple[RigidBody, Array]:
     """Return a body of moments (3,), kg m^2, in random axes, one time in three its principal ones, and `R_BP` (3, 3)."""
     R_BP = np.eye(3)[rng.permutation(3)] if rng.random() < 1 / 3 else random_rotation(rng)
     R_BP = R_BP * np.linalg.det(R_BP)
@@ -90,10 +90,10 @@ def oriented(rng: Random, moments: Array) -> tuple[RigidBody, Array]:
     return RigidBody((tensor + tensor.T) / 2), R_BP
 
 
-def free_case(rng: Random, separatrix: float | None = None) -> Case:
+def draw_free(rng: Random, separatrix: float | None = None) -> Trial:
     """Return a free body over 20 rad, or over 60 one whose start lies off the separatrix by a relative `separatrix`."""
     moments = np.sort([log_uniform(rng, 0.1, 10) for _ in range(3)]) * log_uniform(rng, 1e-4, 1e4)
-    body, R_BP = oriented(rng, moments)
+    body, R_BP = turn_axes(rng, moments)
     w = rng.normal(size=3)
     if separatrix is not None:
         a, b, c = moments
@@ -103,13 +103,13 @@ def free_case(rng: Random, separatrix: float | None = None) -> Case:
     speed = log_uniform(rng, 1e-2, 1e2)
     w *= speed / np.linalg.norm(w)
     kind, angle, bits = ("free", 20.0, BITS) if separatrix is None else ("free, near the separatrix", 60.0, NEAR_BITS)
-    return Case(kind, body, None, random_rotation(rng), R_BP @ w, np.sort(rng.uniform(0, angle / speed, size=24)), bits)
+    return Trial(kind, body, None, random_rotation(rng), R_BP @ w, np.sort(rng.uniform(0, angle / speed, size=24)), bits)
 
 
-def top_case(rng: Random, pole: float | None = None) -> Case:
+def draw_top(rng: Random, pole: float | None = None) -> Trial:
     """Return a top over some four nutations, or one that passes a pole at a distance of about `pole`, rad."""
     J1, J3 = log_uniform(rng, 0.2, 5), log_uniform(rng, 0.2, 5)
-    body, R_BP = oriented(rng, np.array([J1, J1, J3]))
+    body, R_BP = turn_axes(rng, np.array([J1, J1, J3]))
     k = log_uniform(rng, 0.1, 10)
     tilt, w_1, w_3 = rng.uniform(0.3, 2.8), rng.normal() * np.sqrt(k), rng.normal() * log_uniform(rng, 0.3, 30) * np.sqrt(k)
     w_2, b3 = rng.normal() * np.sqrt(k), J3 * w_3 / J1
@@ -126,26 +126,26 @@ def top_case(rng: Random, pole: float | None = None) -> Case:
     weight = float(rng.choice([-1, 1])) * log_uniform(rng, 0.1, 10)
     potential = UniformGravity(weight, R_BP @ [0, 0, k * J1 / weight])
     t = np.sort(rng.uniform(0, 8 * np.pi / np.sqrt(4 * k + w_1**2 + w_2**2), size=24))
-    case = Case("top", body, potential, R_WP @ R_BP.T, R_BP @ w_P, t)
-    return case if pole is None else at_the_pole(case)
+    trial = Trial("top", body, potential, R_WP @ R_BP.T, R_BP @ w_P, t)
+    return trial if pole is None else at_the_pole(trial)
 
 
-def at_the_pole(case: Case) -> Case:
-    """Return the case with its passage as the last of its times."""
-    assert case.potential is not None
-    start = top(Start(case.body, case.R_WB0, case.w_WB_B0), case.potential.moment_B, case.potential.moment_B)
+def at_the_pole(trial: Trial) -> Trial:
+    """Return the trial with its passage as the last of its times."""
+    assert trial.potential is not None
+    start = top(Start(trial.body, trial.R_WB0, trial.w_WB_B0), trial.potential.moment_B, trial.potential.moment_B)
     clock = top_motion(start).argument
     passages = [float(((n / 2) * clock.period - clock.start) / clock.rate) for n in range(3)]
-    distance, t = min((pole_distance(case, t), t) for t in passages if t > 0)
-    kind = "top, within 1e-5 of a pole" if distance < 1e-5 else case.kind
-    return Case(kind, case.body, case.potential, case.R_WB0, case.w_WB_B0, np.append(case.t[case.t < t], t))
+    distance, t = min((pole_distance(trial, t), t) for t in passages if t > 0)
+    kind = "top, within 1e-5 of a pole" if distance < 1e-5 else trial.kind
+    return Trial(kind, trial.body, trial.potential, trial.R_WB0, trial.w_WB_B0, np.append(trial.t[trial.t < t], t))
 
 
-def pole_distance(case: Case, t: float) -> float:
+def pole_distance(trial: Trial, t: float) -> float:
     """Return the angle, rad, between the line through the centre of mass and the vertical, at a time t, s."""
-    assert case.potential is not None
-    R, _ = method.lagrange_top(case.body, case.potential, case.R_WB0, case.w_WB_B0, [t])
-    lever = case.potential.moment_B / np.linalg.norm(case.potential.moment_B)
+    assert trial.potential is not None
+    R, _ = method.lagrange_top(trial.body, trial.potential, trial.R_WB0, trial.w_WB_B0, [t])
+    lever = trial.potential.moment_B / np.linalg.norm(trial.potential.moment_B)
     x, y, _ = R[0] @ lever
     return float(np.hypot(x, y))
 
@@ -156,25 +156,25 @@ def about_z(angle: float) -> Array:
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])
 
 
-def free_cases(count: int, seed: int = 1) -> Iterator[Case]:
+def free_trials(count: int, seed: int = 1) -> Iterator[Trial]:
     """Yield free bodies, every fifth near the separatrix."""
     for number in range(count):
         rng = np.random.default_rng([seed, number])
-        yield free_case(rng, log_uniform(rng, 1e-12, 1e-6) if number % 5 == 0 else None)
+        yield draw_free(rng, log_uniform(rng, 1e-12, 1e-6) if number % 5 == 0 else None)
 
 
-def top_cases(count: int, seed: int = 2) -> Iterator[Case]:
+def top_trials(count: int, seed: int = 2) -> Iterator[Trial]:
     """Yield tops, every tenth past a pole."""
     for number in range(count):
         rng = np.random.default_rng([seed, number])
-        yield top_case(rng, log_uniform(rng, 1e-12, 1e-6) if number % 10 == 0 else None)
+        yield draw_top(rng, log_uniform(rng, 1e-12, 1e-6) if number % 10 == 0 else None)
 
 
-def report(cases: Iterator[Case], bound: float) -> bool:
-    """Print the largest errors of each kind of case; return whether all are within the bound, rad."""
+def report(trials: Iterator[Trial], bound: float) -> bool:
+    """Print the largest errors of each kind of trial; return whether all are within the bound, rad."""
     found: dict[str, list[tuple[float, float]]] = {}
-    for number, case in enumerate(cases, 1):
-        found.setdefault(case.kind, []).append(case.errors())
+    for number, trial in enumerate(trials, 1):
+        found.setdefault(trial.kind, []).append(trial.errors())
         if number % 100 == 0:
             worst = max(max(pair) for errors in found.values() for pair in errors)
             print(f"  {number} cases, {worst:.1e}", file=sys.stderr, flush=True)
@@ -184,9 +184,9 @@ def report(cases: Iterator[Case], bound: float) -> bool:
     return all(max(pair) <= bound for errors in found.values() for pair in errors)
 
 
-def cost(case: Case, samples: int = 100_000, rounds: int = 5) -> float:
+def cost(trial: Trial, samples: int = 100_000, rounds: int = 5) -> float:
     """Return the processor time of one of many samples, 1e-6 s, all preparation included: the best of some rounds."""
-    many = replace(case, t=np.linspace(0, case.t[-1], samples))
+    many = replace(trial, t=np.linspace(0, trial.t[-1], samples))
     best = np.inf
     for _ in range(rounds):
         begin = time.process_time()
@@ -203,9 +203,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--free", type=int, default=1000, help="how many free bodies (default 1000)")
     parser.add_argument("--tops", type=int, default=1000, help="how many tops (default 1000)")
     chosen = parser.parse_args(arguments)
-    for case in (next(free_cases(1)), next(top_cases(1))):
-        print(f"{case.kind:28}{cost(case):6.2f} us a sample", flush=True)
-    results = [report(free_cases(chosen.free), FREE_BOUND), report(top_cases(chosen.tops), TOP_BOUND)]
+    for trial in (next(free_trials(1)), next(top_trials(1))):
+        print(f"{trial.kind:28}{cost(trial):6.2f} us a sample", flush=True)
+    results = [report(free_trials(chosen.free), FREE_BOUND), report(top_trials(chosen.tops), TOP_BOUND)]
     return 0 if all(results) else 1
 
 

@@ -88,7 +88,7 @@ def summary(runs: Sequence[Mapping[str, float]], limits: Mapping[str, float]) ->
 def one_run(limits: Mapping[str, float]) -> dict[str, float]:
     """Return the ratios of one run of the gate: all in one process, and those above their limits again in others."""
     first = _process(list(measures()))
-    return {name: yardstick.confirmed(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
+    return {name: yardstick.confirm(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
 
 
 def _alone(name: str) -> float:
@@ -106,7 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m conservative.benchmarks.verification.gate_false_alarms", description=__doc__
     )
-    parser.add_argument("--runs", type=int, default=100, help="runs that are judged")
+    parser.add_argument("--runs", type=int, default=100, help="runs that are judge")
     parser.add_argument("--learning", type=int, default=10, help="runs before those, from which the thresholds come")
     parser.add_argument("--once", nargs="+", metavar="NAME", help="print the ratios of these rows, from this process")
     options = parser.parse_args()

@@ -31,7 +31,7 @@ LEVEL = 1e-6
 
 
 @dataclass(frozen=True)
-class Growth:
+class DriftGrowth:
     """How drifts grow.
 
     Attributes
@@ -69,7 +69,7 @@ class Growth:
         )
 
 
-def growth(drift: Array, steps: int) -> Growth:
+def fit_growth(drift: Array, steps: int) -> DriftGrowth:
     """Return how drifts (members, blocks + 1), zero at first, grow over `steps` steps.
 
     The changes over blocks of a walk are independent and of mean zero, so that the t value of each member, as a normal
@@ -93,14 +93,14 @@ def growth(drift: Array, steps: int) -> Growth:
     slopes = np.array([_exponent(np.delete(drift, k, axis=0)) for k in range(len(drift))])
     stderr = float(np.sqrt((len(slopes) - 1) * np.mean((slopes - slopes.mean()) ** 2)))
     rms = float(np.sqrt(np.mean(drift[:, -1] ** 2)))
-    return Growth(steps, rms, _exponent(drift), stderr, float(drift[:, -1].mean() / steps), chance)
+    return DriftGrowth(steps, rms, _exponent(drift), stderr, float(drift[:, -1].mean() / steps), chance)
 
 
 def _exponent(drift: Array) -> float:
     """Return the slope of log(rms change) over log(blocks passed), over an eighth of the run at most."""
     lags = 2 ** np.arange(int(math.log2((drift.shape[1] - 1) // 8)) + 1)
     sizes = [np.sqrt(np.mean((drift[:, lag:] - drift[:, :-lag]) ** 2)) for lag in lags]
-    return float(np.polyfit(np.log(lags), np.log(np.maximum(sizes, np.finfo(float).tiny)), 1)[0])
+    return float(stats.linregress(np.log(lags), np.log(np.maximum(sizes, np.finfo(float).tiny))).slope)
 
 
 def ensemble(scene: Scene, members: int, seed: int = 0) -> list[Scene]:
@@ -109,7 +109,7 @@ def ensemble(scene: Scene, members: int, seed: int = 0) -> list[Scene]:
     return [scene.renamed(scene.name, w_WB_B0=scene.w_WB_B0 * (1 + SPREAD * draw.normal(size=3))) for _ in range(members)]
 
 
-def drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -> dict[str, Array]:
+def measure_drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -> dict[str, Array]:
     """Return the drift (members, blocks + 1) of each invariant of the scenes; of a vector, of its component along itself.
 
     Raises
@@ -131,7 +131,7 @@ def drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -> dict[s
     return {name: np.array(values) for name, values in found.items()}
 
 
-def measure(method: Method, scene: Scene, dt: float, steps: int, members: int) -> dict[str, Growth]:
+def measure_growth(method: Method, scene: Scene, dt: float, steps: int, members: int) -> dict[str, DriftGrowth]:
     """Return the growth of each invariant's drift; `steps` is rounded down to a multiple of `BLOCKS`.
 
     Raises
@@ -145,8 +145,8 @@ def measure(method: Method, scene: Scene, dt: float, steps: int, members: int) -
     if positive_integer("members", members) < 2:
         raise BadInput("members", members, "an integer of 2 or more")
     steps -= steps % BLOCKS
-    found = drifts(method, ensemble(scene, members), dt, steps)
-    return {name: growth(values, steps) for name, values in found.items()}
+    found = measure_drifts(method, ensemble(scene, members), dt, steps)
+    return {name: fit_growth(values, steps) for name, values in found.items()}
 
 
 @click.command(help="Measure how round-off grows over long runs.")
@@ -158,7 +158,7 @@ def measure(method: Method, scene: Scene, dt: float, steps: int, members: int) -
 def main(steps: float, members: int, dt: float, method: str, scene: str) -> None:
     """Print the growth of each invariant's drift."""
     try:
-        found = measure(registry.method(method), registry.scene(scene), dt, round(steps), members)
+        found = measure_growth(registry.method(method), registry.scene(scene), dt, round(steps), members)
     except BadInput as bad:
         raise click.UsageError(str(bad)) from None
     for name, grown in found.items():

@@ -1,28 +1,28 @@
 """Compiled kernels. Importing this package imports numba; `import conservative` alone does not.
 
-Numba keys its on-disk cache on the file of the outermost function only, so an edit to an inner kernel would leave stale
-machine code behind. All kernels therefore live in this folder, and caches older than any of its files are dropped on import.
+`protocol` says what a kernel that takes steps is given and what it returns.
+
+Numba compares cached code with the file of the outermost function only, so an edit to an inner kernel would run stale code.
+All kernels therefore live in this folder. A digest of its files lies beside the cached code, in `__pycache__` and under
+NUMBA_CACHE_DIR alike; where it is not that of the files as they are, the code is dropped on import. Fields of other packages
+(`fields`) are not part of the digest: after an edit to one, clear the cache.
+
+With NUMBA_DISABLE_JIT=1 nothing is compiled and all kernels run as plain Python, a thousand times slower, for a debugger or a
+coverage report. Results then differ by round-off, as products are not fused with sums, and a division by zero raises.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
+import hashlib
+import os
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
-
-def _drop_stale_caches(folder: Path) -> None:
-    newest = max(file.stat().st_mtime for file in folder.glob("*.py"))
-    for index in (folder / "__pycache__").glob("*.nbi"):
-        with suppress(FileNotFoundError):  # another process may be at it
-            if index.stat().st_mtime < newest:
-                index.unlink()
-
-
-_drop_stale_caches(Path(__file__).parent)
+COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
+"""Whether kernels are machine code; else they are plain Python."""
 
 kernel: Any = partial(njit, cache=True, error_model="numpy")
 """The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""
@@ -32,3 +32,28 @@ SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
 
 small: Any = partial(kernel, **SMALL)
 """How those are compiled. Contraction is safe in compensated sums, which have no product to contract with."""
+
+
+def _digest(folder: Path) -> str:
+    """Return a digest of all source files of a folder."""
+    found = hashlib.sha256()
+    for file in sorted(folder.glob("*.py")):
+        content = file.read_bytes()
+        found.update(f"{file.name} {len(content)} ".encode() + content)
+    return found.hexdigest()
+
+
+def _drop_stale_code(cache: Path, sources: Path) -> None:
+    """Delete numba's indices in `cache`, without which it finds nothing, unless they are of the `sources` as they are."""
+    stamp, digest = cache / "sources.sha256", _digest(sources)
+    if stamp.exists() and stamp.read_text() == digest:
+        return
+    for index in cache.glob("*.nbi"):
+        index.unlink(missing_ok=True)  # another process may be at it
+    fresh = stamp.with_suffix(f".{os.getpid()}")
+    fresh.write_text(digest)
+    fresh.replace(stamp)
+
+
+if COMPILED:
+    _drop_stale_code(Path(kernel(lambda: None).stats.cache_path), Path(__file__).parent)

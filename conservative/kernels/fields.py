@@ -1,19 +1,21 @@
 """Fields as the kernels see them: a named tuple of parameters in principal axes, and its torque, compiled per type.
 
 A kernel is compiled once for each type of field; `None` is the free body, for which the torque code is not compiled at all.
-A new field is a named tuple in a module of its own with overloads of the four functions below. Newton's method relies on the
+A new field is a named tuple in a module of its own that implements the four functions below. Newton's method relies on the
 derivatives that they return: it expects quadratic convergence.
 """
 
 from __future__ import annotations
 
+import inspect
+from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 from numba.extending import overload
 
 from . import SMALL, small
-from .vector import cross, dot, scaled, vertical
+from .vector import cross, dot, scale, vertical
 
 
 class Uniform(NamedTuple):
@@ -24,47 +26,56 @@ class Uniform(NamedTuple):
     z: float
 
 
+@singledispatch
 def finite_torque(field, q, a):
     """Return T = Q0' tau* in N m and its derivative by a (three columns).
 
     tau* = sum_j qbar_j x (-V*_j) is the torque of the finite derivative over the step from the attitude Q0 of the quaternion q
     to Q0 Cay(2 a) (method of the paper, 23 and 27b, in three unknowns).
     """
-    raise TypeError("compiled only")  # pragma: no cover
+    raise TypeError(f"not a field: {field!r}")
 
 
+@singledispatch
 def energy(field, q):
     """Return V in J at the attitude of the quaternion q, whose length does not matter."""
-    raise TypeError("compiled only")  # pragma: no cover
+    raise TypeError(f"not a field: {field!r}")
 
 
+@singledispatch
 def body_torque(field, q):
     """Return the torque in N m, principal axes, at the attitude of the quaternion q, whose length does not matter."""
-    raise TypeError("compiled only")  # pragma: no cover
+    raise TypeError(f"not a field: {field!r}")
 
 
+@singledispatch
 def finite_derivative(field, q0, q1):
     """Return V* (9,) in J between base vectors q0 and q1 (9,), and its derivative by q1 (9, 9)."""
-    raise TypeError("compiled only")  # pragma: no cover
+    raise TypeError(f"not a field: {field!r}")
 
 
-def is_field(type_, field) -> bool:
-    """Whether a numba type is the named tuple `field`."""
-    return getattr(type_, "instance_class", None) is field
+def implements(function, *fields, **options):
+    """Register what is decorated as `function` of the named tuples `fields`, compiled with numba's `options` and in Python."""
+
+    def register(implementation):
+        def choose(field, *_):
+            return implementation if getattr(field, "instance_class", None) in fields else None
+
+        choose.__signature__ = inspect.signature(implementation)
+        overload(function, jit_options=options)(choose)
+        for field in fields:
+            function.register(field)(implementation)
+        return implementation
+
+    return register
 
 
-@overload(finite_torque, jit_options=SMALL)
+@implements(finite_torque, Uniform, **SMALL)
 def _finite_torque_uniform(field, q, a):
-    if not is_field(field, Uniform):
-        return None
-
-    def torque(field, q, a):
-        # T = (M c) x (-gamma), c = weight com
-        g = vertical(q)
-        m, dm = halfway(a, (field.x, field.y, field.z))
-        return cross(g, m), (cross(g, dm[0]), cross(g, dm[1]), cross(g, dm[2]))
-
-    return torque
+    # T = (M c) x (-gamma), c = weight com
+    g = vertical(q)
+    m, dm = halfway(a, (field.x, field.y, field.z))
+    return cross(g, m), (cross(g, dm[0]), cross(g, dm[1]), cross(g, dm[2]))
 
 
 @small
@@ -79,7 +90,7 @@ def halfway(a, c):
     m = (c[0] + s * (ac[0] + aac[0]), c[1] + s * (ac[1] + aac[1]), c[2] + s * (ac[2] + aac[2]))
     # d(M c)/da_k = s (e_k x c + (a.c) e_k + c_k a - 2 a_k M c)
     f = dot(a, c)
-    t = scaled(2.0, m)
+    t = scale(2.0, m)
     d0 = (s * (f + c[0] * a[0] - a[0] * t[0]), s * (c[0] * a[1] - c[2] - a[0] * t[1]), s * (c[0] * a[2] + c[1] - a[0] * t[2]))
     d1 = (s * (c[1] * a[0] + c[2] - a[1] * t[0]), s * (f + c[1] * a[1] - a[1] * t[1]), s * (c[1] * a[2] - c[0] - a[1] * t[2]))
     d2 = (s * (c[2] * a[0] - c[1] - a[2] * t[0]), s * (c[2] * a[1] + c[0] - a[2] * t[1]), s * (f + c[2] * a[2] - a[2] * t[2]))
@@ -97,36 +108,18 @@ def in_body(q, v):
     return (v[0] + f * (q[0] * t[0] + ut[0]), v[1] + f * (q[0] * t[1] + ut[1]), v[2] + f * (q[0] * t[2] + ut[2]))
 
 
-@overload(energy, jit_options=SMALL)
+@implements(energy, Uniform, **SMALL)
 def _energy_uniform(field, q):
-    if not is_field(field, Uniform):
-        return None
-
-    def of_uniform(field, q):
-        return dot(vertical(q), (field.x, field.y, field.z))
-
-    return of_uniform
+    return dot(vertical(q), (field.x, field.y, field.z))
 
 
-@overload(body_torque, jit_options=SMALL)
+@implements(body_torque, Uniform, **SMALL)
 def _body_torque_uniform(field, q):
-    if not is_field(field, Uniform):
-        return None
-
-    def torque(field, q):
-        return cross(vertical(q), (field.x, field.y, field.z))
-
-    return torque
+    return cross(vertical(q), (field.x, field.y, field.z))
 
 
-@overload(finite_derivative)
+@implements(finite_derivative, Uniform)
 def _finite_derivative_uniform(field, q0, q1):
-    if not is_field(field, Uniform):
-        return None
-
-    def derivative(field, q0, q1):
-        V_star = np.zeros(9)
-        V_star[2], V_star[5], V_star[8] = field.x, field.y, field.z
-        return V_star, np.zeros((9, 9))
-
-    return derivative
+    V_star = np.zeros(9)
+    V_star[2], V_star[5], V_star[8] = field.x, field.y, field.z
+    return V_star, np.zeros((9, 9))

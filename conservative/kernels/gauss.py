@@ -18,25 +18,56 @@ direction of time. The kernel works in units that make L of size one.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import kernel, small
-from .simd import LANES, four, fused, larger_size, place, put, splat, spread
-from .vector import accumulate, add, cross, dot, product, scaled, subtract, vertical
+from .protocol import Result, Workspace, loosen
+from .simd import LANES, four, fuse, lane, larger_size, put, splat, spread
+from .vector import accumulate, add, cross, dot, product, scale, subtract, vertical
 
+FAILURE = "no continuous solution"
+"""Why a step fails."""
 MAX_SWEEPS = 120
 MAX_NEWTON = 25
 ROUND_OFF = 2e-17
 STAGNATION = 2e-15
 SLOWEST = 0.8
-"""Pairs of sweeps that gain less than this are left for Newton, whose step costs as much as a hundred sweeps."""
+"""Newton takes over when two sweeps shrink the change by less than this factor; its step costs as much as a hundred sweeps."""
 FEW, NEAR = 6, 0.25
-"""Corrections of Newton's method that a guess near the solution needs at most, and how near that is, L being of size one."""
+"""Newton is trusted with at most FEW corrections that lead no further than NEAR from the guess; L is of size one."""
 SHORTEST_PART = 2.0**-14
-"""Part of a step below which the continuous branch of its solution must have ended."""
+"""Part of a step below which the continuous branch of its solution counts as ended."""
 LONGEST = 2.0**64
-"""Length up to which a quaternion is let grow; dividing by it then rounds nothing."""
+"""Length at which a quaternion is divided by this power of two, which rounds nothing."""
+
+
+class Model(NamedTuple):
+    """The closed system, principal axes, with momenta in units of `unit` kg m^2/s.
+
+    1/J and the moment c of the field in these units, L and gamma at the start, the attitude q there against axes whose third
+    is along gamma, and `left`, which takes those axes to the world's.
+    """
+
+    unit: float
+    J_inverse: Any
+    moment: Any
+    L: Any
+    gamma: Any
+    q: Any
+    left: Any
+
+
+class Coefficients(NamedTuple):
+    """Number of stages s; A, E by columns, b and its low part, padded with zeros to a multiple of four stages; step h, s."""
+
+    s: int
+    A: Any
+    E: Any
+    b: Any
+    b_low: Any
+    h: float
 
 
 @kernel
@@ -66,23 +97,23 @@ def stages_from(A, s, h, F, U, D, Z):
         d0 = d1 = d2 = d3 = d4 = d5 = splat(0.0)
         for j in range(s):
             a = four(A, j * width + i)
-            d0 = fused(a, spread(F, j), d0)
-            d1 = fused(a, spread(F, width + j), d1)
-            d2 = fused(a, spread(F, 2 * width + j), d2)
-            d3 = fused(a, spread(F, 3 * width + j), d3)
-            d4 = fused(a, spread(F, 4 * width + j), d4)
-            d5 = fused(a, spread(F, 5 * width + j), d5)
-        change = placed(h * d0, U[0], D, Z, i, change)
-        change = placed(h * d1, U[1], D, Z, width + i, change)
-        change = placed(h * d2, U[2], D, Z, 2 * width + i, change)
-        change = placed(h * d3, U[3], D, Z, 3 * width + i, change)
-        change = placed(h * d4, U[4], D, Z, 4 * width + i, change)
-        change = placed(h * d5, U[5], D, Z, 5 * width + i, change)
-    return max(max(place(change, 0), place(change, 1)), max(place(change, 2), place(change, 3)))
+            d0 = fuse(a, spread(F, j), d0)
+            d1 = fuse(a, spread(F, width + j), d1)
+            d2 = fuse(a, spread(F, 2 * width + j), d2)
+            d3 = fuse(a, spread(F, 3 * width + j), d3)
+            d4 = fuse(a, spread(F, 4 * width + j), d4)
+            d5 = fuse(a, spread(F, 5 * width + j), d5)
+        change = store_increments(h * d0, U[0], D, Z, i, change)
+        change = store_increments(h * d1, U[1], D, Z, width + i, change)
+        change = store_increments(h * d2, U[2], D, Z, 2 * width + i, change)
+        change = store_increments(h * d3, U[3], D, Z, 3 * width + i, change)
+        change = store_increments(h * d4, U[4], D, Z, 4 * width + i, change)
+        change = store_increments(h * d5, U[5], D, Z, 5 * width + i, change)
+    return max(max(lane(change, 0), lane(change, 1)), max(lane(change, 2), lane(change, 3)))
 
 
 @kernel
-def placed(d, u, D, Z, i, change):
+def store_increments(d, u, D, Z, i, change):
     """Store four increments d and the states u + d; return the largest change so far."""
     change = larger_size(d - four(D, i), change)
     put(D, i, d)
@@ -91,7 +122,7 @@ def placed(d, u, D, Z, i, change):
 
 
 @kernel
-def swept(A, s, h, J_inverse, c, U, F, D, Z):
+def sweep_stages(A, s, h, J_inverse, c, U, F, D, Z):
     """Iterate D = h A f(U + D) to stagnation; return (sweeps, last change, success)."""
     before = earlier = math.inf
     for sweep in range(1, MAX_SWEEPS + 1):
@@ -108,7 +139,7 @@ def swept(A, s, h, J_inverse, c, U, F, D, Z):
 
 
 @kernel
-def newton(A, s, h, J_inverse, c, U, F, D, Z):
+def newton_solve(A, s, h, J_inverse, c, U, F, D, Z):
     """Solve the same equations by Newton from the D and Z given; return (iterations, last change, success, branch).
 
     The last is whether the determinant of the tangent is positive: it is for h = 0, and zero where the continuous branch ends.
@@ -150,7 +181,7 @@ def newton(A, s, h, J_inverse, c, U, F, D, Z):
 
 
 @kernel
-def followed(A, s, h, J_inverse, c, U, F, D, Z):
+def continue_branch(A, s, h, J_inverse, c, U, F, D, Z):
     """Solve by Newton along the branch D(h) from D(0) = 0, in parts of h as long as can be; return (iterations, size, success).
 
     A part is trusted where its few corrections lead not far away from a guess in line with the last two. Where the branch ends
@@ -162,11 +193,11 @@ def followed(A, s, h, J_inverse, c, U, F, D, Z):
         aim = min(reached + part, 1.0)
         if reached > 0.0:
             D[:] = found + (aim - reached) / (reached - earlier) * (found - before)
-            moved(U, D, Z)
+            place_stages(U, D, Z)
         else:
-            start(A, s, aim * h, J_inverse, c, U, F, D, Z)
+            guess_stages(A, s, aim * h, J_inverse, c, U, F, D, Z)
         guess = D.copy()
-        corrections, change, good, positive = newton(A, s, aim * h, J_inverse, c, U, F, D, Z)
+        corrections, change, good, positive = newton_solve(A, s, aim * h, J_inverse, c, U, F, D, Z)
         work += corrections
         if not (good and positive and corrections <= FEW and np.abs(D - guess).max() <= NEAR):
             part *= 0.5
@@ -175,13 +206,13 @@ def followed(A, s, h, J_inverse, c, U, F, D, Z):
         else:
             before, found, earlier, reached, part = found, D.copy(), reached, aim, 2.0 * part
     D[:] = found
-    moved(U, D, Z)
+    place_stages(U, D, Z)
     rates(J_inverse, c, Z, F)
     return work, stages_from(A, s, h, F, U, D, Z), False
 
 
 @kernel
-def moved(U, D, Z):
+def place_stages(U, D, Z):
     """Z = U + D"""
     width = Z.shape[0] // 6
     for k in range(6):
@@ -189,10 +220,10 @@ def moved(U, D, Z):
 
 
 @kernel
-def any_solution(A, s, h, J_inverse, c, U, F, D, Z):
+def find_solution(A, s, h, J_inverse, c, U, F, D, Z):
     """Whether Newton's method from an explicit Euler guess ends at a solution of the equations, whichever."""
-    start(A, s, h, J_inverse, c, U, F, D, Z)
-    return newton(A, s, h, J_inverse, c, U, F, D, Z)[2]
+    guess_stages(A, s, h, J_inverse, c, U, F, D, Z)
+    return newton_solve(A, s, h, J_inverse, c, U, F, D, Z)[2]
 
 
 @kernel
@@ -221,13 +252,13 @@ def middle(s, Z):
 
 
 @small
-def carried(q, carry, a, size, g0, g1):
+def carry_attitude(q, carry, a, size, g0, g1):
     """A quaternion, longer than q, of R M(g0)' M(g1), as a compensated sum; a is of length `size`.
 
     With a of unit length the quaternion of M(g0)' M(g1) is along (1 + g0.a + g1.a + g0.g1, (g1 - g0) x (g0 + a)).
     """
-    v = cross(subtract(g1, g0), add(scaled(size, g0), a))
-    v = scaled(1.0 / (size + dot(add(g0, g1), a) + size * dot(g0, g1)), v)
+    v = cross(subtract(g1, g0), add(scale(size, g0), a))
+    v = scale(1.0 / (size + dot(add(g0, g1), a) + size * dot(g0, g1)), v)
     d = product(q, (0.0, v[0], v[1], v[2]))
     w, cw = accumulate(q[0], carry[0], d[0])
     x, cx = accumulate(q[1], carry[1], d[1])
@@ -240,7 +271,7 @@ def carried(q, carry, a, size, g0, g1):
 
 
 @small
-def minimal(g, a):
+def minimal_rotation(g, a):
     """Quaternion, not normalised, of the minimal rotation that takes the unit vector g to a."""
     n = cross(g, a)
     return (1.0 + dot(g, a), n[0], n[1], n[2])
@@ -250,11 +281,11 @@ def minimal(g, a):
 def attitude(left, phi, q, gamma):
     """Quaternion, not normalised, of Rz(phi) R turned by `left`, R of q but for round-off: that which takes gamma to e_z."""
     z = product(left, (math.cos(0.5 * phi), 0.0, 0.0, math.sin(0.5 * phi)))
-    return product(z, product(q, minimal(gamma, vertical(q))))
+    return product(z, product(q, minimal_rotation(gamma, vertical(q))))
 
 
 @kernel
-def turned(h, b, a, size, J_inverse, Z):
+def integrate_turn(h, b, a, size, J_inverse, Z):
     """Integral of phi' over the step; a is of length `size`."""
     width = Z.shape[0] // 6
     total = splat(0.0)
@@ -263,13 +294,13 @@ def turned(h, b, a, size, J_inverse, Z):
         g = (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
         above = w[0] * (size * g[0] + splat(a[0])) + w[1] * (size * g[1] + splat(a[1])) + w[2] * (size * g[2] + splat(a[2]))
         total = total + four(b, i) * above / (splat(size) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
-    return h * summed(total)
+    return h * sum_lanes(total)
 
 
 @kernel
-def summed(v):
+def sum_lanes(v):
     """Sum of four floats."""
-    return (place(v, 0) + place(v, 2)) + (place(v, 1) + place(v, 3))
+    return (lane(v, 0) + lane(v, 2)) + (lane(v, 1) + lane(v, 3))
 
 
 @kernel
@@ -279,14 +310,14 @@ def advance(h, b, b_low, F, U, carry):
     for k in range(6):
         total = splat(0.0)
         for i in range(0, width, LANES):
-            total = fused(four(b_low, i), four(F, k * width + i), total)
+            total = fuse(four(b_low, i), four(F, k * width + i), total)
         for i in range(0, width, LANES):
-            total = fused(four(b, i), four(F, k * width + i), total)
-        U[k], carry[k] = accumulate(U[k], carry[k], h * summed(total))
+            total = fuse(four(b, i), four(F, k * width + i), total)
+        U[k], carry[k] = accumulate(U[k], carry[k], h * sum_lanes(total))
 
 
 @kernel
-def start(A, s, h, J_inverse, c, U, F, D, Z):
+def guess_stages(A, s, h, J_inverse, c, U, F, D, Z):
     """First guess of the stages: the rates at the start of the step held constant."""
     width = Z.shape[0] // 6
     for k in range(6):
@@ -296,50 +327,57 @@ def start(A, s, h, J_inverse, c, U, F, D, Z):
 
 
 @kernel
-def march(s, A, E, b, b_low, h, n_steps, every, unit_L, J_inverse, c, L0, gamma0, q0, left, q_out, L_out):
-    """Take n_steps steps of h s and store attitude and momentum of every `every`-th and the last.
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`).
 
-    L0 is in units of `unit_L`, gamma0 is where q0 has e_z, and `left` turns that to world axes. Returns (steps done, sweeps and
-    Newton corrections, size of the last change, False). Steps done < n_steps means that the next one has no solution on the
-    continuous branch; then the third is the residual where the branch ends, and the fourth whether there is one elsewhere.
-    Coefficients come with their stages filled up with zeros to a multiple of four.
+    A step fails where it has no solution on the continuous branch; the size then is the residual where the branch ends.
     """
+    unit, J_inverse, c, L0, gamma0, q0, left = model
+    s, A, E, b, b_low, h = coefficients
+    n_steps, every, q_out, L_out = workspace
     width = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)
     for k in range(3):
         U[k], U[3 + k] = L0[k], gamma0[k]
     F, D, Z = np.empty(6 * width), np.zeros(6 * width), np.empty(6 * width)
     q, q_carry, gamma, phi, phi_carry = q0, (0.0, 0.0, 0.0, 0.0), gamma0, 0.0, 0.0
-    store(0, left, phi, q, gamma, unit_L, U, q_out, L_out)
+    store(0, left, phi, q, gamma, unit, U, q_out, L_out)
     row, work, change = 0, 0, 0.0
     for step in range(1, n_steps + 1):
         if step == 1:
-            start(A, s, h, J_inverse, c, U, F, D, Z)
+            guess_stages(A, s, h, J_inverse, c, U, F, D, Z)
         else:
             stages_from(E, s, h, F, U, D, Z)
-        sweeps, change, good = swept(A, s, h, J_inverse, c, U, F, D, Z)
+        sweeps, change, good = sweep_stages(A, s, h, J_inverse, c, U, F, D, Z)
         work += sweeps
         if not good:
-            corrections, change, good = followed(A, s, h, J_inverse, c, U, F, D, Z)
+            corrections, change, good = continue_branch(A, s, h, J_inverse, c, U, F, D, Z)
             work += corrections
             if not good:
-                return step - 1, work, change, any_solution(A, s, h, J_inverse, c, U, F, D, Z)
+                elsewhere = find_solution(A, s, h, J_inverse, c, U, F, D, Z)
+                return Result(step - 1, (step - 1) * s, work, None, change, elsewhere)
         rates(J_inverse, c, Z, F)
         a = middle(s, Z)
         size = math.sqrt(dot(a, a))
-        phi, phi_carry = accumulate(phi, phi_carry, turned(h, b, a, size, J_inverse, Z))
+        phi, phi_carry = accumulate(phi, phi_carry, integrate_turn(h, b, a, size, J_inverse, Z))
         advance(h, b, b_low, F, U, carry)
         before, gamma = gamma, (U[3], U[4], U[5])
-        q, q_carry = carried(q, q_carry, a, size, before, gamma)
+        q, q_carry = carry_attitude(q, q_carry, a, size, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1
-            store(row, left, phi - phi_carry, q, gamma, unit_L, U, q_out, L_out)
-    return n_steps, work, change, False
+            store(row, left, phi - phi_carry, q, gamma, unit, U, q_out, L_out)
+    return Result(n_steps, n_steps * s, work, None, change, False)
 
 
 @kernel
-def store(row, left, phi, q, gamma, unit_L, U, q_out, L_out):
+def enter(*loose):
+    """`march` as Python calls it (`protocol`)."""
+    return loosen(march(Model(*loose[:7]), Coefficients(*loose[7:13]), Workspace(*loose[13:])))
+
+
+@kernel
+def store(row, left, phi, q, gamma, unit, U, q_out, L_out):
     """Write a state."""
     q_out[row, :] = attitude(left, phi, q, gamma)
     for k in range(3):
-        L_out[row, k] = unit_L * U[k]
+        L_out[row, k] = unit * U[k]

@@ -8,11 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
 from . import kernel
-from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, in_body, is_field
-from .vector import add, cross, dot, scaled
+from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body
+from .vector import add, cross, dot, scale
 
 Triple = tuple[float, float, float]
 
@@ -31,71 +30,47 @@ def _times(field, u):
     return (dot(field.first, u), dot(field.second, u), dot(field.third, u))
 
 
-@overload(finite_torque)
+@implements(finite_torque, Gradient)
 def _finite_torque_gradient(field, q, a):
-    if not is_field(field, Gradient):
-        return None
-
-    def torque(field, q, a):
-        e = in_body(q, field.e)
-        u, du = halfway(scaled(-1.0, a), e)
-        m, dm = halfway(a, _times(field, u))
-        return cross(e, m), (
-            _column(field, a, e, dm[0], du[0]),
-            _column(field, a, e, dm[1], du[1]),
-            _column(field, a, e, dm[2], du[2]),
-        )
-
-    return torque
+    e = in_body(q, field.e)
+    u, du = halfway(scale(-1.0, a), e)
+    m, dm = halfway(a, _times(field, u))
+    return cross(e, m), (
+        _column(field, a, e, dm[0], du[0]),
+        _column(field, a, e, dm[1], du[1]),
+        _column(field, a, e, dm[2], du[2]),
+    )
 
 
 @kernel
 def _column(field, a, e, dm, du):
     """Derivative of e x (M I u): M changes the product by dm, u changes by -du since it is taken at -a."""
-    return cross(e, add(dm, halfway(a, _times(field, scaled(-1.0, du)))[0]))
+    return cross(e, add(dm, halfway(a, _times(field, scale(-1.0, du)))[0]))
 
 
-@overload(energy)
+@implements(energy, Gradient)
 def _energy_gradient(field, q):
-    if not is_field(field, Gradient):
-        return None
-
-    def of_gradient(field, q):
-        e = in_body(q, field.e)
-        return 0.5 * dot(e, _times(field, e))
-
-    return of_gradient
+    e = in_body(q, field.e)
+    return 0.5 * dot(e, _times(field, e))
 
 
-@overload(body_torque)
+@implements(body_torque, Gradient)
 def _body_torque_gradient(field, q):
-    if not is_field(field, Gradient):
-        return None
-
-    def torque(field, q):
-        e = in_body(q, field.e)
-        return cross(e, _times(field, e))
-
-    return torque
+    e = in_body(q, field.e)
+    return cross(e, _times(field, e))
 
 
-@overload(finite_derivative)
+@implements(finite_derivative, Gradient)
 def _finite_derivative_gradient(field, q0, q1):
-    if not is_field(field, Gradient):
-        return None
-
-    def derivative(field, q0, q1):
-        e = np.array(field.e)
-        mean = 0.5 * (q0 + q1)
-        u = (np.sum(mean[0:3] * e), np.sum(mean[3:6] * e), np.sum(mean[6:9] * e))
-        Iu = _times(field, u)
-        rows = (field.first, field.second, field.third)
-        V_star, dV_star = np.empty(9), np.empty((9, 9))
-        ee = 0.5 * np.outer(e, e)
-        for j in range(3):
-            V_star[3 * j : 3 * j + 3] = Iu[j] * e
-            for k in range(3):
-                dV_star[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] = rows[j][k] * ee
-        return V_star, dV_star
-
-    return derivative
+    e = np.array(field.e)
+    mean = 0.5 * (q0 + q1)
+    u = (np.sum(mean[0:3] * e), np.sum(mean[3:6] * e), np.sum(mean[6:9] * e))
+    Iu = _times(field, u)
+    rows = (field.first, field.second, field.third)
+    V_star, dV_star = np.empty(9), np.empty((9, 9))
+    ee = 0.5 * np.outer(e, e)
+    for j in range(3):
+        V_star[3 * j : 3 * j + 3] = Iu[j] * e
+        for k in range(3):
+            dV_star[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] = rows[j][k] * ee
+    return V_star, dV_star

@@ -1,4 +1,4 @@
-"""The step of the symmetric top by addition theorems, and its constants; derivation and symbols in `conservative/methods/lame.py`.
+"""The step of the symmetric top by addition theorems, and its constants; derivation and symbols: `conservative.methods.lame`.
 
 State: attitude q of the slow frame, whose third axis is the body's, and momentum L in its axes. Quaternions are scalar first.
 """
@@ -6,18 +6,35 @@ State: attitude q of the slow frame, whose third axis is the body's, and momentu
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import kernel
-from .twofold import minus, over, plus, scaled, times, two
+from .protocol import Result, Workspace, loosen
+from .twofold import minus, over, plus, scale, times, two
 from .vector import add, cross, product
-from .vector import scaled as scaled_vector
+from .vector import scale as scale_vector
 
 TERMS = 22
 SERIES_RADIUS = 0.125
 DAMPING = 0.3
 LARGEST_POLE = 1.7
+
+
+class Model(NamedTuple):
+    """Moment across the axis, kg m^2; weight times lever arm, N m; q and L at the start, third axis along the body's."""
+
+    J: float
+    kappa: float
+    q: Any
+    L: Any
+
+
+class Coefficients(NamedTuple):
+    """Length of a step, s."""
+
+    h: float
 
 
 @kernel
@@ -28,19 +45,19 @@ def curve(J, kappa, gamma, L):
         plus(times(two(gamma[0]), two(gamma[0])), times(two(gamma[1]), two(gamma[1]))), times(two(gamma[2]), two(gamma[2]))
     )
     # 1/|gamma| = 1 - (|gamma|^2 - 1)/2 up to the square of a rounding error
-    inverse = minus(two(1.5), scaled(0.5, square))
+    inverse = minus(two(1.5), scale(0.5, square))
     g = (times(inverse, two(gamma[0])), times(inverse, two(gamma[1])), times(inverse, two(gamma[2])))
-    w = (scaled(L[0], Ji), scaled(L[1], Ji), scaled(L[2], Ji))
-    k = scaled(kappa, Ji)
+    w = (scale(L[0], Ji), scale(L[1], Ji), scale(L[2], Ji))
+    k = scale(kappa, Ji)
     ww = plus(plus(times(w[0], w[0]), times(w[1], w[1])), times(w[2], w[2]))
-    E = plus(scaled(0.5, ww), times(k, g[2]))
+    E = plus(scale(0.5, ww), times(k, g[2]))
     z = plus(plus(times(w[0], g[0]), times(w[1], g[1])), times(w[2], g[2]))
-    nu, x0 = scaled(0.5, k), times(E, over(two(-1.0), two(6.0)))
+    nu, x0 = scale(0.5, k), times(E, over(two(-1.0), two(6.0)))
     upper = plus(x0, nu)
-    g2 = minus(scaled(12.0, times(x0, x0)), scaled(2.0, times(nu, minus(times(z, w[2]), scaled(2.0, nu)))))
+    g2 = minus(scale(12.0, times(x0, x0)), scale(2.0, times(nu, minus(times(z, w[2]), scale(2.0, nu)))))
     slip = times(nu, minus(z, w[2]))
-    g3 = plus(minus(scaled(4.0, times(upper, times(upper, upper))), times(g2, upper)), times(slip, slip))
-    B_M = minus(scaled(-2.0, x0), scaled(0.25, times(w[2], w[2])))
+    g3 = plus(minus(scale(4.0, times(upper, times(upper, upper))), times(g2, upper)), times(slip, slip))
+    B_M = minus(scale(-2.0, x0), scale(0.25, times(w[2], w[2])))
     return E, z, w[2], nu, x0, g2, g3, np.array((minus(x0, nu), upper, B_M))
 
 
@@ -64,14 +81,14 @@ def series(g2, g3, B, t):
         total = (0.0, 0.0)
         for i in range(2, k - 1):
             total = plus(total, times((c[i, 0], c[i, 1]), (c[k - i, 0], c[k - i, 1])))
-        c[k] = over(scaled(3.0, total), two((2.0 * k + 1.0) * (k - 3.0)))
+        c[k] = over(scale(3.0, total), two((2.0 * k + 1.0) * (k - 3.0)))
     p, dp = (0.0, 0.0), (0.0, 0.0)
     for k in range(TERMS - 1, 0, -1):
         ck = (c[k, 0], c[k, 1])
-        p, dp = plus(times(p, T), ck), plus(times(dp, T), scaled(2.0 * k - 2.0, ck))
+        p, dp = plus(times(p, T), ck), plus(times(dp, T), scale(2.0 * k - 2.0, ck))
     # p = 1/T + sum_k c_k T^(k-1), with k = 1 empty
     inverse = over(two(1.0), T)
-    p, dp = plus(inverse, p), over(plus(scaled(-2.0, inverse), dp), t)
+    p, dp = plus(inverse, p), over(plus(scale(-2.0, inverse), dp), t)
     f = np.empty((3, 2, 2))
     a = np.empty((TERMS, 2))
     for n in range(3):
@@ -80,12 +97,12 @@ def series(g2, g3, B, t):
         for j in range(1, TERMS):
             total = times(b, (a[j - 1, 0], a[j - 1, 1]))
             for k in range(2, j + 1):
-                total = plus(total, scaled(2.0, times((c[k, 0], c[k, 1]), (a[j - k, 0], a[j - k, 1]))))
+                total = plus(total, scale(2.0, times((c[k, 0], c[k, 1]), (a[j - k, 0], a[j - k, 1]))))
             a[j] = over(total, two((2.0 * j + 2.0) * (2.0 * j + 1.0) - 2.0))
         y, dy = (0.0, 0.0), (0.0, 0.0)
         for j in range(TERMS - 1, -1, -1):
             aj = (a[j, 0], a[j, 1])
-            y, dy = plus(times(y, T), aj), plus(times(dy, T), scaled(2.0 * j + 2.0, aj))
+            y, dy = plus(times(y, T), aj), plus(times(dy, T), scale(2.0 * j + 2.0, aj))
         f[n, 0], f[n, 1] = times(y, T), times(dy, t)
     return p, dp, f
 
@@ -99,15 +116,15 @@ def constants(g2, g3, B, h):
         halvings += 1
     p, dp, f = series(g2, g3, B, two(h * 0.5**halvings))
     for _ in range(halvings):
-        S = over(minus(scaled(6.0, times(p, p)), scaled(0.5, g2)), scaled(2.0, dp))
-        p2 = minus(times(S, S), scaled(2.0, p))
-        dp2 = minus(scaled(2.0, times(S, minus(p, p2))), dp)
+        S = over(minus(scale(6.0, times(p, p)), scale(0.5, g2)), scale(2.0, dp))
+        p2 = minus(times(S, S), scale(2.0, p))
+        dp2 = minus(scale(2.0, times(S, minus(p, p2))), dp)
         for n in range(3):
             b = (B[n, 0], B[n, 1])
             y, dy = (f[n, 0, 0], f[n, 0, 1]), (f[n, 1, 0], f[n, 1, 1])
             third = over(two(1.0), two(3.0))
             slope = times(dy, S)
-            A = times(third, minus(times(y, plus(scaled(2.0, p), b)), slope))
+            A = times(third, minus(times(y, plus(scale(2.0, p), b)), slope))
             D = times(third, minus(times(y, plus(plus(p, p2), b)), slope))
             b_ = times(third, minus(dy, times(y, S)))
             C = over(minus(times(A, D), two(1.0)), b_)
@@ -117,7 +134,7 @@ def constants(g2, g3, B, h):
 
 
 @kernel
-def split(g2, g3, B, h):
+def split_step(g2, g3, B, h):
     """How many equal parts to take a step in, and the constants of a part.
 
     Multiples of the period of nutation are poles of p, where the formulas cancel, and beyond about half of it the map amplifies
@@ -161,7 +178,7 @@ def unit_vertical(q):
 
 
 @kernel
-def restored(E, z, k, rate, gamma, w):
+def restore_invariants(E, z, k, rate, gamma, w):
     """Smallest change (dw0, dw1) of w and small turn (3,) of the attitude that bring w.gamma back to z and the energy to E.
 
     One Gauss-Newton correction, damped so much that it takes back a good part of what was lost, step by step, but never turns
@@ -189,11 +206,14 @@ def restored(E, z, k, rate, gamma, w):
 
 
 @kernel
-def march(h, J, kappa, n_steps, every, q0, L0, q_out, L_out):
-    """Take n_steps steps of h s, store the state after every `every`-th and the last; return the number of parts of a step."""
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`), each in as many equal parts as `split_step` says, which count as stages."""
+    J, kappa, q0, L0 = model
+    h = coefficients.h
+    n_steps, every, q_out, L_out = workspace
     gamma = unit_vertical(q0)
     E_, z_, spin_, nu_, x0_, g2, g3, B = curve(J, kappa, gamma, L0)
-    parts, p_h, dp_h, f = split(g2, g3, B, h)
+    parts, p_h, dp_h, f = split_step(g2, g3, B, h)
     h /= parts
     E, z, w2, nu, x0 = E_[0], z_[0], spin_[0], nu_[0], x0_[0]
     k = kappa / J
@@ -222,16 +242,22 @@ def march(h, J, kappa, n_steps, every, q0, L0, q_out, L_out):
             w0, w1 = cos * m0 + sin * m1, cos * m1 - sin * m0
             q = product(q, d)
             gamma = unit_vertical(q)
-            dw, t = restored(E, z, k, rate, gamma, (w0, w1, w2))
+            dw, t = restore_invariants(E, z, k, rate, gamma, (w0, w1, w2))
             w0, w1 = w0 + dw[0], w1 + dw[1]
             # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
             # gamma must be of unit length: left alone, an error of its length would grow from step to step.
             size = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
             half_size = 0.5 * size
             q = product(q, (size, half_size * t[0], half_size * t[1], half_size * t[2]))
-            gamma = scaled_vector(size * size, add(gamma, cross(gamma, t)))
+            gamma = scale_vector(size * size, add(gamma, cross(gamma, t)))
         if step % every == 0 or step == n_steps:
             row += 1
             q_out[row, :] = q
             L_out[row, 0], L_out[row, 1], L_out[row, 2] = J * w0, J * w1, L0[2]
-    return parts
+    return Result(n_steps, n_steps * parts, 0, None, 0.0, False)
+
+
+@kernel
+def enter(*loose):
+    """`march` as Python calls it (`protocol`)."""
+    return loosen(march(Model(*loose[:4]), Coefficients(*loose[4:5]), Workspace(*loose[5:])))

@@ -18,11 +18,12 @@ equations.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import kernel
+from .protocol import Result, Workspace, loosen
 from .vector import product
 
 NODES, WEIGHTS = (tuple(float(x) for x in part) for part in np.polynomial.legendre.leggauss(16))
@@ -60,6 +61,17 @@ class Step(NamedTuple):
     r1: float
     r2: float
     r3: float
+
+
+class Model(NamedTuple):
+    """Where L moves, as a `Polhode` or its values, and the attitude at the start, both in this module's axes."""
+
+    polhode: Any
+    q: Any
+
+
+Coefficients = Step
+"""All that a step is made of."""
 
 
 @kernel
@@ -158,7 +170,7 @@ def exact_step(p, h):
 
 
 @kernel
-def multiplied(a, b, n):
+def multiply(a, b, n):
     """Coefficient n of the product of two power series."""
     total = 0.0
     for k in range(n + 1):
@@ -167,11 +179,11 @@ def multiplied(a, b, n):
 
 
 @kernel
-def divided(a, b):
+def divide(a, b):
     """Power series a / b, b[0] not 0."""
     out = np.zeros(TERMS)
     for n in range(TERMS):
-        out[n] = (a[n] - multiplied(out, b, n)) / b[0]
+        out[n] = (a[n] - multiply(out, b, n)) / b[0]
     return out
 
 
@@ -192,28 +204,28 @@ def calibration_series(p, tau):
     c[0], d[0] = 1.0, 1.0
     for n in range(TERMS):
         w[0, n], w[1, n], w[2, n] = p.A1 / p.J1 * tau * c[n], p.A2 / p.J2 * tau * s[n], A3 / p.J3 * tau * d[n]
-        ew[n] = multiplied(e[0], w[0], n) + multiplied(e[1], w[1], n) + multiplied(e[2], w[2], n)
+        ew[n] = multiply(e[0], w[0], n) + multiply(e[1], w[1], n) + multiply(e[2], w[2], n)
         if n == TERMS - 1:
             break
         over = 1.0 / (n + 1)
-        s[n + 1] = nu * over * multiplied(c, d, n)
-        c[n + 1] = -nu * over * multiplied(s, d, n)
-        d[n + 1] = -nu * p.m * over * multiplied(s, c, n)
+        s[n + 1] = nu * over * multiply(c, d, n)
+        c[n + 1] = -nu * over * multiply(s, d, n)
+        d[n + 1] = -nu * p.m * over * multiply(s, c, n)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            turn = multiplied(e[j], w[k], n) - multiplied(e[k], w[j], n)
-            e[i, n + 1] = 0.5 * over * (w[i, n] + turn + multiplied(e[i], ew, n))
+            turn = multiply(e[j], w[k], n) - multiply(e[k], w[j], n)
+            e[i, n + 1] = 0.5 * over * (w[i, n] + turn + multiply(e[i], ew, n))
     below, c1, c3 = np.zeros(TERMS), np.zeros(TERMS), np.zeros(TERMS)
     for n in range(TERMS):
-        squares = multiplied(e[1], e[1], n) - multiplied(e[0], e[0], n) - multiplied(e[2], e[2], n)
+        squares = multiply(e[1], e[1], n) - multiply(e[0], e[0], n) - multiply(e[2], e[2], n)
         below[n] = squares + (1.0 if n == 0 else 0.0)
-        c1[n] = 2.0 * (e[0, n] - multiplied(e[1], e[2], n))
-        c3[n] = 2.0 * (e[2, n] + multiplied(e[0], e[1], n))
-    c1, c3 = divided(c1, below), divided(c3, below)
+        c1[n] = 2.0 * (e[0, n] - multiply(e[1], e[2], n))
+        c3[n] = 2.0 * (e[2, n] + multiply(e[0], e[1], n))
+    c1, c3 = divide(c1, below), divide(c3, below)
     norm, cd = np.zeros(TERMS), np.zeros(TERMS)
     for n in range(TERMS):
-        norm[n] = multiplied(c1, c1, n) + multiplied(c3, c3, n) + (1.0 if n == 0 else 0.0)
-        cd[n] = multiplied(c, d, n)
+        norm[n] = multiply(c1, c1, n) + multiply(c3, c3, n) + (1.0 if n == 0 else 0.0)
+        cd[n] = multiply(c, d, n)
     # css = (sn(nu tau) / (nu tau)) / ((1 + |c|^2) cn dn), K3 = c3 / (tau (1 + |c|^2) A3 dn)
     over_nu = np.zeros(TERMS)
     for n in range(TERMS - 1):
@@ -221,8 +233,8 @@ def calibration_series(p, tau):
     K3 = np.zeros(TERMS)
     for n in range(TERMS - 1):
         K3[n] = c3[n + 1] / (tau * A3)
-    css = divided(divided(over_nu, cd), norm)
-    cdd = divided(divided(K3, d), norm) - css / p.J3
+    css = divide(divide(over_nu, cd), norm)
+    cdd = divide(divide(K3, d), norm) - css / p.J3
     return css[: TERMS - 2 : 2], cdd[: TERMS - 2 : 2]
 
 
@@ -261,7 +273,7 @@ def preprocessed_step(p, h, order):
 
 
 @kernel
-def normalised(step):
+def normalise(step):
     """The same step with r0^2 + r1^2 + r3^2 = 1, so that products of many steps stay in range."""
     size = math.sqrt(step.r0 * step.r0 + step.r1 * step.r1 + step.r3 * step.r3)
     return Step(step.S, step.C, step.D, step.r0 / size, step.r1 / size, step.r2 / size, step.r3 / size)
@@ -283,13 +295,14 @@ def store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out):
 
 
 @kernel
-def march(p, step, n_steps, every, q_start, q_out, L_out):
-    """Take n_steps steps and store every `every`-th state and the last.
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`).
 
-    q_start is the attitude at t = 0. After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from
-    c, so energy and momentum cannot drift, and mc is not forgotten near the separatrix, where it is far below the round-off of
-    L.
+    After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from c, so that energy and momentum
+    cannot drift, and mc is not lost near the separatrix, where it is far below the round-off of L.
     """
+    p, step = model.polhode, coefficients
+    n_steps, every, q_out, L_out = workspace
     S, C, D = step.S, step.C, step.D
     m, mc = p.m, p.mc
     # One whole shift, by the addition theorem from two halves.
@@ -303,7 +316,7 @@ def march(p, step, n_steps, every, q_start, q_out, L_out):
     s, c, d, z_re, z_im = p.s, p.c, p.d, 1.0, 0.0
     x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
     n = 1.0 / (x * x + y * y + up * up)
-    left = product(q_start, (n * up, -n * y, n * x, 0.0))
+    left = product(model.q, (n * up, -n * y, n * x, 0.0))
     store(0, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
     row, until_rescale, until_sample = 0, RESCALE, every
     for step_number in range(1, n_steps + 1):
@@ -327,3 +340,10 @@ def march(p, step, n_steps, every, q_start, q_out, L_out):
             until_sample = every
             row += 1
             store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
+    return Result(n_steps, n_steps, 0, None, 0.0, False)
+
+
+@kernel
+def enter(*loose):
+    """`march` as Python calls it (`protocol`)."""
+    return loosen(march(Model(Polhode(*loose[0]), loose[1]), Coefficients(*loose[2:9]), Workspace(*loose[9:])))

@@ -13,21 +13,50 @@ least. An invariant that is met to round-off is left alone, and nothing can accu
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import kernel, small
 from .fields import body_torque, energy, in_body
-from .simd import LANES, four, fused, place, put, splat, spread, together
-from .vector import add, cross, dot, product, scaled, times
+from .protocol import Result, Workspace, loosen
+from .simd import LANES, four, fuse, join, lane, put, splat, spread
+from .vector import add, cross, dot, product, scale, times
 
+FAILURE = "the step ends too far from the invariants to be projected onto them"
+"""Why a step fails."""
 MOST_CORRECTIONS = 8
 ROUND_OFF = 2.0**-51
-"""Defect, relative to its scale, that counts as none."""
+"""Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
-"""Defects, relative: what a step may lose, for its end not to be far from the invariants, and what a projection may leave."""
+"""Largest relative defect a step may have before projection, and after it."""
 DEPENDENT, TINY = 1e-8, 1e-300
-"""Added, relatively, since gradients of energy and momentum are parallel in a steady precession, and to what may be 0."""
+"""Regularisation: added to the length 1 of the gradients, which are parallel in a steady precession, and to squares that can
+be 0."""
+
+
+class Model(NamedTuple):
+    """1/J, the field, its axis of symmetry and the scales of energy and momentum; q and L at the start, principal axes.
+
+    `axis` is a world vector of length one, or None; `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative
+    to.
+    """
+
+    J_inverse: Any
+    field: Any
+    axis: Any
+    scales: Any
+    q: Any
+    L: Any
+
+
+class Coefficients(NamedTuple):
+    """Non-zero coefficients of all stages and of the step: factors (n,), their columns, where each row starts; step h, s."""
+
+    weights: Any
+    columns: Any
+    starts: Any
+    h: float
 
 
 @small
@@ -37,11 +66,11 @@ def rates(J_inverse, field, q, L, slopes, at):
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
     n = cross(L, w)
     T = body_torque(field, q)
-    put(slopes, at + LANES, together(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
+    put(slopes, at + LANES, join(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
     put(
         slopes,
         at,
-        together(
+        join(
             -(q[1] * x + q[2] * y + q[3] * z),
             q[0] * x + q[2] * z - q[3] * y,
             q[0] * y + q[3] * x - q[1] * z,
@@ -51,28 +80,28 @@ def rates(J_inverse, field, q, L, slopes, at):
 
 
 @small
-def combined(q, L, weights, columns, first, last, slopes):
+def combine(q, L, weights, columns, first, last, slopes):
     """(q, L) + sum of weights[i] times the slopes of stage columns[i], first <= i < last; the newest slopes come last."""
     for i in range(first, last):
         weight, at = spread(weights, i), 2 * LANES * columns[i]
-        q = fused(weight, four(slopes, at), q)
-        L = fused(weight, four(slopes, at + LANES), L)
+        q = fuse(weight, four(slopes, at), q)
+        L = fuse(weight, four(slopes, at + LANES), L)
     return q, L
 
 
 @small
-def stepped(h, J_inverse, field, weights, columns, starts, q, L, slopes):
+def take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes):
     """The state after one step. Of stage i, weights and columns begin at starts[i]; those of the step itself come last."""
-    q0, L0 = together(q[0], q[1], q[2], q[3]), together(L[0], L[1], L[2], 0.0)
+    q0, L0 = join(q[0], q[1], q[2], q[3]), join(L[0], L[1], L[2], 0.0)
     stages = len(starts) - 2
     for stage in range(stages):
-        qs, Ls = combined(q0, L0, weights, columns, starts[stage], starts[stage + 1], slopes)
-        q, L = (place(qs, 0), place(qs, 1), place(qs, 2), place(qs, 3)), (place(Ls, 0), place(Ls, 1), place(Ls, 2))
+        qs, Ls = combine(q0, L0, weights, columns, starts[stage], starts[stage + 1], slopes)
+        q, L = (lane(qs, 0), lane(qs, 1), lane(qs, 2), lane(qs, 3)), (lane(Ls, 0), lane(Ls, 1), lane(Ls, 2))
         rates(J_inverse, field, q, L, slopes, 2 * LANES * stage)
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
-    dq, dL = combined(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
-    q1, L1 = fused(splat(h), dq, q0), fused(splat(h), dL, L0)
-    return (place(q1, 0), place(q1, 1), place(q1, 2), place(q1, 3)), (place(L1, 0), place(L1, 1), place(L1, 2))
+    dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
+    q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
+    return (lane(q1, 0), lane(q1, 1), lane(q1, 2), lane(q1, 3)), (lane(L1, 0), lane(L1, 1), lane(L1, 2))
 
 
 @small
@@ -94,13 +123,13 @@ def shortest_move(J_inverse, field, axis, size, e, m, q, L):
     """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order.
 
     Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are scaled to length one here,
-    and a little is added to that length, so that parallel gradients share what is to be done.
+    and regularised by DEPENDENT, so that parallel gradients share the correction.
     """
     w, T = times(J_inverse, L), body_torque(field, q)
     by_energy = 1.0 / math.sqrt(size * size * dot(w, w) + dot(T, T) + TINY)
     if axis is None:
         a = e * by_energy * by_energy
-        return scaled(a * size * size, w), scaled(-a, T)
+        return scale(a * size * size, w), scale(-a, T)
     v = in_body(q, axis)
     turn = cross(L, v)
     by_momentum = 1.0 / math.sqrt(size * size + dot(turn, turn))
@@ -109,11 +138,11 @@ def shortest_move(J_inverse, field, axis, size, e, m, q, L):
     over = 1.0 / (one * one - cosine * cosine)
     a = over * by_energy * (one * (e * by_energy) - cosine * (m * by_momentum))
     b = over * by_momentum * (one * (m * by_momentum) - cosine * (e * by_energy))
-    return scaled(size * size, add(scaled(a, w), scaled(b, v))), add(scaled(-a, T), scaled(b, turn))
+    return scale(size * size, add(scale(a, w), scale(b, v))), add(scale(-a, T), scale(b, turn))
 
 
 @small
-def projected(J_inverse, field, axis, kept, scales, q, L):
+def project(J_inverse, field, axis, kept, scales, q, L):
     """Return (q, L, corrections, relative defect left) of a state brought back to the energy and momentum `kept`."""
     q = near_unit(q)
     corrections = 0
@@ -130,29 +159,34 @@ def projected(J_inverse, field, axis, kept, scales, q, L):
 
 
 @kernel
-def march(coefficients, h, n_steps, every, J_inverse, field, axis, scales, q, L, q_out, L_out):
-    """Take n_steps steps of h s from (q, L) and store every `every`-th state and the last.
-
-    `coefficients` are (weights, columns, starts) of the non-zero coefficients of all stages and of the step; `axis` is the
-    field's axis of symmetry, a world vector of length one, or None; `scales` what errors of energy, J, and momentum, kg m^2/s,
-    are relative to. Returns (steps done, corrections of the projections, relative defect left); steps done < n_steps means
-    that the next one could not be projected.
-    """
-    weights, columns, starts = coefficients[0].copy(), coefficients[1], coefficients[2]
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
+    J_inverse, field, axis, scales, q, L = model
+    weights, columns, starts, h = coefficients
+    n_steps, every, q_out, L_out = workspace
+    weights = weights.copy()
     weights[: starts[-2]] *= h
-    slopes = np.empty(2 * LANES * (len(starts) - 2))
+    stages = len(starts) - 2
+    slopes = np.empty(2 * LANES * stages)
     q_out[0, :], L_out[0, :] = q, L
     kept = values(J_inverse, field, axis, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     for step in range(1, n_steps + 1):
-        q, L = stepped(h, J_inverse, field, weights, columns, starts, q, L, slopes)
-        q, L, more, defect = projected(J_inverse, field, axis, kept, scales, q, L)
+        q, L = take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes)
+        q, L, more, defect = project(J_inverse, field, axis, kept, scales, q, L)
         corrections += more
         if not defect < LEFT:
-            return step - 1, corrections, defect
+            done = (step - 1) * stages
+            return Result(step - 1, done, corrections, done, defect, False)
         until_sample -= 1
         if until_sample == 0 or step == n_steps:
             until_sample = every
             row += 1
             q_out[row, :], L_out[row, :] = q, L
-    return n_steps, corrections, defect
+    return Result(n_steps, n_steps * stages, corrections, n_steps * stages, defect, False)
+
+
+@kernel
+def enter(*loose):
+    """`march` as Python calls it (`protocol`)."""
+    return loosen(march(Model(*loose[:6]), Coefficients(*loose[6:10]), Workspace(*loose[10:])))

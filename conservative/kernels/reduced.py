@@ -1,6 +1,6 @@
-"""The paper's step in three unknowns, and the loop of steps, stages and samples around it (method: section 4 of README).
+"""The paper's step in three unknowns, and the loop of steps, stages and samples around it.
 
-Unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal axes, attitude as a quaternion q (scalar first):
+The unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal axes, attitude q a quaternion, scalar first:
 
     J a + a x (J a) = (h/2) (L0 + (h/2) (T - a x T))          T = Q0' tau*
     q1 = q0 (1, a) / sqrt(1 + a.a)
@@ -8,36 +8,57 @@ Unknown is a = dt w*/2, the Cayley vector of half the step; J, L in principal ax
 
 Round-off in L1 that has a mean shows as a drift after 10^6 steps, and it has one, 10^-20 of the energy a step, where L1 - L0 is
 formed from an a that is already rounded and from constants that are not those of the equation solved, as 4/h once it is
-rounded. So the last correction (`finished`) is of the equation for w* itself, whose residual has the size of L1 - L0 and not
-that of L, and L1 follows from its other side. What is left has no mean and walks.
+rounded. So `final_correction` solves the equation for w* itself, whose residual has the size of L1 - L0 and not that of L, and
+L1 follows from its other side. The round-off that remains has no mean: errors grow as the square root of the number of steps.
 
 Arithmetic is a chain of dependent operations here, so what counts is the length of that chain and not the number of operations:
 the first guess and its tangent need no L, so that a processor works on them while it still waits for the last step's L.
 
 The equation has several solutions at large steps. The step is the one on the continuous branch a(h) from a(0) = 0. Newton's
-answer is taken where its corrections are small and shrink from the first one on; where they do not, the branch is followed.
+answer is trusted where its few corrections stay near the first guess; where they do not, `continue_branch` follows the branch.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from . import kernel, small
 from .fields import body_torque, finite_torque
-from .vector import accumulate, add, applied, cross, dot, inverse, product, scaled, subtract, times
+from .protocol import Result, Workspace, loosen
+from .vector import accumulate, add, apply, cross, dot, inverse, product, scale, subtract, times
 
+FAILURE = "no continuous solution"
+"""Why a step fails."""
 MAX_ITERATIONS = 30
 FEW = 4
-"""Corrections within which Newton's method is near its solution from the first one on."""
+"""Newton is trusted with at most so many corrections."""
 NEAR, NEAR_TANGENT, NEAR_ZERO = 0.25, 0.01, 1e-4
-"""Square of what they sum to up to which the first guess was near the solution: relative to a^2, if the guess is from the state
-or from earlier steps or if it is on the tangent of the branch; and absolute."""
+"""Newton is trusted when |a - guess|^2 <= NEAR |a|^2 + NEAR_ZERO; NEAR_TANGENT replaces NEAR for a guess on the tangent of the
+branch."""
 REST = 1e-20
-"""a^2 below which corrections need not get smaller in proportion: of a body at rest a is nothing but round-off."""
+"""Added to |a|^2 in relative tolerances: for a body at rest, a is round-off alone."""
 FIRST_PART, SHORTEST_PART = 0.25, 2.0**-14
-"""Parts of h in which the branch is followed: the first, and the one so short that the branch must have ended."""
+"""`continue_branch` takes h in parts: the first one, relative to h, and the length below which the branch counts as ended."""
 SMOOTH = 0.04
-"""Square of the relative change of a from step to step up to which a is extrapolated."""
+"""Guesses are extrapolated while |change of a|^2 <= SMOOTH |a|^2 from step to step."""
+
+
+class Model(NamedTuple):
+    """Moments, kg m^2, and their inverses, field or None, attitude and momentum, kg m^2/s, at the start: principal axes."""
+
+    J: Any
+    J_inverse: Any
+    field: Any
+    q: Any
+    L: Any
+
+
+class Coefficients(NamedTuple):
+    """Lengths (stages,), s, of the stages of a step, and the relative error that the solver may leave in a stage."""
+
+    lengths: Any
+    tolerance: float
 
 
 @small
@@ -46,14 +67,14 @@ def explicit_guess(h, J_inverse, field, q, L):
     rate = cross(L, times(J_inverse, L))
     if field is not None:
         rate = add(rate, body_torque(field, q))
-    return scaled(0.5 * h, times(J_inverse, add(L, scaled(0.5 * h, rate))))
+    return scale(0.5 * h, times(J_inverse, add(L, scale(0.5 * h, rate))))
 
 
 @small
-def extrapolated(k, past):
+def extrapolate(k, past):
     """Component k of the next a by the polynomial of degree 5 through the last six, newest first."""
     a, b, c, d, e, f = past
-    # The newest comes last: all else is summed while it is being solved for.
+    # The newest comes last: a processor sums the rest while it still computes the newest.
     return ((20.0 * c[k] - 15.0 * (b[k] + d[k])) + (6.0 * e[k] - f[k])) + 6.0 * a[k]
 
 
@@ -69,9 +90,9 @@ def residual(h, J, field, q, L, a):
     half = 0.5 * h
     lhs = add(times(J, a), times(gaps(J), (a[1] * a[2], a[2] * a[0], a[0] * a[1])))
     if field is None:
-        return subtract(lhs, scaled(half, L))
+        return subtract(lhs, scale(half, L))
     T = finite_torque(field, q, a)[0]
-    return subtract(lhs, scaled(half, add(L, scaled(half, subtract(T, cross(a, T))))))
+    return subtract(lhs, scale(half, add(L, scale(half, subtract(T, cross(a, T))))))
 
 
 @small
@@ -85,71 +106,71 @@ def inverse_tangent(h, J, field, q, a):
         return inverse((k0, k1, k2))
     T, dT = finite_torque(field, q, a)
     f = 0.25 * h * h
-    k0 = subtract(k0, scaled(f, subtract(subtract(dT[0], (0.0, -T[2], T[1])), cross(a, dT[0]))))
-    k1 = subtract(k1, scaled(f, subtract(subtract(dT[1], (T[2], 0.0, -T[0])), cross(a, dT[1]))))
-    k2 = subtract(k2, scaled(f, subtract(subtract(dT[2], (-T[1], T[0], 0.0)), cross(a, dT[2]))))
+    k0 = subtract(k0, scale(f, subtract(subtract(dT[0], (0.0, -T[2], T[1])), cross(a, dT[0]))))
+    k1 = subtract(k1, scale(f, subtract(subtract(dT[1], (T[2], 0.0, -T[0])), cross(a, dT[1]))))
+    k2 = subtract(k2, scale(f, subtract(subtract(dT[2], (-T[1], T[0], 0.0)), cross(a, dT[2]))))
     return inverse((k0, k1, k2))
 
 
 @small
-def finished(h, J, field, q, L, carry, rows, a):
+def final_correction(h, J, field, q, L, carry, rows, a):
     """Return a after one more correction with the tangent of the last, and L1 - L0; `rows` are that tangent's inverse.
 
-    Of J w + a x (J w) = L0 + (h/2) (T - a x T), a = (h/2) w, the difference u = J w - L0 is rounded once and takes in what L0
-    lost to rounding. L1 - L0 = 2 u, and the last correction changes it before it is rounded away in a. Each component of
-    a x (J w) is one constant times two rates, so that a constant that is rounded changes which energy and momentum are kept,
-    in the last place, and not that they are.
+    Of J w + a x (J w) = L0 + (h/2) (T - a x T), a = (h/2) w, the difference u = J w - L0 is rounded once and includes what L0
+    lost to rounding. L1 - L0 = 2 u, and the correction is added to u, where it is not rounded away as it is in a. Each
+    component of a x (J w) is one constant times two rates: rounding that constant changes the conserved energy and momentum in
+    the last place, but they are conserved all the same.
     """
     half = 0.5 * h
-    w = scaled(2.0 / h, a)
+    w = scale(2.0 / h, a)
     u = add(subtract(times(J, w), L), carry)
-    turning = times(scaled(half, gaps(J)), (w[1] * w[2], w[2] * w[0], w[0] * w[1]))
+    turning = times(scale(half, gaps(J)), (w[1] * w[2], w[2] * w[0], w[0] * w[1]))
     if field is not None:
-        half_T = scaled(half, finite_torque(field, q, a)[0])
+        half_T = scale(half, finite_torque(field, q, a)[0])
         turning = subtract(add(turning, cross(a, half_T)), half_T)
-    correction = applied(rows, add(u, turning))
-    return subtract(a, scaled(half, correction)), scaled(2.0, subtract(u, times(J, correction)))
+    correction = apply(rows, add(u, turning))
+    return subtract(a, scale(half, correction)), scale(2.0, subtract(u, times(J, correction)))
 
 
 @small
-def solved(h, J, field, q, L, carry, guess, near, tolerance):
+def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
     """Return (a, L1 - L0, corrections made, size of the last, whether to trust it), from a first guess of a.
 
-    Newton's answer is trusted where it takes few corrections (`FEW`) that lead not far away from the guess (`near`), and the
-    determinant of the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
+    Newton's answer is trusted where it takes at most `FEW` corrections, stays near the guess (`near`), and the determinant of
+    the equation's derivative is positive: it is at a = 0, and zero where the continuous branch ends.
     A correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER that
-    one, if s^3 <= the relative error asked for, which is handed over as the square of s: `tolerance`. Stopping where a residual
-    is small enough instead would bias the energy (method, section 9).
+    one, if s^3 <= the relative error asked for, which is given as the square of s: `tolerance`. Stopping where a residual is
+    small enough instead would leave an error of one sign, and the energy would drift.
     """
     a = guess
     for iteration in range(1, FEW + 1):
         rows = inverse_tangent(h, J, field, q, a)
-        correction = applied(rows, residual(h, J, field, q, L, a))
+        correction = apply(rows, residual(h, J, field, q, L, a))
         a = subtract(a, correction)
         square = dot(correction, correction)
-        scale = dot(a, a) + REST
-        if square <= tolerance * scale:
+        aa = dot(a, a) + REST
+        if square <= tolerance * aa:
             away = subtract(a, guess)
-            trusted = dot(away, away) <= near * scale + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
-            a, gain = finished(h, J, field, q, L, carry, rows, a)
+            trusted = dot(away, away) <= near * aa + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
+            a, gain = final_correction(h, J, field, q, L, carry, rows, a)
             return a, gain, iteration + 1, math.sqrt(square), trusted
     return a, a, FEW, math.inf, False
 
 
 @kernel
-def followed(h, J, J_inverse, field, q, L, carry, tolerance):
-    """Return what `solved` does by way of shorter steps: a(h) along the branch from a(0) = 0, in parts as long as can be.
+def continue_branch(h, J, J_inverse, field, q, L, carry, tolerance):
+    """Return what `newton_solve` does, by continuation: a(h) along the branch from a(0) = 0, in parts as long as possible.
 
-    Each guess is on the tangent of the branch. Where the branch ends before h, the size is not of a correction but the residual
-    at that end, relative to the right side.
+    Each guess is on the tangent of the branch. Where the branch ends before h, the size is that of the residual at that end,
+    relative to the right side.
     """
     a, slope = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     reached, part, corrections = 0.0, FIRST_PART, 0
     while part >= SHORTEST_PART:
         aim = min(reached + part, 1.0)
         hs = aim * h
-        guess = add(a, scaled((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, q, L)
-        found, gain, iterations, size, trusted = solved(hs, J, field, q, L, carry, guess, NEAR_TANGENT, tolerance)
+        guess = add(a, scale((aim - reached) * h, slope)) if reached > 0.0 else explicit_guess(hs, J_inverse, field, q, L)
+        found, gain, iterations, size, trusted = newton_solve(hs, J, field, q, L, carry, guess, NEAR_TANGENT, tolerance)
         corrections += iterations
         if not trusted:
             part *= 0.5
@@ -158,7 +179,7 @@ def followed(h, J, J_inverse, field, q, L, carry, tolerance):
             return found, gain, corrections, size, True
         a, reached, part = found, aim, 2.0 * part
         rows = inverse_tangent(hs, J, field, q, a)
-        slope = scaled(0.5, applied(rows, forcing(hs, field, q, L, a)))
+        slope = scale(0.5, apply(rows, forcing(hs, field, q, L, a)))
     r = residual(h, J, field, q, L, a)
     f = forcing(0.5 * h, field, q, L, a)
     return a, a, corrections, math.sqrt(dot(r, r) / dot(f, f)) / abs(0.5 * h), False
@@ -170,15 +191,15 @@ def forcing(h, field, q, L, a):
     if field is None:
         return L
     T = finite_torque(field, q, a)[0]
-    return add(L, scaled(h, subtract(T, cross(a, T))))
+    return add(L, scale(h, subtract(T, cross(a, T))))
 
 
 @kernel
-def any_solution(h, J, J_inverse, field, q, L):
+def find_solution(h, J, J_inverse, field, q, L):
     """Whether Newton's method from the explicit guess, trusted or not, ends at a solution of the equation."""
     a = explicit_guess(h, J_inverse, field, q, L)
     for _ in range(MAX_ITERATIONS):
-        correction = applied(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
+        correction = apply(inverse_tangent(h, J, field, q, a), residual(h, J, field, q, L, a))
         a = subtract(a, correction)
         if dot(correction, correction) <= 1e-24 * (dot(a, a) + REST):
             return True
@@ -186,41 +207,50 @@ def any_solution(h, J, J_inverse, field, q, L):
 
 
 @kernel
-def march(h_stages, n_steps, every, J, J_inverse, field, tolerance, q0, L0, q_out, L_out):
-    """Take n_steps steps, each of the stages h_stages (s), and store every `every`-th state and the last.
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`).
 
     Attitude and momentum are summed with compensation, which costs 15 % of a free body's step in one stage, 13 % in five, and
-    5 % in a field; without it errors walk thirty times as far. Returns (steps done, corrections made, relative size of the last
-    correction, False). Steps done < n_steps means that the next one has no solution on the continuous branch; then the third
-    is the residual where the branch ends, and the fourth whether Newton's method finds a solution elsewhere.
+    5 % in a field; without it round-off errors grow thirty times as large. A step fails where it has no solution on the
+    continuous branch; the size then is the residual where the branch ends.
     """
-    q_out[0, :] = q0
-    L_out[0, :] = L0
-    tolerance = tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
-    state = (q0, (0.0, 0.0, 0.0, 0.0), L0, (0.0, 0.0, 0.0))
+    J, J_inverse, field = model.J, model.J_inverse, model.field
+    n_steps, every, q_out, L_out = workspace
+    lengths = coefficients.lengths
+    tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
+    q_out[0, :] = model.q
+    L_out[0, :] = model.L
+    state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
     at, row, corrections = (1, 0), 0, 0
     while True:
-        at, row, more, size, state = direct(
-            h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out
+        at, row, more, size, state = take_steps(
+            lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out
         )
         corrections += more
         step, stage = at
         if step > n_steps:
-            return n_steps, corrections, size, False
+            return Result(n_steps, n_steps * len(lengths), corrections, None, size, False)
         q, q_carry, L, L_carry = state
-        h = h_stages[stage]
-        a, gain, more, size, found = followed(h, J, J_inverse, field, q, L, L_carry, tolerance)
+        h = lengths[stage]
+        a, gain, more, size, found = continue_branch(h, J, J_inverse, field, q, L, L_carry, tolerance)
         corrections += more
         if not found:
-            return step - 1, corrections, size, any_solution(h, J, J_inverse, field, q, L)
-        L, L_carry = changed_momentum(L, L_carry, gain)
-        q, q_carry = turned_attitude(a, q, q_carry)
+            elsewhere = find_solution(h, J, J_inverse, field, q, L)
+            return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
+        L, L_carry = add_momentum(L, L_carry, gain)
+        q, q_carry = turn_attitude(a, q, q_carry)
         at, state = (step, stage + 1), (q, q_carry, L, L_carry)
 
 
 @kernel
-def direct(h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out):
-    """Go on at a step and stage up to the end, or to a stage whose solution is not to be trusted; return what `march` needs.
+def enter(*loose):
+    """`march` as Python calls it (`protocol`)."""
+    return loosen(march(Model(*loose[:5]), Coefficients(*loose[5:7]), Workspace(*loose[7:])))
+
+
+@kernel
+def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out):
+    """Take steps from a step and stage on, to the end or to a stage whose solution is not trusted; return where that is.
 
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
     """
@@ -233,22 +263,22 @@ def direct(h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, st
     past = (unknown, unknown, unknown, unknown, unknown, unknown)
     known = 0
     for step in range(first_step, n_steps + 1):
-        for stage in range(first, len(h_stages)):
-            h = h_stages[stage]
+        for stage in range(first, len(lengths)):
+            h = lengths[stage]
             if known >= 6:
-                a = (extrapolated(0, past), extrapolated(1, past), extrapolated(2, past))
+                a = (extrapolate(0, past), extrapolate(1, past), extrapolate(2, past))
             else:
                 a = explicit_guess(h, J_inverse, field, q, L)
-            a, gain, iterations, size, trusted = solved(h, J, field, q, L, L_carry, a, NEAR, tolerance)
+            a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
                 return (step, stage), row, corrections, size, (q, q_carry, L, L_carry)
-            if len(h_stages) == 1:
+            if len(lengths) == 1:
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
                 past = (a, past[0], past[1], past[2], past[3], past[4])
-            L, L_carry = changed_momentum(L, L_carry, gain)
-            q, q_carry = turned_attitude(a, q, q_carry)
+            L, L_carry = add_momentum(L, L_carry, gain)
+            q, q_carry = turn_attitude(a, q, q_carry)
         first = 0
         until_sample -= 1
         if until_sample == 0 or step == n_steps:
@@ -260,7 +290,7 @@ def direct(h_stages, n_steps, every, J, J_inverse, field, tolerance, at, row, st
 
 
 @small
-def changed_momentum(L, carry, gain):
+def add_momentum(L, carry, gain):
     """L + gain as a compensated sum."""
     x, cx = accumulate(L[0], carry[0], gain[0])
     y, cy = accumulate(L[1], carry[1], gain[1])
@@ -269,7 +299,7 @@ def changed_momentum(L, carry, gain):
 
 
 @small
-def turned_attitude(a, q, carry):
+def turn_attitude(a, q, carry):
     """q1 = q0 (1, a) / sqrt(1 + a.a) as a compensated increment.
 
     With 1 / sqrt(1 + a.a) = 1 + c it is p + c (q0 + p), p = q0 (0, a): what is rounded in c counts a.a times less than in p.

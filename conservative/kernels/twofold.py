@@ -48,7 +48,7 @@ def times(x, y):
 
 
 @kernel
-def scaled(f, x):
+def scale(f, x):
     """f x for a float f."""
     return times((f, 0.0), x)
 
@@ -57,5 +57,5 @@ def scaled(f, x):
 def over(x, y):
     """x / y"""
     q = x[0] / y[0]
-    r = minus(x, scaled(q, y))
+    r = minus(x, scale(q, y))
     return _fast(q, (r[0] + r[1]) / y[0])

@@ -30,7 +30,7 @@ def subtract(a, b):
 
 
 @small
-def scaled(s, a):
+def scale(s, a):
     """s a"""
     return (s * a[0], s * a[1], s * a[2])
 
@@ -69,11 +69,11 @@ def inverse(columns):
     c0, c1, c2 = columns
     c12 = cross(c1, c2)
     over = 1.0 / dot(c0, c12)
-    return scaled(over, c12), scaled(over, cross(c2, c0)), scaled(over, cross(c0, c1))
+    return scale(over, c12), scale(over, cross(c2, c0)), scale(over, cross(c0, c1))
 
 
 @small
-def applied(rows, b):
+def apply(rows, b):
     """The matrix with these rows times b."""
     return (dot(rows[0], b), dot(rows[1], b), dot(rows[2], b))
 

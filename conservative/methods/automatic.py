@@ -1,10 +1,12 @@
-"""From a wanted error to a method and a step: probe, pick, run, and say how good it is.
+"""From a wanted error to a method and a step: probe the candidates, take the cheapest, run it, and say how good it is.
 
 1. A short probe of each candidate, cutting steps until the difference of two step lengths says that the error is small enough.
-2. The candidate with the least work for its step is taken: a count, not a time, so that the same scene gets the same choice.
+2. The candidate with the least work at its step is taken: a count, not a time, so that the same scene gets the same choice.
 3. The whole run, once more with twice the step. Their difference, not the probe, is the estimate that is reported: a probe
    cannot see how much a scene amplifies errors later on. Where it is above what was asked for, the step is cut and the run
    repeated.
+
+Which families are candidates, and what their work costs, they say themselves: `Method.candidacy`, `Method.cost`.
 
 Source: step doubling as in Richardson's extrapolation; the rest is our own.
 """
@@ -13,24 +15,22 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
-from ..attitude import angle_between
-from ..errors import AccuracyNotReached, IntegrationFailed, Unsupported
-from ..method import Grid, Method
+from .. import registry
+from ..attitude import Array, angle_between
+from ..declarations import Candidacy
+from ..errors import AccuracyNotReached, IntegrationFailed, MissingEngine, Unsupported
+from ..method import Grid, Method, Role
 from ..scene import Scene
-from ..trajectory import Trajectory
-from .gauss import Gauss
-from .lame import Lame
-from .moser_veselov import MoserVeselov
-from .projected import Projected
-from .reduced import Reduced
+from ..trajectory import Choice, Trajectory
 
 SAFETY = 0.5
 """Share of the wanted error that steps are chosen for."""
-MOST_TRUSTED = 30.0
+LARGEST_FACTOR = 30.0
 """Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
 ASYMPTOTIC = 0.2
 """Difference of two runs, rad, from which on it says nothing about the error of either: angles end at pi."""
@@ -38,68 +38,93 @@ ATTEMPTS = 12
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
 
-
-@dataclass(frozen=True)
-class Choice:
-    """What `integrate(scene, error=...)` settled on.
-
-    Attributes
-    ----------
-    method, dt
-        What made the trajectory, and its step, s.
-    error
-        What was asked for: attitude error over the run, rad.
-    estimate
-        Estimated attitude error over the run, rad, from the same run at twice the step.
-    attempts
-        Steps tried on the whole run, s, with the estimate of each, rad.
-    """
-
-    method: Method
-    dt: float
-    error: float
-    estimate: float
-    attempts: tuple[tuple[float, float], ...]
-
-    @property
-    def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
-        return self.estimate <= self.error
+Attempts = list[tuple[float, float]]
+"""Steps tried, s, with the estimated error of each, rad."""
 
 
 def candidates(scene: Scene) -> tuple[Method, ...]:
-    """Return the methods worth probing on a scene: those on the frontier of time against error for its kind."""
-    for method in (MoserVeselov(), Lame()):  # no truncation error
-        if method.unsupported(scene) is None:
-            return (method,)
-    collocations = tuple(Gauss(stages) for stages in (2, 4, 6, 8))
-    if collocations[0].unsupported(scene) is None:
-        return Projected(), *collocations
-    return Projected(), *(Reduced(order=order) for order in (2, 4, 6, 8))
+    """Return the methods worth probing on a scene: an exact family alone where one supports it, else one of each group."""
+    found: dict[str, tuple[Method, ...]] = {}
+    for family, candidacy in _ranked_families():
+        settings = _settings(family)
+        if not settings or settings[0].unsupported(scene) is not None:
+            continue
+        if candidacy.exact:
+            return settings
+        found.setdefault(candidacy.group or family.family, settings)
+    return tuple(chain.from_iterable(found.values()))
 
 
-def chosen(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
+def _ranked_families() -> list[tuple[type[Method], Candidacy]]:
+    """Return the families of ours that are candidates, in the order of their ranks."""
+    ours = [family for family in registry.list_families().values() if family.role == Role.OURS]
+    found = [(family, family.candidacy) for family in ours if family.candidacy is not None]
+    return sorted(found, key=lambda entry: entry[1].rank)
+
+
+def _settings(family: type[Method]) -> tuple[Method, ...]:
+    """Return the settings of a family that are probed; none where what it needs is not installed."""
+    try:
+        return family.candidate_settings()
+    except MissingEngine:
+        return ()
+
+
+def integrate_to_error(scene: Scene, error: float, t_end: float, spacing: float | None, sample_every: int) -> Trajectory:
     """Return the trajectory with the cheapest method and step found for an attitude error, rad; its `choice` says which.
 
     With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th
     step.
     """
-    method, dt = _cheapest(scene, error, t_end)
-    attempts: list[tuple[float, float]] = []
+    method, dt = _find_cheapest(scene, error, t_end)
+    attempts: Attempts = []
     for _ in range(ATTEMPTS):
-        grid = _grid(dt, t_end, spacing, sample_every)
-        estimate, trajectory = _checked_run(method, scene, grid)
+        grid = _even_grid(dt, t_end, spacing, sample_every)
+        estimate, trajectory = _run_twice(method, scene, grid)
         attempts.append((grid.dt, estimate))
-        if (trajectory.ok and estimate <= error) or _hopeless(attempts):
+        if estimate <= error or _stalls(attempts):
             break
-        dt = grid.dt * _shrink(estimate, error, method)
+        dt = grid.dt * _step_factor(estimate, error, method)
     best = Choice(method, grid.dt, error, estimate, tuple(attempts))
     if trajectory.ok and not best.reached:
         warnings.warn(AccuracyNotReached(error, estimate), stacklevel=4)
     return replace(trajectory, choice=best)
 
 
-def _grid(dt: float, t_end: float, spacing: float | None, sample_every: int) -> Grid:
+def _find_cheapest(scene: Scene, error: float, t_end: float) -> tuple[Method, float]:
+    """Return the candidate with the least work per second at the step that its probe asks for, and that step."""
+    probes = [(*_probe(method, scene, error, t_end), method) for method in candidates(scene)]
+    _, dt, method = min(probes, key=lambda entry: entry[0])
+    return method, dt
+
+
+def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[float, float]:
+    """Return (work per second, step) with which a short run of the method has its share of the error."""
+    duration = min(t_end, PROBE_RADIANS / _fastest_rate(scene))
+    share = error * min(1.0, 4 * duration / t_end)
+    dt = duration / 2 if method.order else min(method.longest_step(scene) / 2, t_end / 16)
+    attempts: Attempts = []
+    for _ in range(2 * ATTEMPTS):
+        grid = _even_grid(dt, duration, None, 1)
+        estimate, trajectory = _run_twice(method, scene, grid)
+        attempts.append((grid.dt, estimate))
+        if estimate <= SAFETY * share or method.order is None or _stalls(attempts):
+            break
+        dt = grid.dt * _step_factor(estimate, share, method)
+    return (_count_work(method, trajectory) / duration if math.isfinite(estimate) else math.inf), grid.dt
+
+
+def _fastest_rate(scene: Scene) -> float:
+    """Return a rate, rad/s, that bounds how fast the scene moves: energy all kinetic about the axis of least inertia."""
+    return math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
+
+
+def _count_work(method: Method, trajectory: Trajectory) -> float:
+    """Return a count of work: corrections and steps, weighted by what they cost beside those of the other candidates."""
+    return method.cost.correction * (trajectory.counters.iterations or 0) + method.cost.step * trajectory.counters.steps
+
+
+def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int) -> Grid:
     """Return a grid of an even number of steps of at most dt."""
     if spacing is None:
         n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
@@ -109,86 +134,46 @@ def _grid(dt: float, t_end: float, spacing: float | None, sample_every: int) -> 
     return Grid(spacing / each, n, each * sample_every)
 
 
-def _checked_run(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
-    """Return the estimated error and the trajectory of a run, from the same run at twice the step."""
+def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
+    """Return the estimated error, rad, inf where a run fails, and the trajectory of a run, from one more at twice the step."""
     fine = method.prepare(scene, grid)()
-    # Twice the step and half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
-    odd = grid.every % 2
-    coarse_grid = Grid(2 * grid.dt, grid.n_steps // 2, grid.every if odd else grid.every // 2)
+    # Half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
+    stride = 1 + grid.every % 2
     try:
-        coarse = method.prepare(scene, coarse_grid)()
-    except (IntegrationFailed, Unsupported):
+        coarse = method.prepare(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))()
+    except (IntegrationFailed, MissingEngine, Unsupported):
         return math.inf, fine
     if not (fine.ok and coarse.ok):
         return math.inf, fine
-    stride = 2 if odd else 1
-    shared = fine.R_WB[::stride] if (len(fine) - 1) % stride == 0 else np.concatenate([fine.R_WB[::stride], fine.R_WB[-1:]])
-    difference = float(angle_between(shared, coarse.R_WB).max())
-    estimate = difference / _trusted(method) + _rounding(fine)
+    difference = float(angle_between(_every(stride, fine.R_WB), coarse.R_WB).max())
+    estimate = difference / _convergence_factor(method) + _rounding_error(fine)
     return (estimate if difference < ASYMPTOTIC else math.inf), fine
 
 
-def _rounding(trajectory: Trajectory) -> float:
+def _every(stride: int, R_WB: Array) -> Array:
+    """Return every `stride`-th attitude of (n, 3, 3), and the last."""
+    return R_WB[::stride] if (len(R_WB) - 1) % stride == 0 else np.concatenate([R_WB[::stride], R_WB[-1:]])
+
+
+def _convergence_factor(method: Method) -> float:
+    """Return by which factor the finer of two runs is less off than their difference."""
+    return 1.0 if method.order is None else min(2.0**method.order - 1, LARGEST_FACTOR)
+
+
+def _rounding_error(trajectory: Trajectory) -> float:
     """Return what rounding the scene's own numbers turns the body by, rad: no comparison of two runs can see it."""
     speed = float(np.linalg.norm(trajectory.w_WB_B, axis=1).max())
     return float(np.finfo(float).eps / 2 * speed * trajectory.t[-1])
 
 
-def _trusted(method: Method) -> float:
-    """Return by how much less than the difference of two runs the finer one is off."""
-    return 1.0 if method.order is None else min(2.0**method.order - 1, MOST_TRUSTED)
-
-
-def _shrink(estimate: float, error: float, method: Method) -> float:
-    """Return the factor for the next step."""
+def _step_factor(estimate: float, error: float, method: Method) -> float:
+    """Return the factor for the next step, from the estimated error and that wanted, rad."""
     if not math.isfinite(estimate) or method.order is None:
         return 0.5
     return min(0.9, max(0.1, (SAFETY * error / estimate) ** (1 / method.order)))
 
 
-def _hopeless(attempts: list[tuple[float, float]]) -> bool:
-    """Whether shorter steps have stopped helping: round-off."""
+def _stalls(attempts: Attempts) -> bool:
+    """Return whether shorter steps have stopped helping, as at round-off."""
     estimates = [estimate for _, estimate in attempts if math.isfinite(estimate)]
     return len(estimates) >= 3 and min(estimates[-2:]) > 0.7 * estimates[-3]
-
-
-def _rate(scene: Scene) -> float:
-    """Return a rate, rad/s, that bounds how fast the scene moves: energy all kinetic about the axis of least inertia."""
-    return math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-
-
-def _cheapest(scene: Scene, error: float, t_end: float) -> tuple[Method, float]:
-    """Return the candidate with the least work per second at the step that its probe asks for, and that step."""
-    probed = [(*_probe(method, scene, error, t_end), method) for method in candidates(scene)]
-    _, dt, method = min(probed, key=lambda entry: entry[0])
-    return method, dt
-
-
-def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[float, float]:
-    """Return (work per second, step) with which a short run of the method has its share of the error."""
-    rate = _rate(scene)
-    duration = min(t_end, PROBE_RADIANS / rate)
-    share = SAFETY * error * min(1.0, 4 * duration / t_end)
-    dt = duration / 2 if method.order else min(method.longest_step(scene) / 2, t_end / 16)
-    attempts: list[tuple[float, float]] = []
-    for _ in range(2 * ATTEMPTS):
-        grid = _grid(dt, duration, None, 1)
-        estimate, trajectory = _checked_run(method, scene, grid)
-        attempts.append((grid.dt, estimate))
-        if estimate <= share or method.order is None or _hopeless(attempts):
-            break
-        dt = grid.dt * _shrink(estimate, share / SAFETY, method)
-    return (_work(method, trajectory) / duration if math.isfinite(estimate) else math.inf), grid.dt
-
-
-def _work(method: Method, trajectory: Trajectory) -> float:
-    """Return a count of work: corrections and steps, weighted by what they cost beside those of the other candidates."""
-    correction, step = _costs(method)
-    return correction * (trajectory.counters.iterations or 0) + step * trajectory.counters.steps
-
-
-def _costs(method: Method) -> tuple[float, float]:
-    """Return what a correction and what a step costs besides: ratios are what matters, and ns is their unit here."""
-    if isinstance(method, Gauss):
-        return 12.0 * method.stages, 50.0
-    return (80.0, 340.0) if isinstance(method, Projected) else (50.0, 10.0)

@@ -11,13 +11,14 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import positive_number
+from ..declarations import Claims
 from ..errors import NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 
 MAX_ITERATIONS = 20
-Linearised = Callable[[Array, Array], tuple[Array, Array]]
+Linearisation = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
+    claims: ClassVar[Claims] = Claims("paper", drift_per_step=1e-8)
+    colour: ClassVar[str] = "sky"
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)
@@ -51,16 +54,20 @@ class Convected(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
 
+    @classmethod
+    def picture_settings(cls) -> tuple[Convected, ...]:
+        return (cls(),)
+
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from ..kernels.convected import G, conjugate_momentum
 
         q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
         u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
         J_inverse = np.ascontiguousarray(scene.body.inverse)
-        linearised = _linearised(scene, grid.dt, J_inverse)
+        linearise = _linearise(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
-            u, corrections, failure = _march(linearised, u0, grid, self.tol)
+            u, corrections, failure = _march(linearise, u0, grid, self.tol)
             q, p = u[:, :9].copy(), u[:, 9:].copy()
             L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
             R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
@@ -71,7 +78,7 @@ class Convected(Method):
         return run
 
 
-def _linearised(scene: Scene, dt: float, J_inverse: Array) -> Linearised:
+def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
     """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
     from ..kernels.convected import finite_gradient, residual_and_tangent
 
@@ -79,18 +86,21 @@ def _linearised(scene: Scene, dt: float, J_inverse: Array) -> Linearised:
         return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
     field = scene.potential.kernel_field(np.eye(3))
 
-    def linearised(u0: Array, u1: Array) -> tuple[Array, Array]:
+    def linearise_in_field(u0: Array, u1: Array) -> tuple[Array, Array]:
         V_star, dV_star = finite_gradient(field, u0[:9], u1[:9])
         return residual_and_tangent(dt, J_inverse, V_star, dV_star, u0[:9], u0[9:], u1[:9], u1[9:])
 
-    return linearised
+    return linearise_in_field
 
 
-def _march(linearised: Linearised, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
-    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did."""
+def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[Array, int, NotConverged | None]:
+    """Table 1. Return the samples (n, 18), the corrections made in all, and why it ended early, if it did.
+
+    The steps are taken in Python, where a singular tangent can be told from other errors; only its equations are compiled.
+    """
     samples, total = [u], 0
     for step in range(1, grid.n_steps + 1):
-        u, corrections, norm = _stepped(linearised, u, tol)
+        u, corrections, norm = _take_step(linearise, u, tol)
         total += corrections
         if not norm <= tol:
             return np.array(samples), total, NotConverged(step, (step - 1) * grid.dt, norm)
@@ -99,11 +109,11 @@ def _march(linearised: Linearised, u: Array, grid: Grid, tol: float) -> tuple[Ar
     return np.array(samples), total, None
 
 
-def _stepped(linearised: Linearised, u0: Array, tol: float) -> tuple[Array, int, float]:
+def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, int, float]:
     """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
     u = u0  # 2) prediction: the state itself
     for corrections in range(MAX_ITERATIONS + 1):
-        r, K = linearised(u0, u)  # 3)
+        r, K = linearise(u0, u)  # 3)
         norm = math.sqrt(r @ r)
         if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
             break

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, from_quaternion, triple
+from ..attitude import Array, axes_about, from_quaternion, triple
 from ..check import choice, positive_integer
-from ..errors import BadInput, branch_ended
+from ..declarations import README, Candidacy, Claims, Cost
+from ..errors import BadInput
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
-from .non_spinning import FRAMES, Frame, frame_unsupported, in_frame
-from .principal_axes import PrincipalStart, Quadruple, Triple, axes_about, principal_start, quadruple
+from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
+from .principal_axes import PrincipalStart, principal_start, quadruple
+from .run_kernel import prepare_run
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,10 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit")
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "indigo"
+    kernel: ClassVar[str] = "gauss"
 
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"
@@ -67,6 +72,10 @@ class Gauss(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=50.0, correction=12.0 * self.stages)
+
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
             return "collocation keeps quadratic invariants, so a free body or uniform gravity"
@@ -76,23 +85,34 @@ class Gauss(Method):
     def variants(cls) -> tuple[Gauss, ...]:
         return tuple(cls(stages) for stages in (2, 4, 6, 8))
 
+    @classmethod
+    def suite_settings(cls) -> tuple[Gauss, ...]:
+        return cls(2), cls(6)
+
+    @classmethod
+    def audit_settings(cls) -> tuple[Gauss, ...]:
+        return (cls(2),)
+
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        frame, label = in_frame(self, scene)
-        start = principal_start(scene, frame)
-        march, coefficients, system = kernels("gauss").march, padded(self.stages), closed_system(start)
+        label, start, model = scene.derive(convert, self)
+        return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))
 
-        def run() -> Trajectory:
-            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, work, size, elsewhere = march(self.stages, *coefficients, grid.dt, grid.n_steps, grid.every, *system, q, L)
-            failure = None if done == grid.n_steps else branch_ended(done + 1, done * grid.dt, size, elsewhere)
-            counters = Counters(steps=done, stages=done * self.stages, iterations=work)
-            return start.trajectory(label, grid, done, q, L, counters, failure)
 
-        return run
+def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    frame = resolve_frame(method.frame, scene)
+    start = principal_start(scene, frame)
+    return replace(method, frame=frame).label, start, closed_system(start)
+
+
+@lru_cache(maxsize=256)
+def find_coefficients(stages: int, dt: float) -> Any:
+    """Return the kernel's coefficients of a step dt, s."""
+    return kernels("gauss").Coefficients(stages, *pad_tableau(stages), dt)
 
 
 @lru_cache(maxsize=MOST_STAGES)
-def padded(stages: int) -> tuple[Array, ...]:
+def pad_tableau(stages: int) -> tuple[Array, ...]:
     """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
     table = tableau(stages)
     extra = (0, -len(table.b) % kernels("simd").LANES)
@@ -100,24 +120,8 @@ def padded(stages: int) -> tuple[Array, ...]:
     return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
 
 
-class ClosedSystem(NamedTuple):
-    """Momentum and vertical as the kernel takes them, in its order: principal axes, momenta in units of `unit` kg m^2/s.
-
-    `q` is the attitude against axes whose third is the vertical, and `left` takes those to world axes.
-    """
-
-    unit: float
-    J_inverse: Triple
-    torque: Triple
-    L: Triple
-    gamma: Triple
-    q: Quadruple
-    left: Quadruple
-
-
-@lru_cache(maxsize=256)
-def closed_system(start: PrincipalStart) -> ClosedSystem:
-    """Return the closed system of a start; the vertical of a free body is the direction of its momentum."""
+def closed_system(start: PrincipalStart) -> Any:
+    """Return the kernel's model of a start; the vertical of a free body is the direction of its momentum."""
     R_WP, L = from_quaternion(start.q), np.array(start.L)
     size = math.hypot(*start.L)
     falls = start.field is not None or size == 0
@@ -126,7 +130,7 @@ def closed_system(start: PrincipalStart) -> ClosedSystem:
     # A power of two, so that scaling rounds nothing; a body at rest gets the size of what its field can make of it.
     largest = max(size, math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
     unit = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
-    return ClosedSystem(
+    return kernels("gauss").Model(
         unit,
         triple(unit * np.array(start.J_inverse)),
         triple(moment / unit),

@@ -32,17 +32,16 @@ rotations and kicks have a truncation error and bound the energy only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import numpy as np
-
+from ..declarations import README, Candidacy, Claims
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .non_spinning import frame_unsupported
-from .principal_axes import principal_start
+from .principal_axes import PrincipalStart, principal_start
+from .run_kernel import prepare_run
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,10 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(1, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "olive"
+    kernel: ClassVar[str] = "lame"
 
     @property
     def order(self) -> None:
@@ -74,13 +77,12 @@ class Lame(Method):
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        march, start = kernels("lame").march, principal_start(scene, "non_spinning")
-        moment = start.field.z if start.field else 0.0
+        kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
+        return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 
-        def run() -> Trajectory:
-            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            parts = march(grid.dt, start.J[0], moment, grid.n_steps, grid.every, start.q, start.L, q, L)
-            work = Counters(steps=grid.n_steps, stages=grid.n_steps * parts, iterations=0)
-            return start.trajectory(self.label, grid, grid.n_steps, q, L, work, None)
 
-        return run
+def convert(scene: Scene, method: Lame) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in the frame that does not spin and the kernel's model of it."""
+    start = principal_start(scene, "non_spinning")
+    moment = start.field.z if start.field else 0.0
+    return method.label, start, kernels("lame").Model(start.J[0], moment, start.q, start.L)

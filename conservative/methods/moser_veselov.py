@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ..attitude import Array
+from ..declarations import README, Candidacy, Claims
 from ..errors import BadInput
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart, start_along
+from .run_kernel import prepare_run
 
 ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
 LONGEST, LONGEST_EXACT = 1.5, 6.0
-"""|w| dt at the start has to be below this, rad: with a series, which the equations of a DMV step bound, and with its sum."""
-FARTHEST = 0.2
-"""So has cn of half a step to be above this: at 0, after half a period of the polhode, the quaternion's form breaks down."""
-LONGEST_SHIFT = 2 * math.acos(FARTHEST)
-"""And below this nu dt, with nu the frequency of the polhode in its elliptic functions, cn is above that."""
+"""Limit of |w| dt at the start, rad: of an order 2 to 10, whose step exists for short steps only, and of the exact step."""
+SMALLEST_CN = 0.2
+"""cn of half a step must be above this: at 0, after half a period of the polhode, the form of the quaternion breaks down."""
+LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
+"""Limit of nu dt of the exact step, nu being the polhode's frequency: below it cn is above SMALLEST_CN."""
 
 
 @dataclass(frozen=True)
-class MoserVeselov(Method):
+class _Fields:
+    order: int | None = None
+
+
+@dataclass(frozen=True, init=False)
+class MoserVeselov(_Fields, Method):
     """The discrete Moser-Veselov (DMV) map with a calibrated inertia, for free bodies of any inertia.
 
     With the Cayley vector c of a step h and the inertia B, where 1/B_i = css/J_i + cdd in principal axes,
@@ -46,7 +51,7 @@ class MoserVeselov(Method):
     Parameters
     ----------
     order
-        2, 4, 6, 8, 10 or "exact", which the attribute `order` shows as None: accuracy does not depend on the step.
+        2, 4, 6, 8, 10 or "exact", which the attribute `order` has as None: accuracy does not depend on the step.
 
     Raises
     ------
@@ -54,15 +59,17 @@ class MoserVeselov(Method):
         order is none of these; and on running: the step is too long, see `longest_step`.
     """
 
-    order: int | None = None
-
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
+    claims: ClassVar[Claims] = Claims(README)
+    colour: ClassVar[str] = "wine"
+    kernel: ClassVar[str] = "moser_veselov"
 
-    def __init__(self, order: int | Literal["exact"] = "exact") -> None:
-        if isinstance(order, bool) or order not in ORDERS:
+    def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
+        if order is not None and (isinstance(order, bool) or order not in ORDERS):
             raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
-        object.__setattr__(self, "order", None if order == "exact" else order)
+        super().__init__(None if order == "exact" else order)
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -72,73 +79,71 @@ class MoserVeselov(Method):
         return None if scene.free else "it is for free bodies"
 
     def longest_step(self, scene: Scene) -> float:
-        return 0.99 * shortest_refused(scene, exact=self.order is None)
+        return 0.99 * step_limit(scene, exact=self.order is None)
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in ORDERS)
 
+    @classmethod
+    def candidate_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls("exact"),)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[MoserVeselov, ...]:
+        return cls(2), cls("exact")
+
+    @classmethod
+    def audit_settings(cls) -> tuple[MoserVeselov, ...]:
+        return (cls(4),)
+
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        march, (start, p, step) = kernels("moser_veselov").march, calibrated(self, scene, grid.dt)
-
-        def run() -> Trajectory:
-            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            march(p, step, grid.n_steps, grid.every, start.q, q, L)
-            work = Counters(steps=grid.n_steps, stages=grid.n_steps, iterations=0)
-            return start.trajectory(self.label, grid, grid.n_steps, q, L, work, None)
-
-        return run
+        label, start, model, coefficients = scene.derive(calibrate, self, grid.dt)
+        return prepare_run(scene, grid, label, start, kernels("moser_veselov"), model, coefficients)
 
 
-@lru_cache(maxsize=256)
-def calibrated(method: MoserVeselov, scene: Scene, dt: float) -> tuple[PrincipalStart, Any, Any]:
-    """Return the start along `polhode_axes`, its polhode, and the constants of a step dt, s.
+def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, PrincipalStart, Any, Any]:
+    """Return the label of a run, its start along `polhode_axes`, the kernel's model of it and coefficients of a step dt, s.
 
     Raises
     ------
     BadInput
         dt is too long.
     """
-    require_short(scene, dt, exact=method.order is None)
-    dmv, start, p = kernels("moser_veselov"), polhode_start(scene), polhode(scene)
-    step = dmv.exact_step(p, dt) if method.order is None else dmv.preprocessed_step(p, dt, method.order)
-    if not (math.isfinite(step.r0) and step.C > FARTHEST):
+    require_short_step(scene, dt, exact=method.order is None)
+    kernel, (start, polhode) = kernels("moser_veselov"), scene.derive(find_polhode)
+    step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
+    if not (math.isfinite(step.r0) and step.C > SMALLEST_CN):
         raise BadInput("dt", f"{dt:g}, for which {method.name} has no step", "a shorter step")
-    return start, p, dmv.normalised(step)
+    return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
-def require_short(scene: Scene, dt: float, exact: bool) -> None:
-    """Raise `BadInput` unless dt, s, is below `shortest_refused`."""
-    bound = shortest_refused(scene, exact)
+def require_short_step(scene: Scene, dt: float, exact: bool) -> None:
+    """Raise `BadInput` unless dt, s, is below `step_limit`."""
+    bound = step_limit(scene, exact)
     if dt >= bound:
         turn = float(np.linalg.norm(scene.w_WB_B0)) * dt
         rule = f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"|w| dt < {LONGEST:g}"
         raise BadInput("dt", f"{dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
 
 
-@lru_cache(maxsize=256)
-def shortest_refused(scene: Scene, exact: bool) -> float:
+def step_limit(scene: Scene, exact: bool) -> float:
     """Return the step, s, from which on steps are refused; infinite for a body at rest."""
     speed = float(np.linalg.norm(scene.w_WB_B0))
     if speed == 0:
         return math.inf
     if not exact:
         return LONGEST / speed
-    nu = abs(polhode(scene).nu)
+    nu = abs(scene.derive(find_polhode)[1].nu)
     return min(LONGEST_EXACT / speed, LONGEST_SHIFT / nu if nu > 0 else math.inf)
 
 
-def polhode(scene: Scene) -> Any:
-    """Return the polhode of a scene along `polhode_axes`."""
-    start = polhode_start(scene)
-    return kernels("moser_veselov").polhode(*start.J, *start.L)
-
-
-def polhode_start(scene: Scene) -> PrincipalStart:
-    """Return the scene's start along `polhode_axes`."""
+def find_polhode(scene: Scene) -> tuple[PrincipalStart, Any]:
+    """Return the scene's start along `polhode_axes` and its polhode."""
     R_BP, moments = scene.body.R_BP, scene.body.moments
     R_PS = polhode_axes(moments, (scene.w_WB_B0 @ R_BP) * moments)
-    return start_along(scene, R_BP @ R_PS, moments @ np.abs(R_PS))
+    start = start_along(scene, R_BP @ R_PS, moments @ np.abs(R_PS))
+    return start, kernels("moser_veselov").polhode(*start.J, *start.L)
 
 
 def polhode_axes(J: Array, L: Array) -> Array:

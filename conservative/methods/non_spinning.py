@@ -11,44 +11,28 @@ Klein and Sommerfeld, Theorie des Kreisels, call it the spherical top.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-from ..invariants import axial_direction
 from ..scene import Scene
-
-if TYPE_CHECKING:
-    from .gauss import Gauss
-    from .reduced import Reduced
 
 Frame = Literal["auto", "body", "non_spinning"]
 Resolved = Literal["body", "non_spinning"]
 FRAMES: tuple[Frame, ...] = ("auto", "body", "non_spinning")
 
 
-@lru_cache(maxsize=256)
-def resolved(frame: Frame, scene: Scene) -> Resolved:
+def resolve_frame(frame: Frame, scene: Scene) -> Resolved:
     """Return the frame that "auto" stands for: non-spinning where body and field share an axis of symmetry that saves work."""
     if frame != "auto":
         return frame
     moments = scene.body.moments
     spherical = np.ptp(moments) <= 1e-14 * moments.max()
-    return "body" if spherical or axial_direction(scene.body, scene.potential) is None else "non_spinning"
+    return "body" if spherical or scene.symmetry_axis_B is None else "non_spinning"
 
 
-@lru_cache(maxsize=256)
-def in_frame(method: Reduced | Gauss, scene: Scene) -> tuple[Resolved, str]:
-    """Return the frame that a method takes a scene in, and the label of the run, in which the choice is seen."""
-    frame = resolved(method.frame, scene)
-    return frame, replace(method, frame=frame).label
-
-
-@lru_cache(maxsize=256)
 def frame_unsupported(frame: Frame, scene: Scene) -> str | None:
     """Return why the scene cannot be integrated in `frame`, None if it can."""
-    if frame == "non_spinning" and axial_direction(scene.body, scene.potential) is None:
+    if frame == "non_spinning" and scene.symmetry_axis_B is None:
         return "frame non_spinning needs body and field symmetric about one axis"
     return None

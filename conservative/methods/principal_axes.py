@@ -1,25 +1,21 @@
 """To principal axes and back: the one conversion that all compiled methods share.
 
 Kernels see a diagonal inertia, the attitude `R_WP` as a quaternion (scalar first) and the momentum `L_P`. Their axes P can be
-those of the frame that does not spin (`conservative.methods.non_spinning`); the spin is put back on the way back. Source: definitions.
+those of the frame that does not spin (`conservative.methods.non_spinning`); the spin is then added to the samples. Source:
+definitions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..attitude import Array, to_quaternion, triple
+from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
-from ..errors import BadInput, Diverged, IntegrationFailed
-from ..invariants import axial_direction
-from ..lazy_kernels import kernels
-from ..method import Grid
+from ..errors import BadInput
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .non_spinning import Resolved
 
 Quadruple = tuple[float, float, float, float]
@@ -31,8 +27,6 @@ class PrincipalStart:
 
     Attributes
     ----------
-    scene
-        What is converted.
     J, J_inverse
         Moments of what the kernel moves, kg m^2, and their inverses.
     q, L
@@ -45,7 +39,6 @@ class PrincipalStart:
         Where the third axis is one of symmetry and its spin is left out: the rate of that, rad/s, and 1/J3. Else None.
     """
 
-    scene: Scene
     J: Triple
     J_inverse: Triple
     q: Quadruple
@@ -54,24 +47,9 @@ class PrincipalStart:
     field: Any
     spin: tuple[float, float] | None = None
 
-    def trajectory(
-        self, label: str, grid: Grid, done: int, q: Array, L: Array, work: Counters, failure: IntegrationFailed | None
-    ) -> Trajectory:
-        """Return samples in body axes from quaternions (n, 4) and momenta (n, 3) after `done` steps.
 
-        The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
-        """
-        kept, t = grid.kept(done), grid.t
-        R_WB, w_WB_B = np.empty((kept, 3, 3)), np.empty((kept, 3))
-        finite = kernels("samples").to_body_axes(t, q, L, self.J_inverse, self.spin, self.R_BP, R_WB, w_WB_B)
-        if finite < kept:
-            failure = Diverged(float(t[max(finite - 1, 0)]))
-        return Trajectory(self.scene, t[:finite], R_WB[:finite], w_WB_B[:finite], label, work, failure)
-
-
-@lru_cache(maxsize=256)
 def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
-    """Return the scene's start in principal axes, or in the frame that does not spin. It never changes: it is converted once.
+    """Return the scene's start in principal axes, or in the frame that does not spin.
 
     Raises
     ------
@@ -80,7 +58,7 @@ def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
     """
     if frame == "body":
         return start_along(scene, scene.body.R_BP, scene.body.moments)
-    axis_B = axial_direction(scene.body, scene.potential)
+    axis_B = scene.symmetry_axis_B
     if axis_B is None:
         raise BadInput("frame", f"'non_spinning' for the scene {scene.name!r}", "a scene symmetric about one axis")
     J3 = float(axis_B @ scene.body.inertia @ axis_B)
@@ -96,15 +74,7 @@ def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:
     L = (scene.w_WB_B0 @ R_BP) * moments
     field = None if scene.potential is None else scene.potential.kernel_field(R_BP)
     turned = None if np.array_equal(R_BP, np.eye(3)) else np.ascontiguousarray(R_BP)
-    return PrincipalStart(scene, triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
-
-
-def axes_about(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,); of e_z no rotation at all."""
-    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3]
-    first = np.cross(other, axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis], axis=1)
+    return PrincipalStart(triple(moments), triple(1 / moments), quadruple(scene.R_WB0 @ R_BP), triple(L), turned, field)
 
 
 def quadruple(R: Array) -> Quadruple:

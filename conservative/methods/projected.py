@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import triple
-from ..errors import NotConverged
+from ..attitude import Triple, triple
+from ..declarations import Candidacy, Cost
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .coefficients.explicit import DORMAND_PRINCE_8
-from .principal_axes import principal_start
-
-TOO_LONG = "the step ends too far from the invariants to be projected onto them"
+from .principal_axes import PrincipalStart, principal_start
+from .run_kernel import prepare_run
 
 
 @dataclass(frozen=True)
@@ -37,6 +34,9 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(2)
+    colour: ClassVar[str] = "teal"
+    kernel: ClassVar[str] = "projected"
 
     @property
     def order(self) -> int:
@@ -46,32 +46,34 @@ class Projected(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
 
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=340.0, correction=80.0)
+
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        march, start = kernels("projected").march, principal_start(scene)
-        model = (start.J_inverse, start.field, field_axis(scene), invariant_scales(scene))
-        coefficients, stages = DORMAND_PRINCE_8.packed, len(DORMAND_PRINCE_8.b)
-
-        def run() -> Trajectory:
-            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, corrections, defect = march(coefficients, grid.dt, grid.n_steps, grid.every, *model, start.q, start.L, q, L)
-            failure = None if done == grid.n_steps else NotConverged(done + 1, done * grid.dt, defect, TOO_LONG)
-            work = Counters(steps=done, stages=done * stages, iterations=corrections, evaluations=done * stages)
-            return start.trajectory(self.label, grid, done, q, L, work, failure)
-
-        return run
+        kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
+        coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, grid.dt)
+        return prepare_run(scene, grid, label, start, kernel, model, coefficients)
 
 
-@lru_cache(maxsize=256)
-def field_axis(scene: Scene) -> Any:
+def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    start = principal_start(scene)
+    model = kernels("projected").Model(
+        start.J_inverse, start.field, field_axis(scene), invariant_scales(scene), start.q, start.L
+    )
+    return method.label, start, model
+
+
+def field_axis(scene: Scene) -> Triple | None:
     """Return the axis about which the field is symmetric, three floats in world axes, or None."""
     axis = None if scene.potential is None else scene.potential.axis_W
     return None if axis is None else triple(axis / np.linalg.norm(axis))
 
 
-@lru_cache(maxsize=256)
 def invariant_scales(scene: Scene) -> tuple[float, float]:
     """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
     return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array
 from ..check import choice, positive_number
-from ..errors import branch_ended
+from ..declarations import README, Candidacy, Claims, Cost, SameErrors
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
 from .coefficients.compositions import BEST, composition_of
-from .non_spinning import FRAMES, Frame, frame_unsupported, in_frame
-from .principal_axes import principal_start
+from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
+from .principal_axes import PrincipalStart, principal_start
+from .run_kernel import prepare_run
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,8 @@ class Reduced(Method):
     order
         2, 4, 6, 8 or 10.
     composition
-        Name of the set of lengths (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the best measured one of the order.
+        Name of the set of lengths (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the best measured
+        one of the order.
     tol
         Relative error that the solver may leave in a stage. The default lies below round-off on purpose: an error of one sign,
         however small, shows after 10^8 steps as a drift.
@@ -62,6 +62,13 @@ class Reduced(Method):
 
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(4, "implicit")
+    claims: ClassVar[Claims] = Claims(
+        README, comparisons=(SameErrors("reduced is the paper's map", ("reduced", "convected"), tolerance=1e-3),)
+    )
+    colour: ClassVar[str] = "blue"
+    kernel: ClassVar[str] = "reduced"
+    step_goals: ClassVar[tuple[tuple[str, float], ...]] = (("mujoco:Euler", 25), ("mujoco:RK4", 100), ("convected", 100))
 
     def __post_init__(self) -> None:
         composition_of(self.order, self.composition)
@@ -73,6 +80,10 @@ class Reduced(Method):
         kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
         return kept | {"energy"} if self.frame == "body" else kept
 
+    @property
+    def cost(self) -> Cost:
+        return Cost(step=10.0, correction=50.0)
+
     def unsupported(self, scene: Scene) -> str | None:
         return frame_unsupported(self.frame, scene)
 
@@ -80,24 +91,33 @@ class Reduced(Method):
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(order) for order in BEST)
 
+    @classmethod
+    def candidate_settings(cls) -> tuple[Reduced, ...]:
+        return cls(2), cls(4), cls(6), cls(8)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Reduced, ...]:
+        return cls(2), cls(4), cls(6)
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Reduced, ...]:
+        return (cls(),)
+
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        frame, label = in_frame(self, scene)
-        start = principal_start(scene, frame)
-        march, stages = kernels("reduced").march, stage_lengths(self.order, self.composition, grid.dt)
+        label, start, model = scene.derive(convert, self)
+        coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)
+        return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
 
-        def run() -> Trajectory:
-            q, L = np.empty((grid.n_samples, 4)), np.empty((grid.n_samples, 3))
-            done, corrections, size, elsewhere = march(
-                stages, grid.n_steps, grid.every, start.J, start.J_inverse, start.field, self.tol, start.q, start.L, q, L
-            )
-            failure = None if done == grid.n_steps else branch_ended(done + 1, done * grid.dt, size, elsewhere)
-            work = Counters(steps=done, stages=done * len(stages), iterations=corrections)
-            return start.trajectory(label, grid, done, q, L, work, failure)
 
-        return run
+def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
+    """Return the label of a run, its start in principal axes and the kernel's model of it."""
+    frame = resolve_frame(method.frame, scene)
+    start = principal_start(scene, frame)
+    model = kernels("reduced").Model(start.J, start.J_inverse, start.field, start.q, start.L)
+    return replace(method, frame=frame).label, start, model
 
 
 @lru_cache(maxsize=256)
-def stage_lengths(order: int, composition: str | None, dt: float) -> Array:
-    """Return the lengths (stages,), s, of the stages of a step dt."""
-    return np.array(composition_of(order, composition).lengths(dt))
+def find_coefficients(order: int, composition: str | None, tol: float, dt: float) -> Any:
+    """Return the kernel's coefficients of a step dt, s."""
+    return kernels("reduced").Coefficients(np.array(composition_of(order, composition).lengths(dt)), tol)

@@ -76,12 +76,12 @@ class Substepped(Method):
                     runs[parts] = inner.prepare(scene, Grid(grid.dt / parts, grid.n_steps * parts, grid.every * parts))
                 found = runs[parts]()
                 if 2 * parts > self.most or not isinstance(found.failure, NotConverged):
-                    return self._seen(found, grid, parts)
+                    return self._relabel(found, grid, parts)
                 parts *= 2
 
         return run
 
-    def _seen(self, found: Trajectory, grid: Grid, parts: int) -> Trajectory:
+    def _relabel(self, found: Trajectory, grid: Grid, parts: int) -> Trajectory:
         """Return the trajectory at the times of the grid itself, under a label that says how many parts there are in a step."""
         label = f"{self.label}, {parts} parts a step" if parts > 1 else self.label
         return replace(found, t=grid.t[: len(found)], label=label)

@@ -10,12 +10,22 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import finite_array, positive_number
+from ..check import finite_array, positive_number, read_only
 from ..errors import BadInput
+
+_UNIT = 4 * np.finfo(float).eps
+"""A direction whose length is 1 to this stays as it is, so that dividing by the length once more changes nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    rate: float
+    inertia: Array
+    direction_W: Array
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class GravityGradient:
+class GravityGradient(_Fields):
     """The gradient of a far centre's gravity on a body turning about its centre of mass: V = rate^2/2 u'J u, u = R' e.
 
     The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is rate^2
@@ -37,21 +47,19 @@ class GravityGradient:
         A parameter is not finite, of another shape, not above 0, or not an inertia.
     """
 
-    rate: float
-    inertia: Array
-    direction_W: Array
-
     def __init__(self, rate: float, inertia: ArrayLike, direction_W: ArrayLike = (0, 0, 1)) -> None:
         allowed = "three finite numbers (3,), not all 0"
         direction = finite_array("direction_W", direction_W, ((3,),), allowed)
         size = np.linalg.norm(direction)
         if size == 0:
             raise BadInput("direction_W", direction.tolist(), allowed)
-        direction /= size
-        direction.flags.writeable = False
-        object.__setattr__(self, "rate", positive_number("rate", rate, "a finite rate above 0, 1/s"))
-        object.__setattr__(self, "inertia", RigidBody(inertia).inertia)
-        object.__setattr__(self, "direction_W", direction)
+        if abs(size - 1) > _UNIT:
+            direction = read_only(direction / size)
+        super().__init__(
+            positive_number("rate", rate, "a finite rate above 0, 1/s"),
+            RigidBody(inertia).inertia,
+            direction,
+        )
 
     def _towards(self, R_WB: Array) -> Array:
         """Return u = R' e, (..., 3)."""

@@ -22,33 +22,23 @@ from ..check import finite_array, finite_number, positive_number
 from ..errors import BadInput
 
 _POINT = "three finite numbers (3,), m"
+_LENGTH = "a finite length of 0 or more, m"
+_STRENGTH = "a finite number other than 0, J m"
 
 
-@dataclass(frozen=True, eq=False, init=False)
 class PointPotential(ABC):
-    """What both kinds share: the points, and everything that follows from `energy_of` and `slope`.
+    """What both kinds share: everything that follows from their points, `energy_of` and `slope`.
 
-    Parameters
+    Attributes
     ----------
     point_B
         Point of the body (3,), m, body axes, from the fixed point.
     anchor_W
         Point of the world (3,), m, world axes, from the fixed point.
-
-    Raises
-    ------
-    BadInput
-        A point is not finite or of another shape.
     """
 
     point_B: Array
     anchor_W: Array
-
-    def __init__(self, point_B: ArrayLike, anchor_W: ArrayLike) -> None:
-        for name, value in (("point_B", point_B), ("anchor_W", anchor_W)):
-            array = finite_array(name, value, ((3,),), _POINT)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
 
     @abstractmethod
     def energy_of(self, distance: Array) -> Array:
@@ -89,8 +79,16 @@ class PointPotential(ABC):
         return triple(self.point_B @ R_BP), triple(self.anchor_W)
 
 
+@dataclass(frozen=True, eq=False)
+class _SpringFields:
+    stiffness: float
+    point_B: Array
+    anchor_W: Array
+    rest_length: float
+
+
 @dataclass(frozen=True, eq=False, init=False)
-class LinearSpring(PointPotential):
+class LinearSpring(_SpringFields, PointPotential):
     """A spring between a body point and a world point: V = stiffness/2 (distance - rest_length)^2.
 
     Parameters
@@ -110,15 +108,15 @@ class LinearSpring(PointPotential):
         A parameter is not finite, of another shape or out of its range.
     """
 
-    stiffness: float
-    rest_length: float
-
     def __init__(self, stiffness: float, point_B: ArrayLike, anchor_W: ArrayLike, rest_length: float = 0.0) -> None:
-        object.__setattr__(self, "stiffness", positive_number("stiffness", stiffness, "a finite number above 0, N/m"))
-        super().__init__(point_B, anchor_W)
-        if finite_number("rest_length", rest_length, "a finite length of 0 or more, m") < 0:
-            raise BadInput("rest_length", rest_length, "a finite length of 0 or more, m")
-        object.__setattr__(self, "rest_length", float(rest_length))
+        super().__init__(
+            positive_number("stiffness", stiffness, "a finite number above 0, N/m"),
+            finite_array("point_B", point_B, ((3,),), _POINT),
+            finite_array("anchor_W", anchor_W, ((3,),), _POINT),
+            finite_number("rest_length", rest_length, _LENGTH),
+        )
+        if self.rest_length < 0:
+            raise BadInput("rest_length", rest_length, _LENGTH)
 
     def energy_of(self, distance: Array) -> Array:
         """Return V, (...), in J at distances (...) in m."""
@@ -141,8 +139,15 @@ class LinearSpring(PointPotential):
         return Spring(*self._points(R_BP), self.stiffness, self.rest_length)
 
 
+@dataclass(frozen=True, eq=False)
+class _AttractionFields:
+    strength: float
+    point_B: Array
+    anchor_W: Array
+
+
 @dataclass(frozen=True, eq=False, init=False)
-class PointAttraction(PointPotential):
+class PointAttraction(_AttractionFields, PointPotential):
     """Gravity or electricity between a point of the body and a point of the world: V = -strength / distance.
 
     Parameters
@@ -160,14 +165,14 @@ class PointAttraction(PointPotential):
         A parameter is not finite, of another shape, or 0 where it must not be; or both points are the fixed point.
     """
 
-    strength: float
-
     def __init__(self, strength: float, point_B: ArrayLike, anchor_W: ArrayLike) -> None:
-        allowed = "a finite number other than 0, J m"
-        if finite_number("strength", strength, allowed) == 0:
-            raise BadInput("strength", strength, allowed)
-        object.__setattr__(self, "strength", float(strength))
-        super().__init__(point_B, anchor_W)
+        super().__init__(
+            finite_number("strength", strength, _STRENGTH),
+            finite_array("point_B", point_B, ((3,),), _POINT),
+            finite_array("anchor_W", anchor_W, ((3,),), _POINT),
+        )
+        if self.strength == 0:
+            raise BadInput("strength", strength, _STRENGTH)
         if not np.any(self.point_B) and not np.any(self.anchor_W):
             raise BadInput("anchor_W", "the fixed point, as point_B is", "a point that the body's does not always lie on")
 

@@ -6,14 +6,11 @@ shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import finite_array, finite_number
 
 
 @runtime_checkable
@@ -22,10 +19,10 @@ class Potential(Protocol):
 
     There are two ways to a potential of one's own. The short one is `FunctionPotential(energy, gradient)`, two plain Python
     functions, called from the compiled loop and differentiated by differences: a thousand times slower than a compiled field.
-    The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own with numba
-    overloads of `energy`, `body_torque`, `finite_torque` and `finite_derivative`: `conservative/potentials/point_to_point.py` and
-    `conservative/kernels/point_fields.py` are an example to follow. Whatever it is, `finite_derivative` must satisfy its
-    identity to round-off, since energy is conserved to no better than that.
+    The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own that implements
+    the functions of `conservative.kernels.fields`: follow the example of `conservative/potentials/point_to_point.py` and
+    `conservative/kernels/point_fields.py`. Whatever it is, `finite_derivative` must satisfy its identity to round-off, since
+    energy is conserved to no better than that.
     """
 
     def energy(self, R_WB: Array) -> Array:
@@ -55,63 +52,3 @@ def torque_W(potential: Potential, R_WB: Array) -> Array:
     """Return the torque (..., 3) about the fixed point, N m, world axes, at attitudes (..., 3, 3), body to world."""
     gradient = potential.gradient(R_WB)
     return -np.sum(np.cross(R_WB, gradient, axisa=-2, axisb=-2, axisc=-2), axis=-1)
-
-
-@dataclass(frozen=True, eq=False)
-class UniformGravity:
-    """A uniform field along the world's -z axis: V = weight (R_WB com_B).e_z.
-
-    Parameters
-    ----------
-    weight
-        m g in N. Negative turns the field over.
-    com_B
-        Centre of mass (3,) from the fixed point, m, body axes.
-
-    Raises
-    ------
-    BadInput
-        A parameter is not finite or of another shape.
-    """
-
-    weight: float
-    com_B: Array
-
-    def __init__(self, weight: float, com_B: ArrayLike) -> None:
-        object.__setattr__(self, "weight", finite_number("weight", weight, "a finite number, N"))
-        object.__setattr__(self, "com_B", finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"))
-        self.com_B.flags.writeable = False
-
-    @property
-    def moment_B(self) -> Array:
-        """Weight times centre of mass (3,), N m, body axes: all that the motion needs."""
-        return self.weight * self.com_B
-
-    def energy(self, R_WB: Array) -> Array:
-        """Return V, (...), in J."""
-        return R_WB[..., 2, :] @ self.moment_B
-
-    def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J: constant, with `moment_B` in its last row."""
-        out = np.zeros(np.shape(R_WB))
-        out[..., 2, :] = self.moment_B
-        return out
-
-    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (3, 3): V is linear in the base vectors, so the gradient itself is exact."""
-        return self.gradient(R_0)
-
-    @property
-    def axis_W(self) -> Array:
-        """Return the vertical, (3,)."""
-        return np.array([0.0, 0.0, 1.0])
-
-    def scale(self) -> float:
-        """Return weight times lever arm, J."""
-        return float(np.linalg.norm(self.moment_B))
-
-    def kernel_field(self, R_BP: Array) -> Any:
-        """Return the moment in principal axes as the kernels want it."""
-        from ..kernels.fields import Uniform
-
-        return Uniform(*(self.moment_B @ R_BP))

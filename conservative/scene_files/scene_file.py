@@ -13,14 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import registry
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
 from ..check import finite_array, finite_number, rotation
+from ..entry_points import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction
-from ..potentials.potential import Potential, UniformGravity
+from ..potentials.potential import Potential
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
 from .toml_reader import Table, keys_of, read
@@ -76,13 +77,13 @@ def load(path: str | Path) -> Scene:
     R_WB0, w_WB_B0 = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
-    with top.blamed():
+    with top.blame():
         return Scene(name, body, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path))
 
 
 def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
     """Return the body and, where the file says so much, its mass and centre of mass."""
-    sources = ("inertia", "shape", *registry.registered(registry.BODY_FILES))
+    sources = ("inertia", "shape", *list_entries(BODY_FILES))
     given = [key for key in table.values if key in sources]
     if not given:
         table.only({*sources, "name", *_PLACED, *(key for shape in SHAPES.values() for key in keys_of(shape))})
@@ -95,7 +96,7 @@ def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
     mass = _shape(table) if given == ["shape"] else _from_file(table, given[0])
     if "com_B" in table:
         mass = table.call(mass.about)
-    with table.blamed(inertia=given[0]):
+    with table.blame(inertia=given[0]):
         return mass.body, mass
 
 
@@ -109,9 +110,8 @@ def _from_file(table: Table, kind: str) -> MassDistribution:
     table.only((kind, "name", "com_B"))
     path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
     name = table.text("name", f"the name of the body in {path}")
-    with table.blamed(path=kind):
-        found: MassDistribution = registry.body_file(kind)(path, name)
-    return found
+    with table.blame(path=kind):
+        return load_body_reader(kind)(path, name)
 
 
 def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:
@@ -141,7 +141,7 @@ def _start(table: Table) -> tuple[Array, Array]:
     """Return attitude (3, 3) and rates (3,)."""
     table.only(("R_WB", "w_WB_B"))
     allowed = "three finite rates (3,), rad/s"
-    with table.blamed():
+    with table.blame():
         rates = finite_array("w_WB_B", table.value("w_WB_B", allowed), ((3,),), allowed)
     return _attitude(table, "R_WB"), rates
 
@@ -151,7 +151,7 @@ def _attitude(table: Table, key: str) -> Array:
     if key not in table:
         return np.eye(3)
     if not isinstance(table.values[key], dict):
-        with table.blamed():
+        with table.blame():
             return rotation(key, table.value(key, "a rotation matrix (3, 3)"))
     forms = table.table(key, "one form of a rotation")
     forms.only({*_ATTITUDES, "angle"})

@@ -96,7 +96,7 @@ class Table:
         return Table(self.path, (*self.name, key), self.values[key], self.lines)
 
     @contextmanager
-    def blamed(self, **keys: str) -> Iterator[None]:
+    def blame(self, **keys: str) -> Iterator[None]:
         """Turn a `BadInput` about an argument into a `BadFile` about the key of that name, or the one that `keys` says."""
         try:
             yield
@@ -113,7 +113,7 @@ class Table:
         parameters = {name: p for name, p in inspect.signature(function).parameters.items() if name not in given}
         allowed = f"{function.__name__.strip('_')} takes {', '.join(parameters)}"
         wanted = [name for name, parameter in parameters.items() if parameter.default is parameter.empty or name in self]
-        with self.blamed():
+        with self.blame():
             return function(**given, **{name: self.value(name, allowed) for name in wanted})
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..attitude import from_quaternion
 from ..body import RigidBody
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
 DEFAULT_INERTIA = (0.5, 0.85, 1.0)

@@ -15,7 +15,7 @@ from ..attitude import Array
 from ..body import RigidBody
 from ..check import positive_number
 from ..invariants import Invariant
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
 DEFAULT_AXIAL = 1.0

@@ -11,7 +11,7 @@ from ..attitude import rotation_about
 from ..body import RigidBody
 from ..check import finite_number, positive_number
 from ..errors import BadInput
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
 DEFAULT_HEIGHT = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..body import RigidBody
 from ..check import finite_number
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
 DEFAULT_CENTRAL_INERTIA = (0.234375, 0.46875, 0.234375)

@@ -47,7 +47,7 @@ def cusped_top(t_end: float = DEFAULT_T_END) -> Scene:
     BadInput
         t_end, s, is not a finite number above 0.
     """
-    return _released("cusped_top", 0.0, t_end)
+    return _release("cusped_top", 0.0, t_end)
 
 
 def looping_top(precession: float = DEFAULT_LOOP_RATE, t_end: float = DEFAULT_T_END) -> Scene:
@@ -60,7 +60,7 @@ def looping_top(precession: float = DEFAULT_LOOP_RATE, t_end: float = DEFAULT_T_
     """
     if finite_number("precession", precession, "a finite rate below 0, rad/s") >= 0:
         raise BadInput("precession", precession, "a finite rate below 0, rad/s")
-    return _released("looping_top", precession, t_end)
+    return _release("looping_top", precession, t_end)
 
 
 def unduloid_top(precession: float = DEFAULT_WAVE_RATE, t_end: float = DEFAULT_T_END) -> Scene:
@@ -73,10 +73,10 @@ def unduloid_top(precession: float = DEFAULT_WAVE_RATE, t_end: float = DEFAULT_T
     """
     if not 0 < finite_number("precession", precession, "a rate between 0 and 10, rad/s") < 10:
         raise BadInput("precession", precession, "a rate between 0 and 10, rad/s")
-    return _released("unduloid_top", precession, t_end)
+    return _release("unduloid_top", precession, t_end)
 
 
-def _released(name: str, precession: float, t_end: float) -> Scene:
+def _release(name: str, precession: float, t_end: float) -> Scene:
     """The top with the spin L3/J3 of the steady one, its tilt stationary, precessing at a rate of its own."""
     steady = lagrange_top(t_end=t_end)
     rates = (0.0, precession * math.sin(DEFAULT_TILT), steady.w_WB_B0[2])

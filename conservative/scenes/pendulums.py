@@ -12,7 +12,7 @@ import numpy as np
 
 from ..body import RigidBody
 from ..check import positive_number
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 
 DEFAULT_INERTIA = (1.3, 0.9, 0.7)

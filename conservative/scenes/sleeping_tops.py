@@ -12,7 +12,7 @@ from ..attitude import rotation_about
 from ..body import RigidBody
 from ..check import finite_number, positive_number
 from ..errors import BadInput
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .lagrange_top import DEFAULT_DENSITY, DEFAULT_GRAVITY, DEFAULT_HEIGHT, cone
 

@@ -13,7 +13,7 @@ from ..attitude import Array, rotation_about
 from ..body import RigidBody
 from ..check import finite_number, rotation
 from ..errors import BadInput
-from ..potentials.potential import UniformGravity
+from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .asymmetric_top import asymmetric_top
 from .brick_flip import brick_flip
@@ -49,7 +49,7 @@ def turned_brick(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Sc
     BadInput
         An argument is not finite, or t_end, s, is not above 0.
     """
-    return _turned("turned_brick", brick_flip(), angle, t_end)
+    return _turn("turned_brick", brick_flip(), angle, t_end)
 
 
 def turned_top(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Scene:
@@ -60,10 +60,10 @@ def turned_top(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Scen
     BadInput
         An argument is not finite, or t_end, s, is not above 0.
     """
-    return _turned("turned_top", asymmetric_top(), angle, t_end)
+    return _turn("turned_top", asymmetric_top(), angle, t_end)
 
 
-def _turned(name: str, scene: Scene, angle: float, t_end: float | None) -> Scene:
+def _turn(name: str, scene: Scene, angle: float, t_end: float | None) -> Scene:
     F = rotation_about(DEFAULT_AXIS, finite_number("angle", angle, "a finite angle, rad"))
     turned = in_body_frame(scene, F, name)
     return turned if t_end is None else turned.renamed(name, t_end=t_end)

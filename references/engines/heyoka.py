@@ -54,6 +54,8 @@ class Heyoka(Method):
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "green"
+    module: ClassVar[str] = "heyoka"
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
@@ -77,16 +79,16 @@ class Heyoka(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
-        integrator, label = forms.compiled(problem.form, self.tol), self.label
+        integrators, label = forms.compile_double(problem.form, self.tol), self.label
         propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
 
         def run() -> Trajectory:
-            # The integrator is shared by all scenes of its form, and holds what the last run left.
-            integrator.time = 0.0
-            integrator.state[:] = problem.start
-            # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
-            integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-            states, steps, outcome = propagate(integrator, grid.t)
+            with integrators.borrow() as integrator:
+                integrator.time = 0.0
+                integrator.state[:] = problem.start
+                # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
+                integrator.pars[:] = problem.parameters[: len(integrator.pars)]
+                states, steps, outcome = propagate(integrator, grid.t)
             R_WF, w = problem.readout(grid.t[: len(states)], states)
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), f"heyoka: {outcome.name}")
 
@@ -96,6 +98,10 @@ class Heyoka(Method):
     def variants(cls) -> tuple[Method, ...]:
         tols = (1e-6, 1e-9, 1e-12, 1e-16)
         return (*(cls(tol) for tol in tols), *(cls(tol, "non_spinning") for tol in tols), *(cls(tol, "lean") for tol in tols))
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls(1e-9), cls(1e-16)
 
 
 def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, Any]:

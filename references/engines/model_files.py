@@ -65,7 +65,7 @@ def _mujoco_body(mj: Any, model: Any, data: Any, body: int) -> MassDistribution:
         inertia = R_BI @ np.diag(model.body_inertia[part]) @ R_BI.T
         parts.append((float(model.body_mass[part]), R_WB.T @ (data.xipos[part] - origin), inertia))
     fixed_point = _mujoco_fixed_point(mj, model, data, body)
-    return _together(parts, None if fixed_point is None else R_WB.T @ (fixed_point - origin))
+    return _combine(parts, None if fixed_point is None else R_WB.T @ (fixed_point - origin))
 
 
 def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | None:
@@ -166,7 +166,7 @@ def _not_turning(name: str, others: list[str]) -> BadInput:
     return BadInput("name", f"{name!r}, which no joint turns", allowed)
 
 
-def _together(parts: list[tuple[float, Array, Array]], fixed_point: Array | None) -> MassDistribution:
+def _combine(parts: list[tuple[float, Array, Array]], fixed_point: Array | None) -> MassDistribution:
     """Return bodies of given mass, centre (3,) and inertia (3, 3) about it as one; without a fixed point about its centre."""
     mass = sum(m for m, _, _ in parts)
     com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass

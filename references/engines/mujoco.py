@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice
+from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -65,6 +67,20 @@ class MuJoCo(Method):
 
     family: ClassVar[str] = "mujoco"
     role: ClassVar[Role] = Role.ENGINE
+    claims: ClassVar[Claims] = Claims(
+        "MuJoCo documentation, Computation, Numerical integration",
+        comparisons=(
+            BetterEnergy("RK4 is better than Euler on energy-conserving systems", "mujoco", "mujoco:integrator=Euler"),
+            SameErrors(
+                "implicit and implicitfast coincide for a free body",
+                ("mujoco:integrator=implicit", "mujoco:integrator=implicitfast"),
+                tolerance=1e-6,
+                free=True,
+            ),
+        ),
+    )
+    colour: ClassVar[str] = "vermilion"
+    module: ClassVar[str] = "mujoco"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -87,7 +103,7 @@ class MuJoCo(Method):
         model = _model(mj, axes, grid.dt, self.integrator, scene.free)
         data = mj.MjData(model)
         start = _start(mj, model, data, axes)
-        march = _rolled_out if grid.every <= _ROLLOUT_UP_TO else _stepped
+        march = _roll_out if grid.every <= _ROLLOUT_UP_TO else _step_to_samples
 
         def run() -> Trajectory:
             with _quiet(mj):
@@ -102,6 +118,14 @@ class MuJoCo(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(integrator) for integrator in INTEGRATORS)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("RK4")
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("RK4"), cls("implicit")
 
 
 def _model(mj: Any, axes: Axes, dt: float, integrator: str, free_joint: bool) -> Any:
@@ -139,7 +163,7 @@ def _start(mj: Any, model: Any, data: Any, axes: Axes) -> Array:
     return state
 
 
-def _rolled_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
+def _roll_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
     """Return quaternions, rates and a reason from one call that stores every step."""
     rollout = load("mujoco.rollout", "mujoco", "MuJoCo").rollout
     mj.mj_resetData(model, data)
@@ -155,7 +179,7 @@ def _rolled_out(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tup
     return states[:, nq - 4 : nq], states[:, nq + model.nv - 3 : nq + model.nv], reason
 
 
-def _stepped(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
+def _step_to_samples(mj: Any, model: Any, data: Any, start: Array, grid: Grid) -> tuple[Array, Array, str]:
     """Return quaternions, rates and a reason, stepping from sample to sample inside the engine."""
     mj.mj_resetData(model, data)
     mj.mj_setState(model, data, start, mj.mjtState.mjSTATE_FULLPHYSICS)
@@ -178,12 +202,29 @@ def _warning(mj: Any, data: Any) -> str:
     return ""
 
 
-@contextmanager
-def _quiet(mj: Any) -> Iterator[None]:
-    """Keep MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead."""
-    before = mj.get_mju_user_warning()
-    mj.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mj.set_mju_user_warning(before)
+class _Quiet:
+    """Keeps MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead.
+
+    The first of the runs that overlap puts the user's own handler aside, the last one puts it back.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._runs, self._before = Lock(), 0, None
+
+    @contextmanager
+    def __call__(self, mj: Any) -> Iterator[None]:
+        with self._lock:
+            if self._runs == 0:
+                self._before = mj.get_mju_user_warning()
+                mj.set_mju_user_warning(lambda message: None)
+            self._runs += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._runs -= 1
+                if self._runs == 0:
+                    mj.set_mju_user_warning(self._before)
+
+
+_quiet = _Quiet()

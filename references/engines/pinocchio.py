@@ -46,6 +46,8 @@ class Pinocchio(Method):
 
     family: ClassVar[str] = "pinocchio"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "purple"
+    module: ClassVar[str] = "pinocchio"
 
     def __post_init__(self) -> None:
         choice("scheme", self.scheme, SCHEMES)
@@ -81,6 +83,14 @@ class Pinocchio(Method):
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return tuple(cls(scheme) for scheme in SCHEMES)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return (cls("RK4"),)
+
+    @classmethod
+    def picture_settings(cls) -> tuple[Method, ...]:
+        return (cls("Euler"),)
 
 
 def _model(pin: Any, axes: Axes) -> Any:

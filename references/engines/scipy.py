@@ -12,7 +12,8 @@ from conservative.attitude import Array, from_quaternion
 from conservative.check import choice, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import UniformGravity, torque_W
+from conservative.potentials.potential import torque_W
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -50,6 +51,8 @@ class SciPy(Method):
 
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
+    colour: ClassVar[str] = "orange"
+    module: ClassVar[str] = "scipy.integrate"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -73,7 +76,7 @@ class SciPy(Method):
         atol = self.rtol * np.repeat([1.0, _rate_scale(axes)], [4, 3])
         span = (0.0, float(grid.t[-1]))
 
-        solver = _counting(getattr(integrate, self.integrator))
+        solver = _count_steps(getattr(integrate, self.integrator))
 
         def run() -> Trajectory:
             solver.steps = 0
@@ -91,8 +94,12 @@ class SciPy(Method):
     def variants(cls) -> tuple[Method, ...]:
         return (cls(rtol=1e-9), cls(rtol=1e-12))
 
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return (cls(rtol=1e-9),)
 
-def _counting(solver: Any) -> Any:
+
+def _count_steps(solver: Any) -> Any:
     """Return the solver class with a count of its steps, which `solve_ivp` does not tell."""
 
     def step(self: Any) -> Any:

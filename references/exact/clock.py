@@ -9,7 +9,8 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .theta import ComplexArray, Number, mp
+from .digits import Number, mp
+from .theta import ComplexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +21,7 @@ class Clock:
     rate: Number
     period: Number
 
-    def reduced(self, t: Array) -> tuple[Array, Array]:
+    def reduce(self, t: Array) -> tuple[Array, Array]:
         """Return the phase (n,) within half a period of 0, and the parity (n,), 0 or 1, of the periods taken off.
 
         The product with the time is carried in twice the digits: the error stays a rounding unit of the period, whatever t.
@@ -38,9 +39,9 @@ class Clock:
         period, period_low = _two_parts(self.period)
         return period * high + (period * low + period_low * high), np.mod(np.mod(whole, 2) + more, 2)
 
-    def turned(self, t: Array) -> ComplexArray:
+    def phasor(self, t: Array) -> ComplexArray:
         """Return exp(i phase), (n,); the period must be 2 pi."""
-        return np.asarray(np.exp(1j * self.reduced(t)[0]))
+        return np.asarray(np.exp(1j * self.reduce(t)[0]))
 
 
 def rotation_clock(start: Number, rate: Number) -> Clock:

@@ -22,8 +22,9 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
-from .start import Matrix, Start, Vector, as_array, cross, from_halves, norm, rounded_halves, turned
-from .theta import Lattice, Number, Points, Quotient, Theta, jacobi, mp, theta
+from .digits import Number, mp
+from .start import Matrix, Start, Vector, as_array, cross, from_halves, halves_in_double, multiply, norm
+from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +102,14 @@ class FreeMotion:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, odd = self.argument.reduced(t)
+        v, odd = self.argument.reduce(t)
         points = Points(self.lattice, v)
         sn, cn, dn = (points.quotient(part).real for part in self.parts)
         flip = 1 - 2 * odd
         m = np.stack([flip * cn, flip * sn, dn], axis=-1) * self.largest
-        chi = self.turn.turned(t) * Points(self.phase.lattice, v).theta(self.phase)
+        chi = self.turn.phasor(t) * Points(self.phase.lattice, v).theta(self.phase)
         q_lP = (chi * (1 + m[:, 2]), chi * (m[:, 1] - 1j * m[:, 0]))
-        R_WB = from_halves(*turned(turned(self.q_Wl, q_lP), self.q_PB))
+        R_WB = from_halves(*multiply(multiply(self.q_Wl, q_lP), self.q_PB))
         return R_WB, (m * (float(self.size) * self.inverse_J)) @ self.R_BP.T
 
 
@@ -134,8 +135,8 @@ def free_motion(start: Start) -> FreeMotion:
         jacobi(lattice),
         phase,
         as_array(axes.R_BP),
-        rounded_halves(axes.R_BP.T),
-        rounded_halves(start.attitude * axes.R_BP * R_lP0.T),
+        halves_in_double(axes.R_BP.T),
+        halves_in_double(start.attitude * axes.R_BP * R_lP0.T),
     )
 
 

@@ -26,8 +26,9 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
-from .start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, root, rounded_halves, turned, unit
-from .theta import ComplexArray, Lattice, Number, Points, Quotient, jacobi, mp, quotient
+from .digits import Number, mp
+from .start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, halves_in_double, multiply, root, unit
+from .theta import ComplexArray, Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
 """Roots of the cubic closer than this are one: its double roots come out with half of the 150 digits."""
@@ -162,12 +163,12 @@ def nutation(start: Top) -> Nutation:
     q = (linear * square - 3 * constant) / 6 - square**3 / 27
     angle = mp.acos(max(min(q / mp.sqrt(p) ** 3, mp.mpf(1)), mp.mpf(-1))) / 3 if p > 0 else mp.mpf(0)
     u3, u2, u1 = (2 * root(p) * mp.cos(angle + turn * 2 * mp.pi / 3) - square / 3 for turn in (0, -1, 1))
-    u1, u2, u3 = (merged(u, (start.u, mp.mpf(1), mp.mpf(-1))) for u in (u1, u2, u3))
+    u1, u2, u3 = (snap_to_marks(u, (start.u, mp.mpf(1), mp.mpf(-1))) for u in (u1, u2, u3))
     u1, u2, u3 = max(min(u1, start.u), mp.mpf(-1)), min(max(u2, start.u), mp.mpf(1)), max(u3, mp.mpf(1))
     return Nutation(u1, u2, u3, Lattice.of((u2 - u1) / (u3 - u1), (u3 - u2) / (u3 - u1)))
 
 
-def merged(u: Number, marks: tuple[Number, ...]) -> Number:
+def snap_to_marks(u: Number, marks: tuple[Number, ...]) -> Number:
     """Return the mark that a root equals up to rounding, or the root."""
     return next((mark for mark in marks if abs(u - mark) < _SAME), u)
 
@@ -181,7 +182,7 @@ class Factor:
 
     def at(self, t: Array, points: Points) -> ComplexArray:
         """Return the factor (n,)."""
-        return self.clock.turned(t) * points.quotient(self.shape)
+        return self.clock.phasor(t) * points.quotient(self.shape)
 
 
 def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, start: Number, slope: Number) -> Factor:
@@ -193,7 +194,7 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
     mu = rate - omega * (derivative / value).imag
     value, derivative = shape.value_and_slope(v0)
     scale = start / value if abs(omega * start) > abs(slope) else slope / (omega * derivative + mp.mpc(0, mu) * value)
-    return Factor(rotation_clock(mp.mpf(0), mu), shape.scaled(scale))
+    return Factor(rotation_clock(mp.mpf(0), mu), shape.times(scale))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,9 +213,9 @@ class TopMotion:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        v, odd = self.argument.reduced(t)
+        v, odd = self.argument.reduce(t)
         points = Points(self.lattice, v)
-        R_WB = from_halves(*turned((self.alpha.at(t, points), self.beta.at(t, points)), self.q_PB))
+        R_WB = from_halves(*multiply((self.alpha.at(t, points), self.beta.at(t, points)), self.q_PB))
         w = self.w_scale * (1 - 2 * odd) * self.w.at(t, points)
         w_P = np.stack([w.real, w.imag, np.full_like(w.real, self.spin)], axis=-1)
         return R_WB, w_P @ self.R_BP.T
@@ -243,4 +244,4 @@ def top_motion(start: Top) -> TopMotion:
     alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
     R_BP = as_array(start.R_BP)
     argument = Clock(v0, omega, 2 * lattice.K)
-    return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, rounded_halves(start.R_BP.T))
+    return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, halves_in_double(start.R_BP.T))

@@ -1,9 +1,9 @@
 """Exact solutions: the free rigid body and the Lagrange top, at any times at once.
 
 Each time costs the same, however late. What belongs to the motion as a whole is prepared in 500 bits, and the samples are sums
-of a few exponentials in double precision; see `conservative.references.exact.theta` for why neither a separatrix nor a pole harms them. The
-inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded. Sources:
-Jacobi for the free body, Klein & Sommerfeld for the top; see the functions.
+of a few exponentials in double precision; `conservative.references.exact.theta` says why neither a separatrix nor a pole harms
+them. The inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded.
+Sources: Jacobi for the free body, Klein & Sommerfeld for the top; see the functions.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from conservative.check import finite_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
-from conservative.potentials.potential import Potential, UniformGravity
+from conservative.potentials.potential import Potential
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 from conservative.version import VERSION
 
+from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
 from .motion import Motion, in_blocks, steady_turn
@@ -66,7 +68,8 @@ def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLik
     elliptic integral of the third kind; formulas in `conservative.references.exact.free_body`.
     """
     start, times = _start(body, R_WB0, w_WB_B0), _times(t)
-    return _evaluated(_free_motion(start), times)
+    with MP_LOCK:
+        return _evaluate(_free_motion(start), times)
 
 
 def lagrange_top(
@@ -110,7 +113,8 @@ def lagrange_top(
     reason = _reason(body, potential)
     if reason:
         raise Unsupported("potential", f"{potential!r} with {body!r}", f"what has a closed form ({reason})")
-    return _evaluated(_motion(start, potential), times)
+    with MP_LOCK:
+        return _evaluate(_motion(start, potential), times)
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,7 @@ class Exact(Method):
 
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
+    colour: ClassVar[str] = "black"
 
     @property
     def label(self) -> str:
@@ -136,19 +141,22 @@ class Exact(Method):
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
     def unsupported(self, scene: Scene) -> str | None:
-        return _reason(_swinging(scene) or scene.body, scene.potential)
+        return _reason(_pendulum(scene) or scene.body, scene.potential)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        motion = _motion(Start(_swinging(scene) or scene.body, scene.R_WB0, scene.w_WB_B0), scene.potential)
+        start = Start(_pendulum(scene) or scene.body, scene.R_WB0, scene.w_WB_B0)
+        with MP_LOCK:
+            motion = _motion(start, scene.potential)
 
         def run() -> Trajectory:
-            R_WB, w_WB_B = in_blocks(motion, grid.t)
+            with MP_LOCK:
+                R_WB, w_WB_B = in_blocks(motion, grid.t)
             return Trajectory(scene, grid.t, R_WB, w_WB_B, self.label, Counters(steps=0, evaluations=grid.n_samples))
 
         return run
 
 
-def _swinging(scene: Scene) -> RigidBody | None:
+def _pendulum(scene: Scene) -> RigidBody | None:
     """Return the spherical body that moves as a pendulum does: with the moment about its axis all round; None for others."""
     field, body = scene.potential, scene.body
     if not isinstance(field, UniformGravity):
@@ -197,6 +205,6 @@ def _times(t: ArrayLike) -> Array:
     return finite_array("t", t, (shape,), "finite times (n,), s")
 
 
-def _evaluated(motion: Motion, times: Array) -> tuple[Array, Array]:
+def _evaluate(motion: Motion, times: Array) -> tuple[Array, Array]:
     R_WB, w_WB_B = in_blocks(motion, times.ravel())
     return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)

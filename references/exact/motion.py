@@ -10,8 +10,8 @@ import numpy as np
 from conservative.attitude import Array
 
 from .clock import Clock, rotation_clock
+from .digits import mp
 from .start import Start, as_array, from_halves, norm
-from .theta import mp
 
 
 class Motion(Protocol):
@@ -45,7 +45,7 @@ class SteadyTurn:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3)."""
-        half = self.half_turn.turned(t)
+        half = self.half_turn.phasor(t)
         x, y, z = self.axis_B
         turn = from_halves(half.real + 1j * z * half.imag, (x + 1j * y) * half.imag)
         return self.R_WB0 @ turn, np.broadcast_to(self.w_WB_B, (*t.shape, 3)).copy()

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .theta import Number, mp
+from .digits import Number, mp
 
 Vector = list[Number]
 Matrix = Any
@@ -90,7 +90,7 @@ def norm(a: Vector) -> Number:
     return mp.sqrt(sum(x * x for x in a))
 
 
-def rounded_halves(R: Matrix) -> tuple[complex, complex]:
+def halves_in_double(R: Matrix) -> tuple[complex, complex]:
     """Return `halves` in double precision."""
     alpha, beta = halves(R)
     return complex(alpha), complex(beta)
@@ -111,7 +111,7 @@ def halves(R: Matrix) -> tuple[Number, Number]:
     return mp.mpc(q[0], q[3]), mp.mpc(q[1], q[2])
 
 
-def turned(left: Any, right: Any) -> Any:
+def multiply(left: Any, right: Any) -> Any:
     """Return the product of two quaternions, each a pair (alpha, beta): of numbers or of arrays (n,)."""
     (a, b), (c, d) = left, right
     return a * c - b * np.conj(d), a * d + b * np.conj(c)

@@ -14,17 +14,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import Array
 
-mp = mpmath.MPContext()
-mp.prec = 500
+from .digits import Number, mp
 
-Number = Any
-"""A real or complex number of `mp`."""
 ComplexArray = NDArray[np.complex128]
 
 _BITS_KEPT = 600  # of a series, beside its first term: more than `mp` has
@@ -165,7 +161,7 @@ class Quotient:
     mirrored: bool = False
     scale: Number = 1
 
-    def scaled(self, factor: Number) -> Quotient:
+    def times(self, factor: Number) -> Quotient:
         """Return the quotient times a number."""
         return replace(self, scale=self.scale * factor)
 
@@ -203,9 +199,9 @@ def jacobi(lattice: Lattice) -> tuple[Quotient, Quotient, Quotient]:
     sn, cn, dn = (quotient(lattice, number) for number in (1, 2, 3))
     zero = mp.mpf(0)
     return (
-        sn.scaled(1 / sn.value_and_slope(zero)[1]),
-        cn.scaled(1 / cn.value_and_slope(zero)[0]),
-        dn.scaled(1 / dn.value_and_slope(zero)[0]),
+        sn.times(1 / sn.value_and_slope(zero)[1]),
+        cn.times(1 / cn.value_and_slope(zero)[0]),
+        dn.times(1 / dn.value_and_slope(zero)[0]),
     )
 
 

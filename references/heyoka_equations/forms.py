@@ -16,9 +16,11 @@ equal error); rates scaled so that all coefficients are 1 (8 % less a step, more
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 from ..engine import load
@@ -53,11 +55,33 @@ def form_of(equations: Callable[[Sequence[Expression]], Equations], parameters: 
     return Form(equations, tuple(bool(p != 0) for p in parameters)), [p for p in parameters if p != 0]
 
 
-@cache
-def compiled(form: Form, tol: float) -> Any:
-    """Return the integrator of a form, compiled for a relative tolerance; whoever runs it sets state, time and parameters."""
+class Integrators:
+    """Equal integrators of one form: a run borrows one, so that no two runs at a time write into the same.
+
+    The first is compiled; others are copies of it, made (in a millisecond) when all there are so far are lent out.
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        self._first, self._idle = compiled, [copy(compiled)]
+
+    @contextmanager
+    def borrow(self) -> Iterator[Any]:
+        """Lend an integrator; whoever borrows it sets state, time and parameters."""
+        try:
+            integrator = self._idle.pop()
+        except IndexError:
+            integrator = copy(self._first)
+        try:
+            yield integrator
+        finally:
+            self._idle.append(integrator)
+
+
+@lru_cache(maxsize=64)
+def compile_double(form: Form, tol: float) -> Integrators:
+    """Return integrators of a form in double precision, for a relative tolerance."""
     equations = form.build()
-    return heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol)
+    return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol))
 
 
 def body(parameters: Sequence[Expression]) -> Equations:
@@ -69,7 +93,7 @@ def body(parameters: Sequence[Expression]) -> Equations:
     q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
     gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
     turning = product(parameters[3:12], vertical(q))
-    return [*zip(q, turned_by_body(q, w), strict=True), *zip(w, _sums(gyroscopic, turning), strict=True)]
+    return [*zip(q, kinematics_in_body(q, w), strict=True), *zip(w, _sums(gyroscopic, turning), strict=True)]
 
 
 def non_spinning(parameters: Sequence[Expression]) -> Equations:
@@ -81,7 +105,7 @@ def non_spinning(parameters: Sequence[Expression]) -> Equations:
     q, u = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("u1", "u2")
     k, u3 = parameters
     n1, n2 = 2 * (q[1] * q[3] + q[0] * q[2]), 2 * (q[2] * q[3] - q[0] * q[1])
-    return [*zip(q, turned_by_world(q, [*u, u3]), strict=True), (u[0], -k * n2), (u[1], k * n1)]
+    return [*zip(q, kinematics_in_world(q, [*u, u3]), strict=True), (u[0], -k * n2), (u[1], k * n1)]
 
 
 def free_rates_and_angle(parameters: Sequence[Expression]) -> Equations:
@@ -114,7 +138,7 @@ def cross(a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def turned_by_body(q: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
+def kinematics_in_body(q: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
     """Return q' = q w / 2 for rates w in body axes."""
     return [
         -0.5 * (q[1] * w[0] + q[2] * w[1] + q[3] * w[2]),
@@ -124,7 +148,7 @@ def turned_by_body(q: Sequence[Expression], w: Sequence[Expression]) -> list[Exp
     ]
 
 
-def turned_by_world(q: Sequence[Expression], u: Sequence[Expression]) -> list[Expression]:
+def kinematics_in_world(q: Sequence[Expression], u: Sequence[Expression]) -> list[Expression]:
     """Return q' = u q / 2 for rates u in world axes."""
     return [
         -0.5 * (q[1] * u[0] + q[2] * u[1] + q[3] * u[2]),

@@ -1,6 +1,6 @@
-"""A scene in the forms of `conservative.references.heyoka_equations.forms`: which axes, which numbers, and how states become attitudes and rates.
+"""A scene as heyoka integrates it: which axes, which numbers, and how states become attitudes and rates.
 
-Source: our own, measured against each other.
+The forms are those of `conservative.references.heyoka_equations.forms`. Source: our own, measured against each other.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def lean(scene: Scene) -> Formulation:
 
 
 def _free_rates_and_angle(scene: Scene) -> Formulation:
-    axes = _circulating(principal_axes(scene))
+    axes = _order_axes(principal_axes(scene))
     L0 = axes.J * axes.w0
     momentum = float(np.linalg.norm(L0))
     slope = momentum / axes.J[2]
@@ -164,7 +164,7 @@ def _heights(axes: Axes) -> tuple[float, float]:
     return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
 
 
-def _circulating(axes: Axes) -> Axes:
+def _order_axes(axes: Axes) -> Axes:
     """Return principal axes in another order: the third is one about which a free body's momentum circulates, and L3 > 0.
 
     It is the axis of the largest moment where l^2 > 2 T J_middle, that of the smallest otherwise.

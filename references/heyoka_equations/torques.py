@@ -8,7 +8,8 @@ from typing import Any
 
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
-from conservative.potentials.potential import Potential, UniformGravity
+from conservative.potentials.potential import Potential
+from conservative.potentials.uniform_gravity import UniformGravity
 
 from .forms import Expression, cross, heyoka, product, to_body
 
@@ -34,13 +35,13 @@ def uniform(q: Expressions, moment: Expressions) -> list[Expression]:
 def spring(q: Expressions, parameters: Expressions) -> list[Expression]:
     """Return the torque of V = k/2 (d - d0)^2, parameters b (3), A (3), k, d0."""
     b, anchor, (stiffness, rest_length) = parameters[:3], to_body(q, parameters[3:6]), parameters[6:]
-    return _pulled(b, anchor, stiffness * (1 - rest_length / heyoka().sqrt(_squared_distance(b, anchor))))
+    return _pull_torque(b, anchor, stiffness * (1 - rest_length / heyoka().sqrt(_squared_distance(b, anchor))))
 
 
 def attraction(q: Expressions, parameters: Expressions) -> list[Expression]:
     """Return the torque of V = -c/d, parameters b (3), A (3), c."""
     b, anchor, strength = parameters[:3], to_body(q, parameters[3:6]), parameters[6]
-    return _pulled(b, anchor, strength * _squared_distance(b, anchor) ** -1.5)
+    return _pull_torque(b, anchor, strength * _squared_distance(b, anchor) ** -1.5)
 
 
 def gradient(q: Expressions, parameters: Expressions) -> list[Expression]:
@@ -53,7 +54,7 @@ def _squared_distance(b: Expressions, anchor: Expressions) -> Expression:
     return sum((x - y) ** 2 for x, y in zip(b, anchor, strict=True))
 
 
-def _pulled(b: Expressions, anchor: Expressions, pull: Expression) -> list[Expression]:
+def _pull_torque(b: Expressions, anchor: Expressions, pull: Expression) -> list[Expression]:
     """Return the torque b x (A - b) pull of a force along the line between the points, body axes."""
     return [pull * x for x in cross(b, anchor)]
 

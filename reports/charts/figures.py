@@ -37,7 +37,7 @@ def _series_look(names: list[str], title: str) -> dict[str, Any]:
 
 def work_precision(points: pd.DataFrame, scene: str) -> Any:
     """Return time against error for one scene, from `work_precision.points`; the Pareto front is the bold line."""
-    data = points[points["scene"] == scene].assign(microseconds=lambda found: found["time"] * 1e6)
+    data = points[points["scene"] == scene].assign(microseconds=lambda rows: rows["time"] * 1e6)
     names = series_order(data["series"])
     x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
     y = alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
@@ -54,23 +54,23 @@ def work_precision(points: pd.DataFrame, scene: str) -> Any:
     return styled(best.encode(x=x, y=y, order="error:Q") + lines + marks)
 
 
-def drift(samples: pd.DataFrame, scene: str) -> Any:
-    """Return the largest drift so far of each invariant over time, from `long_runs.samples`, one panel an invariant.
+def drift(drifts: pd.DataFrame, scene: str) -> Any:
+    """Return the largest drift so far of each invariant over time, from `lines.drifts`, one panel an invariant.
 
     Of methods that differ in tolerance alone the loosest and the tightest are drawn.
     """
-    data = _extremes(samples[samples["scene"] == scene]).assign(shown=lambda found: found["drift"].clip(lower=FLOOR))
+    data = _extremes(drifts[drifts["scene"] == scene]).assign(shown=lambda rows: rows["drift"].clip(lower=FLOOR))
     names = series_order(data["series"])
-    return styled(alt.vconcat(*(_drift_panel(part, str(kind), names) for kind, part in data.groupby("invariant", sort=False))))
+    return styled(alt.vconcat(*(_drift_panel(part, str(kind), names) for kind, part in data.groupby("quantity", sort=False))))
 
 
-def _extremes(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the samples without the lines between the loosest and the tightest of several tolerances."""
+def _extremes(drifts: pd.DataFrame) -> pd.DataFrame:
+    """Return drifts without the lines between the loosest and the tightest of several tolerances."""
     lines: dict[str, list[str]] = {}
-    for name in samples["series"].unique():
+    for name in drifts["series"].unique():
         lines.setdefault(without_tolerance(name), []).append(name)
-    kept = {name for names in lines.values() for name in (names[0], names[-1])}
-    return samples[samples["series"].isin(kept)]
+    extremes = {name for names in lines.values() for name in (names[0], names[-1])}
+    return drifts[drifts["series"].isin(extremes)]
 
 
 def _drift_panel(data: pd.DataFrame, kind: str, names: list[str]) -> Any:

@@ -7,15 +7,14 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from conservative.benchmarks.studies.paper_figures import ANALYTICAL
-
+from ..tables.lines import ANALYTICAL
 from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, styled
 
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
 
 
 def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
-    """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `paper` for the columns."""
+    """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
     b = _error_panel(errors, "energy", "(b) Energy", "relative error of energy")
     c = _error_panel(errors, "momentum", "(c) Length of the angular momentum", "relative error of |L|")
     return styled(alt.hconcat(_rates_panel(rates), alt.vconcat(b, c)).resolve_scale(color="independent"))

@@ -1,4 +1,4 @@
-"""The picture of a recommendation: error to expect against step and against tolerance, and the cost of what was found."""
+"""The picture of a recommendation: error to expect against step and against tolerance, and what it costs."""
 
 from __future__ import annotations
 
@@ -12,53 +12,53 @@ import vl_convert
 from conservative.benchmarks.recommendation.recommend import Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..cli.recommend import called, setting
+from ..tables.recommendation import method_text, setting_text
 from .figures import log_channel
 from .style import BLACK, HEIGHT, WIDTH, colour_scale, series_order, shape_scale, styled
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
 
-def points(found: Recommendation) -> pd.DataFrame:
+def points(recommendation: Recommendation) -> pd.DataFrame:
     """Return a row for each probe: method, kind and value of the setting, error to expect, rad, number."""
     rows = [
         {
-            "method": called(advice),
+            "method": method_text(advice),
             "kind": STEP if tolerance_setting(probe.method) is None else TOLERANCE,
             "setting": probe.setting,
             "expected": min(probe.expected, math.pi),
             "run": number,
             "recommended": probe is advice.best and advice.reached,
         }
-        for advice in found.advice
+        for advice in recommendation.advice
         for number, probe in enumerate(advice.probes)
     ]
     return pd.DataFrame(rows)
 
 
-def costs(found: Recommendation) -> pd.DataFrame:
+def costs(recommendation: Recommendation) -> pd.DataFrame:
     """Return a row for each method that reaches the error: method, setting, cost in µs per simulated second."""
-    reaching = [advice for advice in found.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
-    rows = [{"method": called(a), "setting": setting(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
+    reaching = [advice for advice in recommendation.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
+    rows = [{"method": method_text(a), "setting": setting_text(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
     return pd.DataFrame(rows, columns=["method", "setting", "cost"])
 
 
-def picture(found: Recommendation) -> Any:
+def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
-    data, prices = points(found), costs(found)
+    data, prices, asked = points(recommendation), costs(recommendation), recommendation.conditions
     names = series_order(data["method"])
-    panels = [_probes(part, str(kind), names, found.bench.error) for kind, part in data.groupby("kind", sort=True)]
+    panels = [_probes(part, str(kind), names, asked.error) for kind, part in data.groupby("kind", sort=True)]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
         rows.append(_costs(prices, names))
-    title = f"{found.bench.scene.name}: {found.bench.error:g} rad over {found.bench.duration:g} s"
+    title = f"{asked.scene.name}: {asked.error:g} rad over {asked.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
     return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 
 
-def svg(found: Recommendation) -> str:
+def svg(recommendation: Recommendation) -> str:
     """Return the picture as SVG."""
-    return str(vl_convert.vegalite_to_svg(picture(found).to_dict()))
+    return str(vl_convert.vegalite_to_svg(picture(recommendation).to_dict()))
 
 
 def _probes(data: pd.DataFrame, kind: str, names: list[str], error: float) -> Any:

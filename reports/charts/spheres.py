@@ -2,102 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 import pandas as pd
 
-from conservative.attitude import Array
-from conservative.benchmarks.studies.case import Failed, attempt
-from conservative.benchmarks.studies.long_runs import case_for
-from conservative.method import Method, Role
-from conservative.potentials.potential import UniformGravity
-from conservative.scene import Scene
-from conservative.trajectory import Trajectory
-
-from ..labels import shown
 from .style import GREY, colours
 from .vega_embed import Spec, as_csv
-
-KEPT = 700
-"""Samples of a curve."""
-PREFERRED = (
-    "convected",
-    "reduced",
-    "mujoco:integrator=Euler",
-    "mujoco",
-    "mujoco:integrator=implicit",
-    "pinocchio:scheme=Euler",
-)
-"""What is drawn where a report has it: a curve that stays, beside ones that may not."""
-COLUMNS = ("scene", "method", "series", "x", "y", "z")
 
 TURN, TILT = 35, 25
 """Where the spheres are looked at from at first, degrees."""
 
 
-def chosen(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods that are drawn: the preferred ones, and the first of every family that has none there; no truth."""
-    preferred = [method for method in methods if method.name in PREFERRED]
-    firsts = {method.family: method for method in reversed(methods) if method.role != Role.TRUTH}
-    return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
+def chart(curves: pd.DataFrame, scene: str, series: str) -> Spec:
+    """Return one sphere, from `lines.curves`, as a Vega-Lite specification with parameters `turn` and `tilt`, degrees.
 
-
-def absent(found: pd.DataFrame, scene: str, methods: Sequence[Method]) -> list[str]:
-    """Return the names of the methods that should be drawn on a scene and could not."""
-    drawn = set(found[found["scene"] == scene]["method"])
-    return [method.name for method in chosen(methods) if method.name not in drawn]
-
-
-def curves(scenes: Sequence[Scene], methods: Sequence[Method]) -> pd.DataFrame:
-    """Return curves: columns scene, method, series, and the point x, y, z, in units of the sphere's radius at the start.
-
-    The run is that of the drift over time. Of a free body the point is the momentum, in principal axes; of a body in a field
-    the direction of its axis, in world axes. Methods that cannot do the scene, or fail, have no curve. The first truth among
-    the methods that can do the scene comes first.
+    The far side is faint.
     """
-    found = [drawn for scene in scenes for drawn in _found(scene, [*_truth(scene, methods), *chosen(methods)])]
-    return pd.concat(found, ignore_index=True) if found else pd.DataFrame(columns=list(COLUMNS))
-
-
-def _truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
-    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
-
-
-def _found(scene: Scene, methods: Sequence[Method]) -> Iterator[pd.DataFrame]:
-    for method in methods:
-        outcome = attempt(case_for(scene, method), skip_missing=True)
-        if not isinstance(outcome, Failed):
-            yield curve(outcome.trajectory, method.name)
-
-
-def curve(trajectory: Trajectory, method: str) -> pd.DataFrame:
-    """Return the curve of one run, at most `KEPT` evenly spaced samples of it."""
-    kept = np.unique(np.linspace(0, len(trajectory.t) - 1, KEPT).round().astype(int))
-    x, y, z = _points(trajectory)[kept].T
-    names = {"scene": trajectory.scene.name, "method": method, "series": shown(method, trajectory.label)}
-    values = {**names, "x": x, "y": y, "z": z}
-    return pd.DataFrame(values, columns=list(COLUMNS))
-
-
-def _points(trajectory: Trajectory) -> Array:
-    scene = trajectory.scene
-    if scene.free:
-        momentum = trajectory.w_WB_B @ scene.body.inertia  # symmetric
-        return np.asarray(momentum @ np.linalg.eigh(scene.body.inertia)[1] / np.linalg.norm(momentum[0]))
-    return np.asarray(trajectory.R_WB @ _axis(scene))
-
-
-def _axis(scene: Scene) -> Array:
-    """Return the unit vector (3,) that is traced, body axes: towards the centre of mass where there is one, else the third."""
-    com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)
-    length = float(np.linalg.norm(com_B))
-    return com_B / length if length else np.eye(3)[2]
-
-
-def chart(found: pd.DataFrame, scene: str, series: str) -> Spec:
-    """Return one sphere as a Vega-Lite specification with the parameters `turn` and `tilt`, degrees; the far side is faint."""
-    rows = found[(found["scene"] == scene) & (found["series"] == series)]
+    rows = curves[(curves["scene"] == scene) & (curves["series"] == series)]
     points = [
         {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(rows[["x", "y", "z"]].round(4).to_numpy().tolist())
     ]
@@ -107,12 +27,12 @@ def chart(found: pd.DataFrame, scene: str, series: str) -> Spec:
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
         "layer": [
-            {"data": _grid(), "transform": _projected(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding("part")},
+            {"data": _grid(), "transform": _project(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding("part")},
             {
                 "data": as_csv(points, ("k", "x", "y", "z")),
-                "transform": [*_projected(), *_sides()],
+                "transform": [*_project(), *_sides()],
                 "mark": _line(colours([series])[series], 1.3, 1.0),
-                "encoding": _encoding("stretch") | {"opacity": _faint()},
+                "encoding": _encoding("stretch") | {"opacity": _fade()},
             },
         ],
         "config": {"view": {"stroke": None}},
@@ -136,7 +56,7 @@ def _grid() -> Spec:
     return as_csv(rows, ("part", "k", "x", "y", "z"))
 
 
-def _projected() -> list[Spec]:
+def _project() -> list[Spec]:
     """Return the parallel projection: across and up on the paper, and towards the eye."""
     a, e = "(turn * PI / 180)", "(tilt * PI / 180)"
     ahead = f"(cos{a} * datum.x + sin{a} * datum.y)"
@@ -162,5 +82,5 @@ def _encoding(detail: str) -> Spec:
     return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}, "order": order, "detail": {"field": detail}}
 
 
-def _faint() -> Spec:
+def _fade() -> Spec:
     return {"condition": {"test": "datum.near < 0", "value": 0.3}, "value": 1}

@@ -13,6 +13,9 @@ from typing import Any
 
 import altair as alt
 
+from conservative import registry
+from conservative.method import Method, Role
+
 from ..labels import family
 
 BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, TEAL = (
@@ -30,22 +33,23 @@ BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, T
     "#44AA99",
 )
 
-FAMILY_COLOURS = {
-    "reduced": BLUE,
-    "convected": SKY,
-    "gauss": INDIGO,
-    "moser_veselov": WINE,
-    "lame": OLIVE,
-    "projected": TEAL,
-    "heyoka": GREEN,
-    "mujoco": VERMILION,
-    "scipy": ORANGE,
-    "pinocchio": PURPLE,
-    "exact": BLACK,
-    "precise": GREY,
+PALETTE = {
+    "blue": BLUE,
+    "sky": SKY,
+    "indigo": INDIGO,
+    "wine": WINE,
+    "olive": OLIVE,
+    "teal": TEAL,
+    "green": GREEN,
+    "vermilion": VERMILION,
+    "orange": ORANGE,
+    "purple": PURPLE,
+    "black": BLACK,
+    "grey": GREY,
 }
+"""What `Method.colour` can name; families of one role stand in legends in this order."""
 _OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
-"""For families registered by other packages, in the order of their names (Tol's muted scheme)."""
+"""For families that name no colour, in the order of their names (Tol's muted scheme)."""
 
 SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-left", "triangle-right")
 DASHES = ([1, 0], [6, 3], [2, 2], [8, 3, 2, 3], [4, 4], [10, 4], [1, 3], [6, 2, 1, 2])
@@ -53,9 +57,20 @@ DASHES = ([1, 0], [6, 3], [2, 2], [8, 3, 2, 3], [4, 4], [10, 4], [1, 3], [6, 2, 
 WIDTH, HEIGHT = 420, 260
 
 
+def family_colours() -> dict[str, str]:
+    """Return the colours that registered families name, in the order of legends: by role, then by the palette."""
+    families = [family for family in registry.list_families().values() if family.colour is not None]
+    return {family.family: PALETTE.get(str(family.colour), str(family.colour)) for family in sorted(families, key=_place)}
+
+
+def _place(family: type[Method]) -> tuple[int, int]:
+    places = list(PALETTE)
+    return list(Role).index(family.role), places.index(family.colour) if family.colour in places else len(places)
+
+
 def series_order(names: Iterable[str]) -> list[str]:
     """Return different names in the order of legends: families in the order of their colours, numbers by value."""
-    families = list(FAMILY_COLOURS)
+    families = list(family_colours())
     rank = {name: families.index(family(name)) if family(name) in families else len(families) for name in names}
     return sorted(rank, key=lambda name: (rank[name], _by_value(name)))
 
@@ -68,8 +83,9 @@ def _by_value(name: str) -> list[tuple[float, str]]:
 
 def colours(series: list[str]) -> dict[str, str]:
     """Return a colour for each name of a series: that of its family, the same in every picture."""
-    strangers = sorted({family(name) for name in series} - FAMILY_COLOURS.keys())
-    known = FAMILY_COLOURS | {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(strangers)}
+    named = family_colours()
+    strangers = sorted({family(name) for name in series} - named.keys())
+    known = named | {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(strangers)}
     return {name: known[family(name)] for name in series}
 
 

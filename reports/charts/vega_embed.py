@@ -80,7 +80,7 @@ def lines(charts: Iterable[Spec]) -> list[str]:
     return list(dict.fromkeys(name for scale in scales for name in scale["domain"]))
 
 
-def embedded(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
+def embed(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
     """Return a picture's specification as the page embeds it; a picture of panels becomes a chart a panel."""
     whole: Spec = chart.to_dict()
     panels: list[Spec] | None = whole.pop("vconcat", None)
@@ -98,13 +98,13 @@ def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
         _prepare(unit, tooltip)
     fields = set(_fields(panel))
     data = whole["datasets"]
-    used = {unit["data"]["name"]: as_csv(data[unit["data"]["name"]], fields) for unit in units if "data" in unit}
+    tables = {unit["data"]["name"]: as_csv(data[unit["data"]["name"]], fields) for unit in units if "data" in unit}
     for unit in units:
         if "data" in unit:
-            unit["data"] = {"name": unit["data"]["name"], "format": used[unit["data"]["name"]]["format"]}
-    kept = {key: value for key, value in panel.items() if key not in ("config", "$schema")}
-    values = {name: found["values"] for name, found in used.items()}
-    return kept | {"datasets": values, "width": "container", "height": height, "params": [{"name": HIDDEN, "value": []}]}
+            unit["data"] = {"name": unit["data"]["name"], "format": tables[unit["data"]["name"]]["format"]}
+    rest = {key: value for key, value in panel.items() if key not in ("config", "$schema")}
+    values = {name: table["values"] for name, table in tables.items()}
+    return rest | {"datasets": values, "width": "container", "height": height, "params": [{"name": HIDDEN, "value": []}]}
 
 
 def _prepare(unit: Spec, tooltip: Tooltip) -> None:
@@ -116,10 +116,10 @@ def _prepare(unit: Spec, tooltip: Tooltip) -> None:
     if encoding.get("color", {}).get("field") == "series":
         unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum.series) < 0"}, *unit.get("transform", ())]
         unit["mark"] = unit["mark"] | {"tooltip": True}
-        encoding["tooltip"] = [_shown(*part) for part in tooltip]
+        encoding["tooltip"] = [_channel(*part) for part in tooltip]
 
 
-def _shown(field: str, kind: str, title: str) -> Spec:
+def _channel(field: str, kind: str, title: str) -> Spec:
     return {"field": field, "type": "quantitative", "format": ".6g", "title": title} if kind == "Q" else _text(field, title)
 
 

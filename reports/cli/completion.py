@@ -20,10 +20,10 @@ def methods(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
 def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the registered scenes, scene files, and folders on the way to one, that the last of several may become."""
     before, last = _last(incomplete)
-    found = [*_registered("scenes", last), *_files(last)]
-    if not before and (not found or found == [f"{found[0].rstrip('/')}/"]):
+    names = [*_registered("scenes", last), *_files(last)]
+    if not before and (not names or names == [f"{names[0].rstrip('/')}/"]):
         return [CompletionItem(incomplete, type="file")]  # the shell knows ~ and puts no space after the only folder
-    return [CompletionItem(before + name) for name in found]
+    return [CompletionItem(before + name) for name in names]
 
 
 def _last(incomplete: str) -> tuple[str, str]:
@@ -32,9 +32,9 @@ def _last(incomplete: str) -> tuple[str, str]:
 
 
 def _registered(group: str, start: str) -> list[str]:
-    from conservative.registry import registered
+    from conservative.entry_points import list_entries
 
-    return [name for name in registered(f"conservative.{group}") if name.startswith(start)]
+    return [name for name in list_entries(f"conservative.{group}") if name.startswith(start)]
 
 
 def _files(start: str) -> list[str]:
@@ -44,6 +44,6 @@ def _files(start: str) -> list[str]:
         entries = sorted(Path(folder + slash).iterdir())
     except OSError:
         return []
-    shown = [path for path in entries if path.name.startswith(name) and (name or not path.name.startswith("."))]
-    endings = ((path, "/" if path.is_dir() else "") for path in shown)
+    visible = [path for path in entries if path.name.startswith(name) and (name or not path.name.startswith("."))]
+    endings = ((path, "/" if path.is_dir() else "") for path in visible)
     return [f"{folder}{slash}{path.name}{end}" for path, end in endings if end or path.suffix == ".toml"]

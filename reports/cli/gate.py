@@ -1,82 +1,40 @@
-"""What `conservative gate` does: read results and baseline, and compare or accept."""
+"""`conservative gate`."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, cast
 
-from conservative.benchmarks.gate import baseline, results
-from conservative.benchmarks.gate import compare as comparison
+import click
 
+from .options import epilog
 
-@dataclass(frozen=True)
-class Compared:
-    """The verdict on each file of results."""
-
-    verdicts: Sequence[comparison.Verdict]
-
-    @property
-    def passed(self) -> bool:
-        """Whether the gate is passed by all."""
-        return all(verdict.passed for verdict in self.verdicts)
-
-    def as_json(self) -> str:
-        """Return verdicts with their violations and notes as JSON."""
-        verdicts = [{"passed": verdict.passed, **asdict(verdict)} for verdict in self.verdicts]
-        return json.dumps({"passed": self.passed, "verdicts": verdicts}, indent=2, ensure_ascii=False)
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.verdicts))
+TIMES = "required: fail where the baseline has no times of this machine; known: then compare all but times, and say so."
 
 
-@dataclass(frozen=True)
-class Accepted:
-    """The baseline that was written, how many rows it has, and the new entry of its history."""
+@click.command(
+    short_help="Compare benchmarks with a baseline.",
+    epilog=epilog(
+        "pytest --benchmark --gate                     run and compare; leaves the results where this command finds them",
+        "conservative gate                             compare them again",
+        'conservative gate --update "Fewer corrections"   accept them, with the reason',
+        "conservative gate --json | jq '.verdicts[].violations'",
+    ),
+)
+@click.argument("results", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--baseline", type=click.Path(path_type=Path), help="The baseline.  [default: benchmarks/baseline.json]")
+@click.option("--times", type=click.Choice(["required", "known"]), default="required", show_default=True, help=TIMES)
+@click.option(
+    "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."
+)
+@click.option("--json", "as_json", is_flag=True, help="Violations and notes, or the new entry of the history, as JSON.")
+def gate(results: tuple[Path, ...], baseline: Path | None, times: str, update: str | None, as_json: bool) -> None:
+    """Compare RESULTS of `pytest --benchmark` with the baseline; by default those of the last run with --gate.
 
-    path: Path
-    rows: int
-    entry: Mapping[str, Any]
-    passed: bool = True
-
-    def as_json(self) -> str:
-        """Return it as JSON."""
-        content = {"passed": self.passed, "baseline": str(self.path), "rows": self.rows, "entry": dict(self.entry)}
-        return json.dumps(content, indent=2, ensure_ascii=False)
-
-    def __str__(self) -> str:
-        changes = [f"{len(self.entry[kind])} {kind}" for kind in ("added", "changed", "removed")]
-        return f"{self.path}: {self.rows} rows from {self.entry['runs']} runs; {', '.join(changes)}"
-
-
-def gate(paths: Sequence[Path], kept: Path | None, times: str) -> Compared:
-    """Return the verdicts on each file of results.
-
-    Raises
-    ------
-    BadInput
-        A file holds no results, or there is no baseline.
+    Exits with 1 and a line for each violation, or with 2 where there is no baseline to compare with.
     """
-    before = baseline.read(kept or baseline.PATH)
-    return Compared([comparison.judged(before, found, cast(comparison.Times, times)) for found in _read(paths)])
+    from ..tables.gate import accept, compare
 
-
-def update(paths: Sequence[Path], kept: Path | None, reason: str) -> Accepted:
-    """Write the baseline that accepts results, and return what changed.
-
-    Raises
-    ------
-    BadInput
-        A file holds no results, no reason is given, or the results cannot be accepted; the baseline is there but damaged.
-    """
-    path = kept or baseline.PATH
-    before = baseline.read(path) if path.exists() else None
-    after = baseline.updated(before, _read(paths), reason)
-    baseline.write(after, path)
-    return Accepted(path, len(after.rows), after.history[-1])
-
-
-def _read(paths: Sequence[Path]) -> list[results.Results]:
-    return [results.read(path) for path in (paths or [results.FOLDER / results.FILE])]
+    answer = compare(results, baseline, times) if update is None else accept(results, baseline, update)
+    click.echo(answer.json_text() if as_json else answer)
+    if not answer.passed:
+        raise click.exceptions.Exit(1)

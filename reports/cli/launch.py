@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from conservative.errors import MissingExtra
-from conservative.extras import require_extra
+from conservative.errors import MissingExtra, require_extra
 
 
 def launch() -> None:

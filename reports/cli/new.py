@@ -1,28 +1,25 @@
-"""What `conservative new --json` says: the keys of a scene file with their meanings, what else there is, and a whole file."""
+"""`conservative new`."""
 
 from __future__ import annotations
 
-import json
-import tomllib
-from collections.abc import Iterator
-from functools import reduce
-from typing import Any
+import click
 
-from conservative.scene_files.scene_file import choices, template
-from conservative.scene_files.toml_reader import key_lines
+from .options import epilog
 
 
-def as_json() -> str:
-    """Return as JSON: `keys` of the file that `conservative new` writes, the `choices` of others, and its `text`."""
-    text = template()
-    return json.dumps({"keys": list(_keys(text)), "choices": choices(), "text": text}, indent=2, ensure_ascii=False)
+@click.command(
+    short_help="Write a scene file to start from.",
+    epilog=epilog(
+        "conservative new > my_body.toml",
+        "conservative run my_body.toml",
+        "conservative new --json | jq '.choices.shape'",
+    ),
+)
+@click.option("--json", "as_json", is_flag=True, help="Keys with their meanings, what else there is, and the text, as JSON.")
+def new(as_json: bool) -> None:
+    """Print a scene file with every key explained; every command takes such a file where it takes the name of a scene."""
+    from conservative.scene_files.scene_file import template
 
+    from ..tables.scene_file import json_text
 
-def _keys(text: str) -> Iterator[dict[str, Any]]:
-    """Yield every key that has a value, in the order of the file; what it means is the comment behind it."""
-    values, lines = tomllib.loads(text), text.splitlines()
-    for key, line in key_lines(text).items():
-        value: Any = reduce(lambda table, name: table[name], key, values)
-        if not isinstance(value, dict):
-            meaning = lines[line - 1].partition("#")[2].strip()
-            yield {"key": ".".join(key), "value": value, "line": line, "meaning": meaning}
+    click.echo(json_text() if as_json else template(), nl=as_json)

@@ -1,36 +1,71 @@
-"""What `conservative recommend` shows: what to use, what that costs and does, and the probe runs behind it."""
+"""`conservative recommend`."""
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+import signal
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from conservative import registry
-from conservative.benchmarks.recommendation.extrapolation import Drift
-from conservative.benchmarks.recommendation.probe import Probe
-from conservative.benchmarks.recommendation.recommend import Advice, Recommendation, question, recommend
-from conservative.benchmarks.studies.case import OK
-from conservative.benchmarks.studies.selection import tolerance_setting
-from conservative.errors import BadInput
+import click
 
-from ..labels import shown
-from ..terminal.atomic_files import text_file
-from ..terminal.progress import Step
+from conservative.errors import require_extra
 
-REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
-FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
-PROBES = ("method", "setting", "run, s", "error, rad", "to expect, rad")
-KEPT = 1e-13
-"""Relative drift up to which a quantity is called kept."""
+from ..terminal.interrupts import interruptible
+from . import completion
+from .options import epilog, split_names
+
+if TYPE_CHECKING:
+    from conservative.benchmarks.recommendation.recommend import Recommendation
+
+    from ..terminal.progress import Step
+
 FILES = ("recommendation.json", "recommendation.svg")
 
 
-def run(
-    scene_name: str, error: float, duration: float | None, engines: Sequence[str], limit: float, out: Path | None, step: Step
+@click.command(
+    short_help="Say which method, step or tolerance a body needs.",
+    epilog=epilog(
+        "conservative recommend my_body.toml --error 1e-6 --duration 3600",
+        "conservative recommend brick_flip --error 1e-4 --engine mujoco",
+        "conservative recommend lagrange_top --json --out recommended | jq .cheapest",
+    ),
+)
+@click.argument("scene", shell_complete=completion.scenes)
+@click.option("--error", type=float, default=1e-6, show_default=True, help="Largest attitude error over the duration, rad.")
+@click.option("--duration", type=float, help="s.  [default: the scene's]")
+@click.option("--engine", multiple=True, metavar="A,B", shell_complete=completion.methods, help="[default: all installed]")
+@click.option(
+    "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for recommendation.json and recommendation.svg.")
+def recommend(
+    scene: str,
+    error: float,
+    duration: float | None,
+    engine: tuple[str, ...],
+    cost_limit: float,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Probe our methods and every engine on SCENE, a name or a file, and say what reaches the error, at what cost and drift.
+
+    What a probe cannot cover of the duration is extrapolated by a law that is told with it.
+    """
+    require_extra("conservative recommend", "report")
+    from ..tables.recommendation import json_text
+    from ..terminal.progress import progress
+
+    with interruptible(signal.SIGTERM), progress() as step:
+        recommendation = _answer(scene, error, duration, split_names("engine", engine), cost_limit, out, step)
+    if as_json:
+        click.echo(json_text(recommendation))
+    else:
+        _show(recommendation)
+
+
+def _answer(
+    scene: str, error: float, duration: float | None, engines: list[str], cost_limit: float, out: Path | None, step: Step
 ) -> Recommendation:
     """Return the recommendation; with `out` it is left there as JSON and as a picture, too.
 
@@ -41,20 +76,35 @@ def run(
     MissingEngine
         An engine that is named is not installed.
     """
-    asked = question(registry.scene(scene_name), error, duration, engines or None, limit)
+    from contextlib import ExitStack
+
+    from conservative import registry
+    from conservative.benchmarks.recommendation.question import ask
+    from conservative.benchmarks.recommendation.recommend import recommend as answer
+
+    from ..terminal.atomic_files import text_file
+
+    question = ask(registry.scene(scene), error, duration, engines or None, cost_limit)
     with ExitStack() as files:
         streams = [files.enter_context(text_file(path, "out")) for path in _paths(out)]
-        found = recommend(asked, step)
-        if streams:
-            from ..charts.recommendation import svg
+        recommendation = answer(question, step)
+        for stream, content in zip(streams, _contents(recommendation) if streams else (), strict=True):
+            stream.write(content)
+    return recommendation
 
-            for stream, content in zip(streams, (as_json(found), svg(found)), strict=True):
-                stream.write(content)
-    return found
+
+def _contents(recommendation: Recommendation) -> tuple[str, str]:
+    """Return the contents of `FILES`."""
+    from ..charts.recommendation import svg
+    from ..tables.recommendation import json_text
+
+    return json_text(recommendation), svg(recommendation)
 
 
 def _paths(out: Path | None) -> list[Path]:
     """Return the files of a recommendation; their folder is made if it is not there."""
+    from conservative.errors import BadInput
+
     if out is None:
         return []
     try:
@@ -64,170 +114,11 @@ def _paths(out: Path | None) -> list[Path]:
     return [out / name for name in FILES]
 
 
-def setting(probe: Probe) -> str:
-    """Return the setting of a probe as text: a step or a tolerance."""
-    name = tolerance_setting(probe.method)
-    return f"dt = {probe.dt:.7g} s" if name is None else f"{name} = {probe.setting:.0e}"
-
-
-def called(advice: Advice) -> str:
-    """Return what to call the method of an advice, with its engine's version, without the setting looked for."""
-    if advice.best is None:
-        return shown(advice.line, "")
-    method = advice.best.method
-    name = shown(method.name, method.label)
-    tolerance = tolerance_setting(method)
-    return (
-        name if tolerance is None else name.replace(f"{tolerance}={advice.best.setting:g}", "").replace(" ,", " ").strip(" ,")
-    )
-
-
-def finite(value: float) -> float | None:
-    """Return the value, None where JSON has no number for it."""
-    return value if math.isfinite(value) else None
-
-
-def as_json(found: Recommendation) -> str:
-    """Return everything as JSON; null stands for what could not be measured, and for an attitude that is lost."""
-    bench, amplified = found.bench, found.bench.amplification
-    content = {
-        "scene": bench.scene.name,
-        "error": bench.error,
-        "duration": bench.duration,
-        "cost_limit": bench.cost_limit,
-        "cheapest": found.cheapest.line if found.cheapest else None,
-        "recommendations": [_advice(advice) for advice in found.advice],
-        "not_installed": list(found.missing),
-        "truth": {
-            "by": found.truth.names[0],
-            "checked_by": found.truth.names[1],
-            "agreement": found.truth.agreement_rad,
-            "checked_until": found.truth.checked_until,
-            "until": bench.truth_until,
-        },
-        "motion": {
-            "unstable": amplified.unstable,
-            "disturbance": amplified.disturbance,
-            "becomes": amplified.becomes,
-            "lost": amplified.lost,
-            "measured_until": amplified.until,
-            "by": amplified.label,
-        },
-    }
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def _advice(advice: Advice) -> dict[str, Any]:
-    order = advice.order
-    return {
-        "name": advice.line,
-        "called": called(advice),
-        "role": advice.role,
-        "reached": advice.reached,
-        "reason": advice.reason,
-        "cost": finite(advice.cost),
-        "observed_order": finite(order.slope) if order else None,
-        "best": _probe(advice.best) if advice.best else None,
-        "probes": [_probe(probe) for probe in advice.probes],
-    }
-
-
-def _probe(probe: Probe) -> dict[str, Any]:
-    tolerance = tolerance_setting(probe.method)
-    return {
-        "method": probe.method.name,
-        tolerance or "dt": probe.setting,
-        "length": probe.length,
-        "error": finite(probe.error),
-        "expected": finite(probe.expected),
-        "law": probe.law,
-        "holds": finite(probe.holds),
-        "drift": {d.name: {"measured": d.measured, "expected": d.expected, "secular": d.secular} for d in probe.drifts},
-        "status": probe.status,
-    }
-
-
-def show(found: Recommendation) -> None:
+def _show(recommendation: Recommendation) -> None:
     """Print what was asked, what reaches it, what does not, the probes, and what all that rests on."""
-    from rich.console import Console
+    from ..tables.recommendation import notes, question_text, tables
+    from ..terminal.tables import print_tables, print_text
 
-    console = Console(soft_wrap=False)
-    bench = found.bench
-    asked = f"{bench.scene.name}: attitude error of at most {bench.error:g} rad over {bench.duration:g} s\n"
-    console.print(asked, style="bold", markup=False)
-    reaching = sorted((advice for advice in found.advice if advice.reached), key=lambda advice: advice.cost)
-    failing = [advice for advice in found.advice if advice.best and not advice.reached]
-    limit = f"What does not, at up to {bench.cost_limit:g} s of computing per simulated second"
-    if reaching:
-        console.print(_table("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching]))
-    if failing:
-        console.print(_table(limit, FAILING, [_failing(advice) for advice in failing]))
-    probed = [row for advice in found.advice for row in _probed(advice)]
-    console.print(_table("The probe runs; <- is what is in the tables above", PROBES, probed))
-    console.print("\n".join(notes(found)), markup=False, highlight=False)
-
-
-def notes(found: Recommendation) -> list[str]:
-    """Return in words what the figures rest on: laws of growth, truth, stability, what could not be tried."""
-    bench, truth, amplified = found.bench, found.truth, found.bench.amplification
-    lines = [f"{called(a)}: {a.best.law}." for a in found.advice if a.best]
-    lines.append(
-        f"Truth: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the first "
-        f"{truth.checked_until:.3g} s; errors are measured over up to {bench.truth_until:.4g} s."
-    )
-    stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
-    after = ", and by anything after that" if amplified.lost else ""
-    lines.append(
-        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.becomes:.2g} rad within "
-        f"{amplified.until:.4g} s{after} ({amplified.label}): {stable}."
-    )
-    lines.append("Cost: the fastest of interleaved runs in this machine's own time; ratios are what lasts.")
-    lines += [f"{called(a)}: {a.reason}." for a in found.advice if not a.reached]
-    lines += [f"{name}: not installed." for name in found.missing]
-    return lines
-
-
-def _reaching(advice: Advice) -> tuple[str, ...]:
-    assert advice.best is not None  # what reaches an error has run
-    probe = advice.best
-    return called(advice), setting(probe), _microseconds(advice.cost), f"{probe.expected:.1e}", drift_text(probe.drifts)
-
-
-def _failing(advice: Advice) -> tuple[str, ...]:
-    assert advice.best is not None  # the caller leaves out those without
-    probe = advice.best
-    expected = f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
-    cost, drift = _microseconds(advice.cost), drift_text(probe.drifts)
-    return called(advice), setting(probe), cost, f"{probe.holds:.2g} s", expected, drift
-
-
-def _probed(advice: Advice) -> Iterator[tuple[str, ...]]:
-    order = "" if advice.order is None else "no order seen" if advice.order.reason else f"order {advice.order.slope:.2f}"
-    for i, probe in enumerate(advice.probes):
-        error = f"{probe.error:.2e}" if probe.status == OK else probe.status
-        expected = f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
-        name = (called(advice), order)[i] if i < 2 else ""
-        yield name, setting(probe) + (" <-" if probe is advice.best else ""), f"{probe.length:.4g}", error, expected
-
-
-def drift_text(drifts: Sequence[Drift]) -> str:
-    """Return the drifts to expect, relative: an arrow marks one that goes on, `kept` stands for a few rounding units."""
-    moved = [f"{d.name} {d.expected:.0e}{' ↗' if d.secular else ''}" for d in drifts if d.expected > KEPT]
-    return ", ".join(moved) or "kept"
-
-
-def _microseconds(cost: float) -> str:
-    return "" if math.isnan(cost) else f"{cost * 1e6:.3g}"
-
-
-def _table(title: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> object:
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=escape(title), box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
-    for name in header:
-        table.add_column(name)
-    for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
-    return table
+    print_text(question_text(recommendation), style="bold")
+    print_tables(tables(recommendation))
+    print_text("\n".join(notes(recommendation)))

@@ -1,161 +1,45 @@
-"""What `conservative run` does: one run, its summary, its samples."""
+"""`conservative run`."""
 
 from __future__ import annotations
 
-import csv
-import json
-import math
-from collections.abc import Iterable
-from contextlib import nullcontext
-from dataclasses import asdict, replace
-from io import StringIO
 from pathlib import Path
-from typing import IO, Any
 
-from conservative import registry
-from conservative.attitude import orthonormality
-from conservative.benchmarks.measures.timing import elapsed
-from conservative.errors import BadInput
-from conservative.invariants import Invariant, sizes
-from conservative.method import Grid, Method, grid_for, integrate, require_support
-from conservative.presentation import COLUMNS
-from conservative.presentation import samples as samples_of
-from conservative.scene import Scene
-from conservative.trajectory import Trajectory
+import click
 
-from ..terminal.atomic_files import text_file
-from ..terminal.progress import Expect
+from conservative.errors import require_extra
 
-TRIAL = 100
-"""Part of the steps of a run, as a divisor, that is run before it to tell how long it takes."""
-SAMPLES = 1_000_000
-"""Samples that are kept at most; every step is one in runs of no more steps."""
-STEPS = 10**11
-"""Steps that are taken at most: a day's work of a fast method."""
+from . import completion
+from .options import epilog
 
 
-def run(
-    scene_name: str,
-    method_name: str,
-    dt: float | None,
-    t_end: float | None,
-    samples: Path | None,
-    expect: Expect | None = None,
-) -> dict[str, Any]:
-    """Integrate and return the summary; samples go to the file `samples` if there is one; `expect` is told how long it takes.
+@click.command(
+    short_help="Integrate one scene once.",
+    epilog=epilog(
+        "conservative run brick_flip --method reduced --dt 0.01",
+        "conservative run lagrange_top -m mujoco:RK4 --dt 0.001 --t-end 2 --json",
+        "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
+    ),
+)
+@click.argument("scene", shell_complete=completion.scenes)
+@click.option(
+    "--method", "-m", default="reduced", show_default=True, shell_complete=completion.methods, help="Name, with settings."
+)
+@click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
+@click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+@click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
+@click.option("--csv", type=click.Path(path_type=Path), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
+def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
+    """Integrate SCENE once and show how it ended, its drifts and its last state.
 
-    Raises
-    ------
-    BadInput
-        A name, a setting, dt, t_end or the file cannot be used; found before the run starts.
-    MissingEngine
-        The method's engine is not installed.
+    Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
+    A run that fails leaves what it reached in the file, and exits with 1.
     """
-    scene, method = registry.scene(scene_name), registry.method(method_name)
-    grid = _grid(scene, method, scene.dt if dt is None else dt, t_end)
-    with text_file(samples, "csv") if samples else nullcontext() as stream:
-        if expect is not None:
-            _trial(scene, method, grid, stream is not None, expect)
-        return _done(scene, method, grid, stream)
+    require_extra("conservative run", "report", "rich")
+    from ..run.single_run import json_text, run_once, summary_text
+    from ..terminal.progress import waiting
 
-
-def _grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
-    """Return the steps and samples, or find what `integrate` would refuse before a file is opened."""
-    try:
-        grid = grid_for(scene, dt, t_end)
-    except OverflowError:  # more steps than a float can count
-        grid = Grid(dt or 0.0, STEPS + 1)
-    require_support(method, scene)
-    if grid.n_steps > STEPS:
-        raise BadInput("dt", f"{grid.dt:g}, for more than {STEPS:.0e} steps", "a longer step, or a shorter run (--t-end)")
-    return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
-
-
-def _done(scene: Scene, method: Method, grid: Grid, stream: IO[str] | None) -> dict[str, Any]:
-    duration = grid.dt * grid.n_steps
-    trajectory = integrate(scene, grid.dt, method, duration, grid.every, on_failure="return")
-    if stream is not None:
-        write_samples(trajectory, stream)
-    return summary_of(trajectory, method, grid.dt)
-
-
-def _trial(scene: Scene, method: Method, grid: Grid, written: bool, expect: Expect) -> None:
-    """Do the first of `TRIAL` parts, and again once it is compiled, to tell how long all take; of few steps say nothing."""
-    if grid.n_steps >= TRIAL:
-        part = replace(grid, n_steps=grid.n_steps // TRIAL)
-        _done(scene, method, part, None)
-        expect(TRIAL * elapsed(lambda: _done(scene, method, part, StringIO() if written else None)))
-
-
-def summary_of(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:
-    """Return what a run was, how it ended, its drifts and its last state."""
-    scene = trajectory.scene
-    return {
-        "scene": scene.name,
-        "method": method.name,
-        "label": trajectory.label,
-        "dt": dt,
-        "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,
-        "status": str(trajectory.outcome),
-        "counters": asdict(trajectory.counters),
-        "drift": {invariant.name: _drift(trajectory, invariant) for invariant in scene.invariants},
-        "orthonormality": float(orthonormality(trajectory.R_WB).max(initial=0.0)),
-        "last": _last(trajectory),
-    }
-
-
-def _drift(trajectory: Trajectory, invariant: Invariant) -> float:
-    """Return the largest change of an invariant, relative to its scale."""
-    return float(sizes(trajectory.drift(invariant)).max(initial=0.0))
-
-
-def _last(trajectory: Trajectory) -> dict[str, Any] | None:
-    if not len(trajectory):
-        return None
-    return {
-        "t": float(trajectory.t[-1]),
-        "R_WB": trajectory.R_WB[-1].tolist(),
-        "w_WB_B": trajectory.w_WB_B[-1].tolist(),
-        "energy": float(trajectory.energy[-1]),
-        "momentum_W": trajectory.momentum_W[-1].tolist(),
-    }
-
-
-def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
-    """Write one line a sample, with every digit, under `COLUMNS` (SI units; R_WB by rows)."""
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(samples_of(trajectory).tolist())
-
-
-def as_json(summary: dict[str, Any]) -> str:
-    """Return the summary as JSON."""
-    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def as_text(summary: dict[str, Any]) -> str:
-    """Return the summary for a person."""
-    counters = ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
-    lines = [
-        ("scene", summary["scene"]),
-        ("method", summary["label"]),
-        ("status", summary["status"]),
-        ("run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"),
-        ("work", counters),
-        *((f"drift of {name}", f"{value:.2e} (relative)") for name, value in summary["drift"].items()),
-        ("orthonormality", f"{summary['orthonormality']:.2e}"),
-        *_last_lines(summary["last"]),
-    ]
-    width = max(len(name) for name, _ in lines)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
-
-
-def _last_lines(last: dict[str, Any] | None) -> list[tuple[str, str]]:
-    if last is None:
-        return []
-    rows = [(f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1)]
-    return [(f"at t = {last['t']:g} s", ""), *rows, ("w_WB_B, rad/s", _numbers(last["w_WB_B"]))]
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:+.12g}" for value in values)
+    with waiting(f"{scene}: {method}") as expect:
+        summary = run_once(scene, method, dt, t_end, csv, expect)
+    click.echo(json_text(summary) if as_json else summary_text(summary))
+    if summary["status"] != "ok":
+        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['status']}")

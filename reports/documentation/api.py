@@ -1,4 +1,6 @@
-"""Pages for every public name, made from the docstrings by pdoc: `python -m conservative.reports.documentation.api` writes them into the folder api/.
+"""Pages for every public name, made from the docstrings by pdoc, into the folder api/.
+
+    python -m conservative.reports.documentation.api
 
 They open from disk without a network. What stands here is pdoc's settings: docstrings are NumPy's, and formulas are plain text.
 """
@@ -9,6 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
+import conservative
 from conservative.errors import MissingEngine
 from conservative.version import VERSION
 
@@ -44,6 +47,7 @@ def write(folder: Path) -> Path:
     except ImportError as error:
         raise MissingEngine("pdoc", "pdoc") from error
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
+    tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows what is imported, and these come on demand
     _name_aliases()
     pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")
     pdoc.pdoc(*MODULES, output_directory=folder)
@@ -52,10 +56,10 @@ def write(folder: Path) -> Path:
 
 def _name_aliases() -> None:
     """Put classes that have nothing but a name in place of the aliases, in all that is imported of ours."""
-    shown = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
+    stand_ins = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
     ours = [module for name, module in sys.modules.items() if name.partition(".")[0] == "conservative"]
     for module in ours:
-        vars(module).update({name: shown[name] for name in ALIASES if name in vars(module)})
+        vars(module).update({name: stand_ins[name] for name in ALIASES if name in vars(module)})
 
 
 def main() -> None:

@@ -1,4 +1,6 @@
-"""The README's three pictures: `python -m conservative.reports.documentation.readme_pictures` measures and draws them anew, into reports/pictures/.
+"""The README's three pictures, drawn anew into reports/pictures/.
+
+    python -m conservative.reports.documentation.readme_pictures
 
 They are those of a report, of fewer methods: time against error, drift of the energy, and the polhode on the momentum sphere.
 Times mean something on a quiet machine only.
@@ -15,15 +17,17 @@ import altair as alt
 import pandas as pd
 
 from conservative import registry
-from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import long_runs, studies
+from conservative.benchmarks.studies.study import Study
 from conservative.method import Method
 from conservative.scene import Scene
 
 from .. import document
 from ..charts import figures, spheres
 from ..charts.style import styled
-from ..tables import work_precision
+from ..tables import lines, work_precision
 from ..terminal.progress import Step, progress
 
 FOLDER = Path(__file__).parents[1] / "pictures"
@@ -62,35 +66,37 @@ def _methods(names: Sequence[str]) -> tuple[Method, ...]:
     return tuple(registry.method(name) for name in names)
 
 
+def _samples(study: str, scene: Scene, methods: tuple[Method, ...]) -> pd.DataFrame:
+    findings = studies.findings(Study(study, (scene,), methods))
+    return samples.frame(finding for finding in findings if isinstance(finding, Samples))
+
+
 def time_against_error(scene: Scene, methods: tuple[Method, ...], quick: bool) -> Any:
     """Return the report's chart of time against error."""
-    study = studies.Study("work_precision", (scene,), methods, quick)
+    study = Study("work_precision", (scene,), methods, quick)
     table = measurement.frame(list(studies.rows(study)))
     return figures.work_precision(work_precision.points(table), scene.name)
 
 
 def drift_of_energy(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the report's chart of drifts, of the energy alone."""
-    found = pd.concat(
-        [long_runs.measured(long_runs.case_for(scene, method), False)[1] for method in methods], ignore_index=True
-    )
-    return figures.drift(found[found["invariant"] == "energy"], scene.name)
+    drifts = lines.drifts(_samples("long_runs", scene, methods))
+    return figures.drift(drifts[drifts["quantity"] == "energy"], scene.name)
 
 
 def polhodes(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the page's spheres side by side, each under the name of its method."""
-    curves = spheres.curves((scene,), methods)
+    curves = lines.curves(_samples("sphere_curves", scene, methods))
     names = list(dict.fromkeys(curves["series"]))
-    panels = [spheres.chart(curves, scene.name, name) for name in names]
-    shared = panels[0]["params"]
-    kept = [{key: panel[key] for key in ("width", "height", "layer")} for panel in panels]
-    titled = [panel | {"title": name} for panel, name in zip(kept, names, strict=True)]
+    charts = [spheres.chart(curves, scene.name, name) for name in names]
+    panels = [{key: chart[key] for key in ("width", "height", "layer")} for chart in charts]
+    titles = [panel | {"title": name} for panel, name in zip(panels, names, strict=True)]
     end = scene.t_end * long_runs.DURATIONS
     title = {
         "text": f"{scene.name}: angular momentum in body axes, on its sphere",
         "subtitle": f"over {end:g} s in steps of {scene.dt:g} s; what loses momentum leaves the curve",
     }
-    return styled(alt.HConcatChart.from_dict({"title": title, "params": shared, "hconcat": titled}))
+    return styled(alt.HConcatChart.from_dict({"title": title, "params": charts[0]["params"], "hconcat": titles}))
 
 
 def write(folder: Path, quick: bool, step: Step) -> list[Path]:

@@ -1,33 +1,32 @@
 """What is measured of a report that is not written yet: one file beside its folder, so that `--resume` can go on.
 
-The file is replaced as a whole whenever a piece is finished, and goes when the report is there. It says on which terms it was
-made: measurements are only ever put together with others of the same scenes, methods, versions, source and machine.
+The file is replaced as a whole after each study, and goes when the report is there. It says on which terms it was measured:
+measurements are only ever put together with others of the same scenes, methods, versions, source and machine.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shlex
-from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.suite.points import Point
+from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
-from conservative.methods.reduced import Reduced
 
 from ..terminal.atomic_files import text_file
 from .plan import Plan
 from .provenance import Provenance
+from .terms import differences, terms
 
-FORMAT = 1
-_SOURCE = (".", "references", "benchmarks")
-"""What decides about a measurement; the rest of `reports` only shows it."""
-_SHOWN = 3
+FORMAT = 2
+_MOST_DIFFERENCES = 3
 """How many differences a complaint has at most."""
 
 
@@ -36,22 +35,25 @@ class Process:
     """What measured a piece: the command, when it began, and the commit (see `Provenance`)."""
 
     command: str
-    begun: str
+    start: str
     commit: str
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A finished piece: its rows, samples of its picture under `long_runs.COLUMNS` if it has one, and what measured it."""
+    """All that one study measured: its rows, lines of its pictures, and the process that measured it."""
 
     rows: tuple[Measurement, ...]
-    samples: tuple[tuple[Any, ...], ...]
+    samples: tuple[Samples, ...]
     by: Process
 
 
 @dataclass(frozen=True)
-class Partial:
-    """The finished pieces of a report by name, and the file that has them too, except before the first."""
+class Checkpoint:
+    """The pieces of a report that are done, by name, and the file that has them too, except before the first.
+
+    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the `process` that goes on, and `pieces`.
+    """
 
     path: Path
     names: tuple[str, ...]
@@ -59,11 +61,14 @@ class Partial:
     process: Process
     pieces: dict[str, Piece] = field(default_factory=dict)
 
-    def keep(self, name: str, rows: list[Measurement], samples: list[list[object]] | None = None) -> None:
-        """Keep a finished piece, in the file as well; what an earlier report left there goes."""
-        self.pieces[name] = Piece(tuple(rows), tuple(map(tuple, samples or [])), self.process)
+    def keep(self, name: str, findings: Iterable[Finding]) -> None:
+        """Keep what a study finds, in the file as well; what an earlier report left there goes."""
+        every = list(findings)
+        rows = tuple(finding for finding in every if isinstance(finding, Measurement))
+        lines = tuple(finding for finding in every if isinstance(finding, Samples))
+        self.pieces[name] = Piece(rows, lines, self.process)
         with text_file(self.path, "out") as stream:
-            stream.write(_as_json(self))
+            stream.write(_content(self))
 
     def remove(self) -> None:
         """Remove the file: the report is written."""
@@ -71,7 +76,7 @@ class Partial:
 
     @property
     def story(self) -> str:
-        """Say what is finished, where it is and how to go on."""
+        """What is done, where it is and how to go on, in words."""
         if not self.pieces:
             return "nothing was finished, nothing is kept"
         command = self.process.command
@@ -82,11 +87,10 @@ class Partial:
     @property
     def earlier(self) -> tuple[str, ...]:
         """What other processes measured, one sentence each; empty where one process measured everything."""
-        found = groupby(self.pieces.items(), key=lambda item: item[1].by)
         return tuple(
             f"{', '.join(name for name, _ in items)}: measured by an earlier process, which was interrupted; "
-            f"begun {by.begun} at commit {by.commit} with `{by.command}`"
-            for by, items in found
+            f"begun {by.start} at commit {by.commit} with `{by.command}`"
+            for by, items in groupby(self.pieces.items(), key=lambda item: item[1].by)
             if by != self.process
         )
 
@@ -98,97 +102,65 @@ def path_for(out: Path) -> Path:
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
-def begun(made: Plan, out: Path, source: Provenance, resume: bool) -> Partial:
-    """Return what to begin with: nothing, or with `resume` what an earlier process has finished.
+def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint:
+    """Return what to begin with: nothing, or with `resume` what an earlier process has done.
 
     Raises
     ------
     BadInput
-        There is nothing to resume, or it was made on other terms; or the file is none of ours, so that it must stay.
+        There is nothing to resume, or it was measured on other terms; or the file is none of ours, so that it must stay.
     """
     path = path_for(out)
-    fresh = Partial(path, made.pieces, terms(made, source), Process(source.command, source.date, source.commit))
+    process = Process(source.command, source.date, source.commit)
+    fresh = Checkpoint(path, plan.names, terms(plan, source), process)
     if not path.exists():
         if resume:
             raise BadInput("resume", f"no {str(path)!r}", "the folder --out of a report that was interrupted")
         return fresh
-    was, pieces = read(path)
-    if not resume:
-        return fresh
-    different = list(differences(was["terms"], json.loads(json.dumps(fresh.terms))))
-    if different:
-        more = f" and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
-        raise BadInput(
-            "resume",
-            f"{str(path)!r}, which was made with {'; '.join(different[:_SHOWN])}{more}",
-            f"the same again (it was `{was['command']}`), or no --resume, to begin anew",
-        )
-    fresh.pieces.update(pieces)
+    before, pieces = read(path)
+    if resume:
+        _require_same_terms(path, before, fresh.terms)
+        fresh.pieces.update(pieces)
     return fresh
 
 
-def terms(made: Plan, source: Provenance) -> dict[str, Any]:
-    """Return what has to be the same for measurements to be put together, as what JSON knows."""
-    return {
-        "studies": list(made.pieces),
-        # What a scene is, whatever its file is called; that it is hashed as a point of `Reduced` is the same for all.
-        "scenes": {scene.name: Point(scene, Reduced()).definition for scene in made.scenes},
-        "methods": {method.name: method.label for method in made.methods},
-        "--quick": made.quick,
-        "--skip-missing": made.skip_missing,
-        "source": _source_hash(),
-        "machine": {key: source.machine[key] for key in ("processor", "cores")},
-        "versions": {"python": source.python, **source.compared},
-    }
+def _require_same_terms(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    """Raise `BadInput` unless a file, as `read` has it, was measured on the terms of now."""
+    different = list(differences(before["terms"], json.loads(json.dumps(now))))
+    if different:
+        more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
+        raise BadInput(
+            "resume",
+            f"{str(path)!r}, which was made with {'; '.join(different[:_MOST_DIFFERENCES])}{more}",
+            f"the same again (it was `{before['command']}`), or no --resume, to begin anew",
+        )
 
 
-def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """Yield in words what differs between two terms."""
-    for name in {**was, **now}:
-        old, new = was.get(name), now.get(name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            yield from (f"{name}: {key} {text}" for key, text in _between(old, new))
-        elif old != new:
-            yield f"{name} {_shown(old)}, now {_shown(new)}"
-
-
-def _between(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key in {**old, **new}:
-        if key not in new:
-            yield key, "(now without)"
-        elif key not in old:
-            yield key, "missing (now with)"
-        elif old[key] != new[key]:
-            yield key, f"{_shown(old[key])}, now {_shown(new[key])}"
-
-
-def _shown(value: Any) -> str:
-    return ", ".join(value) if isinstance(value, list) else str(value)
-
-
-def _source_hash() -> str:
-    """Return the hash of all source that decides about a measurement: a commit would not tell of changes, nor without git."""
-    root = Path(__file__).parents[2]
-    found = hashlib.sha256()
-    for place in _SOURCE:
-        path = root / place
-        for file in sorted(path.rglob("*.py")):
-            found.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
-    return found.hexdigest()[:12]
-
-
-def _as_json(partial: Partial) -> str:
+def _content(checkpoint: Checkpoint) -> str:
     """Return the file: floats come back as they are, nan as nan."""
-    pieces = {
-        name: {"by": vars(piece.by), "rows": [astuple(row) for row in piece.rows], "samples": piece.samples}
-        for name, piece in partial.pieces.items()
-    }
-    content = {"format": FORMAT, "command": partial.process.command, "terms": partial.terms, "pieces": pieces}
+    pieces = {name: _record(piece) for name, piece in checkpoint.pieces.items()}
+    content = {"format": FORMAT, "command": checkpoint.process.command, "terms": checkpoint.terms, "pieces": pieces}
     return json.dumps(content, ensure_ascii=False)
 
 
+def _record(piece: Piece) -> dict[str, Any]:
+    return {
+        "by": vars(piece.by),
+        "rows": list(map(measurement.flat, piece.rows)),
+        "samples": list(map(samples.flat, piece.samples)),
+    }
+
+
+def _piece(record: Mapping[str, Any]) -> Piece:
+    return Piece(
+        tuple(map(measurement.from_flat, record["rows"])),
+        tuple(map(samples.from_flat, record["samples"])),
+        Process(**record["by"]),
+    )
+
+
 def read(path: Path) -> tuple[dict[str, Any], dict[str, Piece]]:
-    """Return the content of a file of unfinished work, and its pieces.
+    """Return the command and terms of a file of unfinished work, and its pieces.
 
     Raises
     ------
@@ -199,12 +171,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Piece]]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']}")
-        pieces = {
-            name: Piece(
-                tuple(Measurement(*row) for row in piece["rows"]), tuple(map(tuple, piece["samples"])), Process(**piece["by"])
-            )
-            for name, piece in content["pieces"].items()
-        }
+        pieces = {name: _piece(record) for name, record in content["pieces"].items()}
         return {"command": str(content["command"]), "terms": dict(content["terms"])}, pieces
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         allowed = "unfinished work that an interrupted report left, or no such file: remove it"

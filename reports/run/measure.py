@@ -1,66 +1,45 @@
-"""What a report measures, piece by piece; each piece is kept as soon as it is finished."""
+"""What a report measures, study by study; each is kept in the checkpoint as soon as it is done."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.measures import measurement
-from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.studies import long_runs, studies
-from conservative.method import Role
+from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies.study import Progress
 
 from ..terminal.progress import Step
-from .checkpoint import Partial
+from .checkpoint import Checkpoint
 from .plan import Plan
 
-Report = Callable[[int, int, str], None]
-"""Called before each run: runs done, runs in all, and what comes next."""
 
-
-@dataclass(frozen=True)
-class Measured:
-    """What was measured: the tidy table, and drifts over time (see `long_runs.samples`)."""
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """All that a report measures: the tidy table (see `Measurement`), and the samples of lines (see `Samples`)."""
 
     table: pd.DataFrame
-    drifts: pd.DataFrame
+    samples: pd.DataFrame
 
 
-def measure(made: Plan, step: Step, kept: Partial) -> Measured:
-    """Return all rows, in the order of the plan: the studies, then long runs for the drift over time.
+def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
+    """Return rows and samples in the order of the plan.
 
-    What `kept` has is not measured again; what is measured is kept there.
+    What the checkpoint has is not measured again; what is measured is kept there.
     """
-    left = [name for name in made.pieces if name not in kept.pieces]
-    spans = made.spans(left)
-    by_name = {study.name: study for study in made.studies}
-    for name in left:
-        report = _within(step, name, spans[name])
-        if name in by_name:
-            kept.keep(name, list(studies.rows(by_name[name], report)))
-        else:
-            kept.keep(name, *_long_runs(made, report))
-    rows = [row for name in made.pieces for row in kept.pieces[name].rows]
-    return Measured(
-        measurement.frame(rows), pd.DataFrame(kept.pieces[long_runs.STUDY].samples, columns=list(long_runs.COLUMNS))
+    left = [study for study in plan.studies if study.name not in checkpoint.pieces]
+    spans = plan.spans(study.name for study in left)
+    for study in left:
+        checkpoint.keep(study.name, studies.findings(study, _progress(step, study.name, spans[study.name])))
+    pieces = [checkpoint.pieces[name] for name in plan.names]
+    return Measurements(
+        measurement.frame(row for piece in pieces for row in piece.rows),
+        samples.frame(line for piece in pieces for line in piece.samples),
     )
 
 
-def _within(step: Step, name: str, span: tuple[float, float]) -> Report:
-    """Return a piece's progress as a share of the whole."""
+def _progress(step: Step, name: str, span: tuple[float, float]) -> Progress:
+    """Return a study's progress as a share of the whole."""
     start, end = span
     return lambda done, total, what: step(start + (end - start) * done / total, f"{name.replace('_', ' ')}: {what}")
-
-
-def _long_runs(made: Plan, report: Report) -> tuple[list[Measurement], list[list[object]]]:
-    """Return the rows of the long runs, and the samples of their picture under `long_runs.COLUMNS`."""
-    pairs = [(scene, method) for scene in made.scenes for method in made.methods if method.role != Role.TRUTH]
-    rows, samples = [], []
-    for k, (scene, method) in enumerate(pairs):
-        report(k, len(pairs), f"{scene.name}: {method.name}")
-        found, picture = long_runs.measured(long_runs.case_for(scene, method), made.skip_missing)
-        rows += found
-        samples += picture.to_numpy(dtype=object).tolist()
-    return rows, samples

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
-from conservative.benchmarks.studies import long_runs, selection, studies
+from conservative.benchmarks.studies import selection, studies
+from conservative.benchmarks.studies.study import Study
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -17,11 +18,14 @@ SECONDS = {
     "work_precision": 2.5,
     "stability": 1.0,
     "hard_cases": 2.0,
-    long_runs.STUDY: 0.7,
+    "long_runs": 0.7,
+    "sphere_curves": 0.3,
+    "paper_figures": 0.1,
+    "import_time": 0.1,
 }
-"""How long each piece takes for one scene and one method, roughly: for the time left."""
-SHOWING = {"pictures": 6.0, "page": 12.0}
-"""How long what comes after the measurements takes, roughly."""
+"""How long each study takes for one scene and one method, roughly: for the time left."""
+RENDERING = {"pictures": 6.0, "page": 3.0}
+"""How long, s, what comes after the measurements takes, roughly."""
 QUICK = 0.3
 """How much of that a quick report takes."""
 
@@ -51,27 +55,29 @@ class Plan:
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
 
     @property
-    def studies(self) -> tuple[studies.Study, ...]:
+    def studies(self) -> tuple[Study, ...]:
         """What is measured, in this order; the hard cases only where nobody asked for less."""
-        crossed = studies.studies(self.scenes, self.methods, self.quick, self.skip_missing)
+        crossed = studies.crossed(self.scenes, self.methods, self.quick, self.skip_missing)
         return (*crossed, *studies.hard(self.methods, self.skip_missing)) if self.hard else crossed
 
     @property
-    def pieces(self) -> tuple[str, ...]:
-        """Names of the studies, then of the long runs. Each is measured in one process, so that its times can be compared."""
-        return (*(study.name for study in self.studies), long_runs.STUDY)
+    def names(self) -> tuple[str, ...]:
+        """Names of the studies. Each is measured in one process, so that its times can be compared."""
+        return tuple(study.name for study in self.studies)
 
     def spans(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
-        """Return when each of the pieces named begins and ends, and each part of showing them, as shares of all the time."""
+        """Return when each of the studies named begins and ends, and each part of rendering, as shares of all the time."""
         pairs = len(self.scenes) * len(self.methods)
         factor = QUICK if self.quick else 1.0
         costs = {name: factor * pairs * SECONDS[name] for name in names}
-        costs |= {name: factor * seconds for name, seconds in SHOWING.items()}
+        costs |= {name: factor * seconds for name, seconds in RENDERING.items()}
         ends = [end / sum(costs.values()) for end in accumulate(costs.values())]
         return dict(zip(costs, pairwise([0.0, *ends]), strict=True))
 
 
-def plan(scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False) -> Plan:
+def plan_report(
+    scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False
+) -> Plan:
     """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
-    chosen = selection.scenes(scenes) if scenes else selection.scenes()
-    return Plan(chosen, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard=not (scenes or quick))
+    values = selection.scenes(scenes) if scenes else selection.scenes()
+    return Plan(values, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard=not (scenes or quick))

@@ -1,53 +1,46 @@
-"""Claims, where they are made, what was measured, and whether they hold: the paper's, our own README's and the engines'."""
+"""Claims, where they are made, what was measured, and whether they hold: of families by their own word, and of the paper.
+
+`Method.claims` says where something is claimed of a family; `order`, `conserves` and `candidacy` of its settings say what.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies import paper_figures
-from conservative.benchmarks.studies.case import UNSUPPORTED
+from conservative import registry
+from conservative.benchmarks.measures.measure import Measure, key
+from conservative.declarations import BetterEnergy, Claims, Comparison, SameErrors
+from conservative.errors import MissingEngine
+from conservative.method import Method
+from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
-from . import orders
-from .overview import Cell, Cells
-from .tables import number
+from .cells import Cell, Grade, Table, number
+from .rows import keyed
 
-HOLDS, FAILS, OPEN = Cell("✓ holds", "good"), Cell("✗ does not hold", "bad"), Cell("– not measured here", "none")
-ENERGY = "energy drift max"
+HOLDS, FAILS, OPEN = (
+    Cell("✓ holds", Grade.GOOD),
+    Cell("✗ does not hold", Grade.BAD),
+    Cell("– not measured here", Grade.NONE),
+)
+ENERGY, ATTITUDE = key(Measure.DRIFT_MAX, "energy"), key(Measure.ATTITUDE_MAX)
 ROUND_OFF = 1e-12
 """Relative drift up to which a quantity is taken to be kept to round-off over the paper's runs."""
+NO_TRUNCATION = 1e-11
+"""Attitude error, rad, up to which a method is taken to have no truncation error over the paper's runs."""
 ORDER_MARGIN = 0.25
-"""How far an observed order may be from the declared one."""
+"""How far an observed order may be from the one claimed."""
+STUDY = "paper"
+"""Name of the study that most claims are held against."""
 
-PAPER, README = "paper", "README, Methods"
-MUJOCO = "MuJoCo documentation, Computation, Numerical integration"
-DECLARED = {
-    "convected": (2, PAPER),
-    "reduced": (2, README),
-    "reduced:order=4": (4, README),
-    "reduced:order=6": (6, README),
-    "gauss:stages=2": (4, README),
-    "moser_veselov:order=4": (4, README),
-    "mujoco": (4, MUJOCO),
-    "mujoco:integrator=Euler": (1, MUJOCO),
-}
-"""Orders that are claimed, by method, and where."""
-KEPT = {
-    "convected": (("energy", "momentum", "vertical momentum"), PAPER),
-    "reduced": (("energy", "momentum", "vertical momentum"), README),
-    "gauss": (("energy", "momentum", "vertical momentum", "axial momentum"), README),
-    "moser_veselov": (("energy", "momentum"), README),
-    "lame": (("energy", "vertical momentum", "axial momentum"), README),
-}
-"""Quantities that are claimed to stay, by method, and where; those that a scene does not have are not asked for."""
-PAPER_TOLERANCE = 1e-8
-"""The paper iterates until the residual is below this, so its energy is kept to that, not to round-off."""
+Scenes = Mapping[str, Scene]
+Settings = Callable[[type[Method]], Iterable[Method]]
 
 
 @dataclass(frozen=True)
@@ -60,42 +53,67 @@ class Finding:
     verdict: Cell
 
 
-def findings(table: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
-    """Return every claim that the report can say something about."""
+def findings(table: pd.DataFrame, fits: pd.DataFrame, scenes: Iterable[Scene]) -> list[Finding]:
+    """Return every claim that the report can say something about; `fits` are those of the attitude's error, see `orders`."""
     by_name = {scene.name: scene for scene in scenes}
-    of_tables = [*_orders(table), *_exact(table), *_same_map(table)]
-    return [*_kept(table, by_name), *of_tables, *_mujoco(table, by_name), *_factor_four(by_name)]
+    of_methods = [*_conservation(table, by_name), *_orders(fits), *_exactness(table)]
+    return [*of_methods, *_comparisons(table, by_name), *_factor_four(table)]
 
 
-def as_cells(found: list[Finding]) -> Cells:
+def as_table(findings: list[Finding]) -> Table:
     """Return the findings as a table."""
-    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in found]
+    return ["claim", "where made", "measured", "verdict"], [[f.claim, f.where, f.measured, f.verdict] for f in findings]
 
 
-def _judged(holds: bool) -> Cell:
+def _judge(holds: bool) -> Cell:
     return HOLDS if holds else FAILS
 
 
-def _paper_rows(table: pd.DataFrame, method: str, measure: str) -> pd.DataFrame:
-    rows = table[(table["study"] == "paper") & (table["method"] == method) & (table["measure"] == measure)]
-    return rows[rows["status"] != UNSUPPORTED]
+def _families() -> list[tuple[type[Method], Claims]]:
+    """Return the registered families that something is claimed of."""
+    return [(family, family.claims) for family in registry.list_families().values() if family.claims is not None]
 
 
-def _kept(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
-    for method, (quantities, where) in KEPT.items():
-        for quantity in quantities:
-            rows = _paper_rows(table, method, f"{quantity} drift max")
-            for scene, members in rows.groupby("scene", sort=False):
-                steps = scenes[str(scene)].t_end / float(members["dt"].min())
-                yield _drift(f"{method} keeps {quantity}", str(scene), where, members, steps)
+def _claimed(settings: Settings) -> Iterator[tuple[Method, Claims]]:
+    """Yield settings of each family; none of one whose engine is not installed."""
+    for family, claims in _families():
+        try:
+            methods = tuple(settings(family))
+        except MissingEngine:
+            continue
+        yield from ((method, claims) for method in methods)
 
 
-def _drift(claim: str, scene: str, where: str, rows: pd.DataFrame, steps: float) -> Finding:
-    extent = "to the tolerance of its iteration in each step" if where == PAPER else "to round-off"
-    bound = PAPER_TOLERANCE * steps if where == PAPER else ROUND_OFF
+def _default(family: type[Method]) -> tuple[Method, ...]:
+    return (family(),)
+
+
+def _paper_rows(table: pd.DataFrame, method: str) -> pd.DataFrame:
+    rows = table[(table["study"] == STUDY) & (table["method"] == method)]
+    return rows[rows["outcome"] != OutcomeKind.UNSUPPORTED]
+
+
+def _measured(table: pd.DataFrame, method: str, measure: str) -> pd.DataFrame:
+    rows = keyed(_paper_rows(table, method))
+    return rows[rows["measure"] == measure]
+
+
+def _conservation(table: pd.DataFrame, scenes: Scenes) -> Iterator[Finding]:
+    for method, claims in _claimed(_default):
+        rows = _paper_rows(table, method.name)
+        drifts = rows[(rows["measure"] == Measure.DRIFT_MAX.text) & rows["quantity"].isin(method.conserves)]
+        for (scene, quantity), members in drifts.groupby(["scene", "quantity"], sort=False):
+            steps = scenes[str(scene)].t_end / float(members["dt"].min())
+            yield _drift(f"{method.name} keeps {quantity}", str(scene), claims, members, steps)
+
+
+def _drift(claim: str, scene: str, claims: Claims, rows: pd.DataFrame, steps: float) -> Finding:
+    extent, bound = "to round-off", ROUND_OFF
+    if claims.drift_per_step is not None:
+        extent, bound = "to the tolerance of its iteration in each step", claims.drift_per_step * steps
     worst = _worst(rows)
     measured = f"largest drift {number(worst)}, bound {number(bound)}"
-    return Finding(f"{claim} {extent} ({scene})", where, measured, _judged(worst <= bound))
+    return Finding(f"{claim} {extent} ({scene})", claims.source, measured, _judge(worst <= bound))
 
 
 def _worst(rows: pd.DataFrame) -> float:
@@ -103,88 +121,81 @@ def _worst(rows: pd.DataFrame) -> float:
     return math.inf if rows["value"].isna().any() else float(rows["value"].max())
 
 
-def _orders(table: pd.DataFrame) -> Iterator[Finding]:
-    rows = table[(table["study"] == "convergence") & table["method"].isin(list(DECLARED))]
-    names = rows.drop_duplicates(["method", "scene"])
-    for method, scene in zip(names["method"], names["scene"], strict=True):
-        fits = orders.fits(orders.errors(rows[(rows["method"] == method) & (rows["scene"] == scene)]))
-        order, where = DECLARED[method]
-        if len(fits):
-            yield _order(f"{method} is of order {order} ({scene})", where, order, fits.iloc[0])
+def _orders(fits: pd.DataFrame) -> Iterator[Finding]:
+    claimed = {method.name: (method.order, claims.source) for method, claims in _claimed(lambda cls: cls.audit_settings())}
+    for _, fit in fits[fits["method"].isin(list(claimed))].iterrows():
+        order, source = claimed[fit["method"]]
+        if order is not None:
+            yield _order(f"{fit['method']} is of order {order} ({fit['scene']})", source, order, fit)
 
 
 def _order(claim: str, where: str, order: int, fit: pd.Series[Any]) -> Finding:
     if fit["reason"]:
         return Finding(claim, where, str(fit["reason"]), OPEN)
     margin = max(ORDER_MARGIN, 3 * float(fit["stderr"]))
-    return Finding(
-        claim, where, f"slope {fit['text']} from {fit['points']} steps", _judged(abs(fit["slope"] - order) <= margin)
+    holds = abs(fit["slope"] - order) <= margin
+    return Finding(claim, where, f"slope {fit['text']} from {fit['points']} steps", _judge(holds))
+
+
+def _exactness(table: pd.DataFrame) -> Iterator[Finding]:
+    for method, claims in _claimed(_default):
+        if method.candidacy is None or not method.candidacy.exact:
+            continue
+        for scene, members in _measured(table, method.name, ATTITUDE).groupby("scene", sort=False):
+            worst, claim = _worst(members), f"{method.name} has no truncation error ({scene})"
+            measured = f"largest attitude error {number(worst)} rad, bound {NO_TRUNCATION:g}"
+            yield Finding(claim, claims.source, measured, _judge(worst <= NO_TRUNCATION))
+
+
+def _comparisons(table: pd.DataFrame, scenes: Scenes) -> Iterator[Finding]:
+    for _, claims in _families():
+        yield from chain.from_iterable(_compare(each, claims.source, table, scenes) for each in claims.comparisons)
+
+
+def _compare(claim: Comparison, source: str, table: pd.DataFrame, scenes: Scenes) -> Iterator[Finding]:
+    return (
+        _compare_errors(claim, source, table, scenes)
+        if isinstance(claim, SameErrors)
+        else _compare_energy(claim, source, table)
     )
 
 
-def _exact(table: pd.DataFrame) -> Iterator[Finding]:
-    for method in ("moser_veselov", "lame"):
-        rows = _paper_rows(table, method, orders.ERROR)
-        for scene, members in rows.groupby("scene", sort=False):
-            worst = _worst(members)
-            measured = f"largest attitude error {number(worst)} rad, bound 1e-11"
-            yield Finding(f"{method} has no truncation error ({scene})", README, measured, _judged(worst <= 1e-11))
-
-
-def _same_map(table: pd.DataFrame) -> Iterator[Finding]:
-    """Compare the errors of the paper's map and of ours, which is said to be the same."""
-    ours, theirs = (_paper_rows(table, method, orders.ERROR) for method in ("reduced", "convected"))
-    both = ours.merge(theirs, on=["scene", "dt"], suffixes=("", "_paper")).dropna(subset=["value", "value_paper"])
+def _compare_errors(claim: SameErrors, source: str, table: pd.DataFrame, scenes: Scenes) -> Iterator[Finding]:
+    one, other = (_measured(table, method, ATTITUDE)[["scene", "dt", "value"]] for method in claim.methods)
+    both = one.merge(other, on=["scene", "dt"], suffixes=("", "_other")).dropna()
     for scene, rows in both.groupby("scene", sort=False):
-        gap = float((rows["value"] / rows["value_paper"] - 1).abs().max())
+        if claim.free and not scenes[str(scene)].free:
+            continue
+        gap = float((rows["value"] / rows["value_other"] - 1).abs().max())
         measured = f"attitude errors differ by {number(gap)} of themselves at most, at {len(rows)} steps"
-        yield Finding(f"reduced is the paper's map ({scene})", README, measured, _judged(gap <= 1e-3))
+        yield Finding(f"{claim.words} ({scene})", source, measured, _judge(gap <= claim.tolerance))
 
 
-def _mujoco(table: pd.DataFrame, scenes: Mapping[str, Scene]) -> Iterator[Finding]:
-    rows = table[(table["study"] == "paper") & table["method"].str.startswith("mujoco")]
-    for scene, members in rows.groupby("scene", sort=False):
-        rk4, single, implicit, fast = (
-            _by_step(members, f"mujoco{setting}", measure)
-            for setting, measure in (
-                ("", ENERGY),
-                (":integrator=Euler", ENERGY),
-                (":integrator=implicit", orders.ERROR),
-                (":integrator=implicitfast", orders.ERROR),
-            )
-        )
-        if rk4 and single:
-            yield _rk4_first(str(scene), rk4, single)
-        if implicit and fast and scenes[str(scene)].free:
-            yield _coincide(str(scene), implicit, fast)
+def _compare_energy(claim: BetterEnergy, source: str, table: pd.DataFrame) -> Iterator[Finding]:
+    """Compare the better method at its coarsest step with the other at its finest."""
+    coarse, fine = _measured(table, claim.better, ENERGY), _measured(table, claim.worse, ENERGY)
+    for scene in coarse["scene"].unique():
+        one, other = _row_at(coarse, scene, max), _row_at(fine, scene, min)
+        if one is None or other is None:
+            continue
+        words = f"{claim.words}, even with {one['dt'] / other['dt']:g} times its step ({scene})"
+        shown = [number(row["value"]) if math.isfinite(row["value"]) else "failed" for row in (one, other)]
+        measured = f"energy drift {shown[0]}, of the other at the smaller step {shown[1]}"
+        holds = math.isfinite(one["value"]) and not one["value"] >= other["value"]
+        yield Finding(words, source, measured, _judge(holds))
 
 
-def _by_step(rows: pd.DataFrame, method: str, measure: str) -> dict[float, float]:
-    found = rows[(rows["method"] == method) & (rows["measure"] == measure)]
-    return dict(zip(found["dt"], found["value"], strict=True))
+def _row_at(rows: pd.DataFrame, scene: str, extreme: Callable[[pd.Series[float]], float]) -> pd.Series[Any] | None:
+    """Return the row of a scene at its longest or shortest step, None where it has none."""
+    here = rows[rows["scene"] == scene]
+    return None if here.empty else here[here["dt"] == extreme(here["dt"])].iloc[0]
 
 
-def _rk4_first(scene: str, rk4: Mapping[float, float], single: Mapping[float, float]) -> Finding:
-    """Compare RK4 at the coarsest step with Euler at the finest, a quarter of it: the same work."""
-    coarse, fine = max(rk4), min(single)
-    claim = f"RK4 is better than Euler on energy-conserving systems, even with {coarse / fine:g} times its step ({scene})"
-    shown = [number(value) if math.isfinite(value) else "failed" for value in (rk4[coarse], single[fine])]
-    measured = f"energy drift of RK4 {shown[0]}, of Euler at the smaller step {shown[1]}"
-    holds = math.isfinite(rk4[coarse]) and not rk4[coarse] >= single[fine]
-    return Finding(claim, MUJOCO, measured, _judged(holds))
-
-
-def _coincide(scene: str, implicit: Mapping[float, float], fast: Mapping[float, float]) -> Finding:
-    gaps = [abs(implicit[dt] / fast[dt] - 1) for dt in implicit.keys() & fast.keys()]
-    claim = f"implicit and implicitfast coincide for a free body ({scene})"
-    return Finding(claim, MUJOCO, f"attitude errors differ by {number(max(gaps))} of themselves", _judged(max(gaps) <= 1e-6))
-
-
-def _factor_four(scenes: Collection[str]) -> Iterator[Finding]:
-    if "lagrange_top" not in scenes:
+def _factor_four(table: pd.DataFrame) -> Iterator[Finding]:
+    distances = table[table["measure"] == Measure.PERIOD_DISTANCE.text]["value"].to_list()
+    if not distances:
         return
-    distances = paper_figures.position_errors()["distance"].to_list()
     ratios = [before / after for before, after in pairwise(distances)]
     measured = "ratios " + ", ".join(number(ratio, 3) for ratio in ratios)
     holds = all(abs(ratio - 4) <= 0.4 for ratio in ratios)
-    yield Finding("halving the step divides the top's position error by four", f"{PAPER}, figure 2", measured, _judged(holds))
+    yield Finding("halving the step divides the top's position error by four", "paper, figure 2", measured, _judge(holds))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
 from .work_precision import Contest
 
 
-def lines(found: list[Contest]) -> list[str]:
+def lines(contests: Sequence[Contest]) -> list[str]:
     """Return, for each scene, where an engine is faster than anything of ours, or alone, and where ours is."""
-    out = [line for scene, contests in groupby(found, key=lambda c: c.scene) for line in _scene(scene, list(contests))]
+    out = [line for scene, members in groupby(contests, key=lambda c: c.scene) for line in _scene(scene, list(members))]
     return out or ["No engine and no method of ours was measured on error against time."]
 
 
@@ -50,8 +50,8 @@ def _errors(contests: list[Contest]) -> str:
     """Return the errors, every decade in between left out where they are neighbours."""
     errors = [c.error for c in contests]
     neighbours = all(1 < a / b < 11 for a, b in pairwise(errors))
-    shown = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
-    return f"{shown} rad"
+    text = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
+    return f"{text} rad"
 
 
 def _range(factors: list[float]) -> str:

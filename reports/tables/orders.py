@@ -9,30 +9,35 @@ import pandas as pd
 
 from conservative.attitude import Array
 from conservative.benchmarks.measures.convergence_order import Order, observed_order
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import OutcomeKind
 
-from ..labels import shown
+from .rows import of_measure, of_study, with_names, with_outcome
 
-ERROR = "attitude error max"
-RATES = "rate error max"
-
-
-def errors(table: pd.DataFrame, measure: str = ERROR) -> pd.DataFrame:
-    """Return columns scene, series, dt (s), error of the convergence study, coarse to fine; runs that failed are not in it."""
-    rows = table[(table["study"] == "convergence") & (table["measure"] == measure) & (table["status"] == "ok")]
-    names = [shown(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
-    return (
-        rows.rename(columns={"value": "error"}).assign(series=names)[["scene", "series", "dt", "error"]].reset_index(drop=True)
-    )
+COLUMNS = ("scene", "method", "series", "dt", "error")
 
 
-def fits(found: pd.DataFrame) -> pd.DataFrame:
+def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
+    """Return the errors of the convergence study by a measure, coarse to fine; runs that failed are not among them.
+
+    Columns scene, method, series (what to call it), dt (s), error (unit of the measure).
+    """
+    rows = with_names(with_outcome(of_measure(of_study(table, "convergence"), measure), OutcomeKind.OK))
+    return rows.assign(series=rows["name"]).rename(columns={"value": "error"})[list(COLUMNS)].reset_index(drop=True)
+
+
+def fits(errors: pd.DataFrame) -> pd.DataFrame:
     """Return the order of each line of `errors`.
 
-    Columns scene, series, slope, stderr, floor, points, coarse and fine (the window, s), error_coarse and error_fine (of the
-    fit at its ends), text (slope and its standard error), reason (why there is none); nan where there is no fit.
+    Columns scene, method, series, slope, stderr, floor, points, coarse and fine (the window, s), error_coarse and error_fine
+    (of the fit at its ends), text (slope and its standard error), reason (why there is none); nan where there is no fit.
     """
-    groups = found.groupby(["scene", "series"], sort=False)
-    return pd.DataFrame([dict(zip(("scene", "series"), key, strict=True)) | _fit(line) for key, line in groups])
+    keys = list(COLUMNS[:3])
+    groups = errors.groupby(keys, sort=False)
+    return pd.DataFrame([dict(zip(keys, key, strict=True)) | _fit(line) for key, line in groups], columns=[*keys, *_FIT])
+
+
+_FIT = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")
 
 
 def _fit(line: pd.DataFrame) -> dict[str, object]:
@@ -41,8 +46,7 @@ def _fit(line: pd.DataFrame) -> dict[str, object]:
     used = list(order.used)
     ends = _ends(order, np.log(steps[used]), np.log(values[used])) if used else (math.nan,) * 4
     text = "no order" if order.reason else f"{order.slope:.2f} ± {order.stderr:.2f}"
-    numbers = {"slope": order.slope, "stderr": order.stderr, "floor": order.floor, "points": len(used), "text": text}
-    return numbers | {"reason": order.reason} | dict(zip(("coarse", "fine", "error_coarse", "error_fine"), ends, strict=True))
+    return dict(zip(_FIT, (order.slope, order.stderr, order.floor, len(used), text, order.reason, *ends), strict=True))
 
 
 def _ends(order: Order, x: Array, y: Array) -> tuple[float, float, float, float]:

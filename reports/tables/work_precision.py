@@ -13,10 +13,16 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from ..labels import shown, without_tolerance
+from conservative.benchmarks.measures.measure import Measure
+from conservative.method import Role
+from conservative.outcome import OutcomeKind
 
-ERROR, TIME, AGREEMENT = "attitude error max", "time per simulated second", "truth agreement"
+from ..labels import display_name, without_tolerance
+from .rows import of_study, with_outcome
+
 DECADES = tuple(10.0**-k for k in range(1, 14))
+_KEYS = ["scene", "series", "method", "label", "role", "dt"]
+_VALUES = {Measure.ATTITUDE_MAX.text: "error", Measure.TIME.text: "time"}
 
 
 @dataclass(frozen=True)
@@ -53,31 +59,31 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     Columns scene, series, method, label, role, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
     error below what the truth is known to is raised to that.
     """
-    rows = table[(table["study"] == "work_precision") & (table["status"] == "ok") & table["measure"].isin([ERROR, TIME])]
-    keys = ["scene", "detail", "method", "label", "role", "dt"]
-    wide = rows.pivot_table(index=keys, columns="measure", values="value").reset_index()
-    wide = rows[keys].drop_duplicates().merge(wide, how="left", on=keys)  # pivot_table orders rows by the values of the keys
-    wide = wide.reindex(columns=[*keys, ERROR, TIME]).rename(columns={ERROR: "error", TIME: "time"})
-    wide["error"] = wide["error"].clip(lower=wide["scene"].map(confirmed(table)).fillna(0.0))
-    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).drop(columns="detail").reset_index(drop=True)
+    rows = with_outcome(of_study(table, "work_precision"), OutcomeKind.OK)
+    rows = rows[rows["measure"].isin(list(_VALUES))]
+    wide = rows.pivot_table(index=_KEYS, columns="measure", values="value").reset_index()
+    wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys
+    wide = wide.reindex(columns=[*_KEYS, *_VALUES]).rename(columns=_VALUES)
+    wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
+    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).reset_index(drop=True)
 
 
-def confirmed(table: pd.DataFrame) -> dict[str, float]:
+def truth_resolution(table: pd.DataFrame) -> dict[str, float]:
     """Return, for scenes whose truth is no closed form and not multi-precision, how far two of its kind agree, rad."""
-    rows = table[(table["measure"] == AGREEMENT) & table["label"].str.startswith("scipy")]
+    rows = table[(table["measure"] == Measure.AGREEMENT.text) & table["label"].str.startswith("scipy")]
     return {str(scene): float(value) for scene, value in rows.groupby("scene")["value"].max().items()}
 
 
-def _line_names(found: pd.DataFrame) -> list[str]:
-    """Return the name of each point's line; points with one `detail` are one line."""
-    settings = found.groupby("detail")["method"].transform("nunique")
-    names = [shown(method, label) for method, label in zip(found["method"], found["label"], strict=True)]
+def _line_names(rows: pd.DataFrame) -> list[str]:
+    """Return what to call each point's line; a line of several methods differs in tolerance."""
+    settings = rows.groupby("series")["method"].transform("nunique")
+    names = [display_name(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
     return [without_tolerance(name) if count > 1 else name for name, count in zip(names, settings, strict=True)]
 
 
-def front(found: pd.DataFrame) -> pd.DataFrame:
+def front(points: pd.DataFrame) -> pd.DataFrame:
     """Return the points of one scene that no other beats in both error and time, cheap to dear."""
-    ordered = found.sort_values(["time", "error"])
+    ordered = points.sort_values(["time", "error"])
     best_before = ordered["error"].cummin().shift(fill_value=math.inf)
     return ordered[ordered["error"] < best_before]
 
@@ -85,13 +91,13 @@ def front(found: pd.DataFrame) -> pd.DataFrame:
 def cost(line: pd.DataFrame, error: float) -> float:
     """Return the time at which a line, points coarse to fine, gets to an error; nan where it does not."""
     errors, times = line["error"].tolist(), line["time"].tolist()
-    reached = [time for e, time in zip(errors, times, strict=True) if e <= error]
+    below = [time for e, time in zip(errors, times, strict=True) if e <= error]
     crossings = [
         _between(error, errors[i : i + 2], times[i : i + 2])
         for i in range(len(errors) - 1)
         if min(errors[i : i + 2]) < error < max(errors[i : i + 2]) and min(errors[i : i + 2]) > 0
     ]
-    return min([*reached, *crossings], default=math.nan)
+    return min([*below, *crossings], default=math.nan)
 
 
 def _between(error: float, errors: list[float], times: list[float]) -> float:
@@ -99,12 +105,12 @@ def _between(error: float, errors: list[float], times: list[float]) -> float:
     return float(times[0] * (times[1] / times[0]) ** share)
 
 
-def contests(found: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Contest]:
+def contests(points: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Contest]:
     """Return the contest at each decade that at least one side reaches, for each scene."""
     out = []
-    for scene, members in found.groupby("scene", sort=False):
+    for scene, members in points.groupby("scene", sort=False):
         for error in decades:
-            ours, theirs = (_cheapest(members[members["role"] == role], error) for role in ("ours", "engine"))
+            ours, theirs = (_cheapest(members[members["role"] == role.value], error) for role in (Role.OURS, Role.ENGINE))
             if ours or theirs:
                 out.append(Contest(str(scene), error, ours, theirs))
     return out

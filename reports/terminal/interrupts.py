@@ -19,27 +19,27 @@ def interruptible(number: signal.Signals) -> Iterator[None]:
 
     Compiled code that is interrupted while it is loaded raises `SystemError`, for one.
     """
-    arrived: list[KeyboardInterrupt] = []
+    stops: list[KeyboardInterrupt] = []
 
     def stop(number: int, frame: object) -> None:
-        arrived.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
-        raise arrived[0]
+        stops.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
+        raise stops[0]
 
-    with _handled(stop, number):
+    with _handle(stop, number):
         try:
             yield
         except Exception as error:
-            if not arrived:
+            if not stops:
                 raise
             for note in notes(error):
-                arrived[0].add_note(note)
-            raise arrived[0] from error
+                stops[0].add_note(note)
+            raise stops[0] from error
 
 
 @contextmanager
 def unstoppable() -> Iterator[None]:
     """Ignore interrupts for the moment that a few renames take, which make sense only together."""
-    with _handled(signal.SIG_IGN, signal.SIGINT, signal.SIGTERM):
+    with _handle(signal.SIG_IGN, signal.SIGINT, signal.SIGTERM):
         yield
 
 
@@ -49,7 +49,7 @@ def notes(error: BaseException) -> list[str]:
 
 
 @contextmanager
-def _handled(handler: Any, *numbers: signal.Signals) -> Iterator[None]:
+def _handle(handler: Any, *numbers: signal.Signals) -> Iterator[None]:
     """Handle signals that are not ignored already, as under nohup; only the main thread can."""
     in_main_thread = threading.current_thread() is threading.main_thread()
     before = {number: signal.getsignal(number) for number in numbers} if in_main_thread else {}

@@ -12,8 +12,8 @@ Step = Callable[[float, str], None]
 """Called with the share of all work that is done, 0 to 1, and what comes next."""
 Expect = Callable[[float], None]
 """Called with the time, s, that the rest is expected to take."""
-PATIENCE = 1.0
-"""How long, s, one piece of work goes on before a bar appears."""
+DELAY = 1.0
+"""Time, s, that one piece of work takes before a bar appears."""
 
 
 def shown() -> bool:
@@ -50,12 +50,12 @@ def waiting(what: str) -> Iterator[Expect | None]:
     def expect(seconds: float) -> None:
         # Compiled code keeps the interpreter locked, and the bar standing: so its text has the time as well.
         bar.update(task, total=monotonic() - start + seconds, description=f"{what}, about {seconds:.0f} s")
-        if seconds > PATIENCE:
+        if seconds > DELAY:
             bar.start()
 
     def tick() -> None:
         while not done.wait(0.1):
-            if monotonic() - start > PATIENCE:
+            if monotonic() - start > DELAY:
                 bar.start()
             bar.update(task, completed=monotonic() - start)
 

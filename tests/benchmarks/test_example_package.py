@@ -23,7 +23,8 @@ def project(tmp_path_factory):
 
 
 def run(project, *command):
-    environment = {**os.environ, "PYTHONPATH": str(project / "installed"), "GITHUB_STEP_SUMMARY": str(project / "summary.md")}
+    path = os.pathsep.join(filter(None, (str(project / "installed"), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": path, "GITHUB_STEP_SUMMARY": str(project / "summary.md")}
     done = subprocess.run(
         [sys.executable, *command],
         cwd=project / "source",

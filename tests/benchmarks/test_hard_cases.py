@@ -7,8 +7,11 @@ import numpy as np
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.measures import errors
+from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import hard_cases, selection, studies
+from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
+from conservative.outcome import OutcomeKind
 from conservative.references.exact.method import Exact
 
 METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
@@ -22,24 +25,23 @@ def truth(scene, grid):
 @cache
 def table():
     scenes = (cv.scenes.brick_flip(), cv.scenes.simo_wong_top())
-    study = studies.Study("hard_cases", scenes, METHODS, truth=truth)
-    return {(row.scene, row.method, row.measure): row for row in studies.rows(study)}
+    study = Study("hard_cases", scenes, METHODS, truth=truth)
+    return {(row.scene, row.method, key(row.measure, row.quantity)): row for row in studies.rows(study)}
 
 
-def test_every_measure_and_status_of_every_pair():
+def test_every_measure_and_outcome_of_every_pair():
     found = table()
     for scene in (cv.scenes.brick_flip(), cv.scenes.simo_wong_top()):
         for method in METHODS:
-            for measure, unit in errors.names(scene):
-                row = found[scene.name, method.name, measure]
-                assert row.unit == unit
-                assert math.isnan(row.value) == (row.status != "ok")
+            for blank in errors.blanks(scene):
+                row = found[scene.name, method.name, blank.key]
+                assert math.isnan(row.value) == (not row.outcome.ok)
 
 
 def test_what_is_not_supported_is_a_row_that_says_so():
     row = table()["brick_flip", "lame", "attitude error max"]
-    assert row.status == "unsupported"
-    assert "symmetric" in row.detail
+    assert row.outcome.kind is OutcomeKind.UNSUPPORTED
+    assert "symmetric" in row.outcome.reason
 
 
 def test_values_are_those_of_the_run():
@@ -47,7 +49,10 @@ def test_values_are_those_of_the_run():
     grid = hard_cases.grid(scene)
     assert grid.dt == scene.dt
     assert grid.t[-1] == 6.0
-    direct = {name: value for name, value, _ in errors.measure(cv.Reduced().run(scene, grid.dt), truth(scene, grid).trajectory)}
+    direct = {
+        value.key: value.value
+        for value in errors.measure_errors(cv.Reduced().run(scene, grid.dt), truth(scene, grid).trajectory)
+    }
     assert table()["brick_flip", "reduced", "rate error max"].value == direct["rate error max"]
 
 
@@ -61,7 +66,7 @@ def test_a_long_motion_is_cut_by_its_turn():
 def test_every_scene_and_every_engine_takes_part():
     methods = selection.methods()
     study = studies.hard(methods)[1]
-    assert {scene.name for scene in study.scenes} == set(registry.registered(registry.SCENES))
+    assert {scene.name for scene in study.scenes} == set(registry.list_scenes())
     chosen = study.methods
     families = {method.family for method in methods if method.role != Role.TRUTH}
     assert {method.family for method in chosen} == families

@@ -1,36 +1,104 @@
+import dataclasses
+import json
 import math
 
 import numpy as np
 import pytest
 
-from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame
+from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures.measure import Measure, Value, key
+from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame, from_flat, outcome_of
+from conservative.benchmarks.measures.samples import Samples
+from conservative.method import Role
+from conservative.outcome import OK, Outcome, OutcomeKind
 
 ROW = Measurement(
-    "paper", "brick_flip", "reduced", "conservative==1/reduced", "ours", 0.01, "energy drift max", 1e-15, "1", "ok"
+    study="paper",
+    scene="brick_flip",
+    method="reduced",
+    label="conservative==1/reduced",
+    role=Role.OURS,
+    series="reduced",
+    dt=0.01,
+    quantity="energy",
+    measure=Measure.DRIFT_MAX,
+    value=1e-15,
 )
-NUMBERS = ["dt", "value"]
+FAILED = dataclasses.replace(ROW, value=math.nan, outcome=Outcome(OutcomeKind.NOT_CONVERGED, "why", 3, 0.02, 0.5))
+NUMBERS = {"dt", "value", "step", "time", "residual"}
+LINE = Samples(
+    study="long_runs",
+    scene="brick_flip",
+    method="reduced",
+    label="conservative==1/reduced",
+    role=Role.OURS,
+    dt=0.01,
+    quantity="energy",
+    t=np.array([0.1, 0.1 + 0.2]),
+    value=np.array([1e-16, math.nan]),
+)
 
 
 def test_columns_and_their_types_do_not_depend_on_the_rows():
-    full, empty = frame([ROW, ROW]), frame([])
+    full, empty = frame([ROW, FAILED]), frame([])
     assert list(full.columns) == list(empty.columns) == list(COLUMNS)
     assert (full.dtypes == empty.dtypes).all()
-    assert {name for name in COLUMNS if full[name].dtype == np.float64} == set(NUMBERS)
+    assert {name for name in COLUMNS if full[name].dtype == np.float64} == NUMBERS
     assert len(full) == 2
     assert len(empty) == 0
 
 
-def test_a_row_survives_the_table():
-    found = frame([ROW]).iloc[0].to_dict()
-    assert found == {name: getattr(ROW, name) for name in COLUMNS}
-    assert found["detail"] == ""
+def test_a_row_in_the_table():
+    found = frame([ROW]).iloc[0]
+    shown = found[["role", "quantity", "measure", "unit", "value", "outcome", "reason", "detail"]].tolist()
+    assert shown == ["ours", "energy", "drift max", "1", 1e-15, "ok", "", ""]
+    assert found[["step", "time", "residual"]].isna().all()
 
 
-def test_a_value_that_was_not_measured_is_nan():
-    failed = Measurement(*[getattr(ROW, name) for name in COLUMNS[:7]], math.nan, "1", "missing")
-    assert math.isnan(frame([failed])["value"][0])
+@pytest.mark.parametrize("row", [ROW, FAILED])
+def test_a_row_survives_json(row):
+    record = json.loads(json.dumps(measurement.flat(row)))
+    again = from_flat(record)
+    assert dataclasses.replace(again, value=0.0) == dataclasses.replace(row, value=0.0)
+    assert str(again.value) == str(row.value)
+
+
+def test_an_outcome_survives_the_table():
+    assert [outcome_of(record) for _, record in frame([ROW, FAILED]).iterrows()] == [OK, FAILED.outcome]
+
+
+@pytest.mark.parametrize("change", [{"measure": "drift mux"}, {"role": "nobody"}, {"outcome": "fine"}])
+def test_a_record_of_something_else_is_refused(change):
+    with pytest.raises((KeyError, ValueError)):
+        from_flat(measurement.flat(ROW) | change)
 
 
 def test_rows_are_frozen():
     with pytest.raises(AttributeError):
         ROW.value = 2.0
+
+
+def test_every_measure_is_found_by_its_text():
+    assert [Measure.named(measure.text) for measure in Measure] == list(Measure)
+    assert len({measure.text for measure in Measure}) == len(Measure)
+    with pytest.raises(KeyError):
+        Measure.named("energy drift max")
+
+
+def test_a_drift_is_called_by_its_quantity():
+    assert key(Measure.DRIFT_MAX, "energy") == Value(Measure.DRIFT_MAX, 1.0, "energy").key == "energy drift max"
+    assert key(Measure.ATTITUDE_MAX) == "attitude error max"
+
+
+def test_samples_survive_json():
+    again = samples.from_flat(json.loads(json.dumps(samples.flat(LINE))))
+    assert (again.role, again.quantity, again.dt) == (LINE.role, LINE.quantity, LINE.dt)
+    np.testing.assert_array_equal(again.t, LINE.t)
+    np.testing.assert_array_equal(again.value, LINE.value)
+
+
+def test_the_table_of_samples_has_a_row_for_each():
+    full, empty = samples.frame([LINE, LINE]), samples.frame([])
+    assert list(full.columns) == list(empty.columns) == list(samples.COLUMNS)
+    assert (full.dtypes == empty.dtypes).all()
+    assert full["t"].tolist() == [*LINE.t, *LINE.t]

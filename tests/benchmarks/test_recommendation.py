@@ -9,9 +9,10 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
-from conservative.benchmarks.recommendation import extrapolation as growth_module
-from conservative.benchmarks.recommendation.extrapolation import Amplification, Growth, growth
-from conservative.benchmarks.recommendation.recommend import engines, question, recommend
+from conservative.benchmarks.recommendation import extrapolation
+from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, fit_law
+from conservative.benchmarks.recommendation.question import ask, list_engines
+from conservative.benchmarks.recommendation.recommend import recommend
 from conservative.method import Grid
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.exact.method import Exact
@@ -34,7 +35,7 @@ def true_error(scene, probe, duration, truth):
 
 def largest_excess(scene, error, duration, names, truth=None):
     """How far the worst of the settings that are said to reach an error is above it, as a factor."""
-    found = recommend(question(scene, error, duration, names))
+    found = recommend(ask(scene, error, duration, names))
     reached = [advice for advice in found.advice if advice.reached]
     assert found.ours in reached
     return max(true_error(scene, advice.best, duration, truth or Exact()) for advice in reached) / error
@@ -54,13 +55,13 @@ def test_settings_extrapolated_from_short_probes_reach_the_error():
 
 def test_a_law_that_promises_too_much_is_caught(monkeypatch):
     """The negative control of the tests above."""
-    monkeypatch.setattr(Growth, "at", lambda self, duration: self.error / 1e4)
+    monkeypatch.setattr(ErrorLaw, "at", lambda self, duration: self.error / 1e4)
     assert largest_excess(free_body(), 1e-6, 20.0, ("mujoco:RK4",)) > 3  # measured 650
 
 
 @pytest.fixture(scope="module")
 def of_mujoco():
-    return recommend(question(free_body(), 1e-6, 20.0, ("mujoco",)))
+    return recommend(ask(free_body(), 1e-6, 20.0, ("mujoco",)))
 
 
 def test_all_integrators_of_an_engine_are_listed(of_mujoco):
@@ -83,7 +84,7 @@ def test_ours_is_cheaper_and_keeps_what_it_should(of_mujoco):
 
 
 def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
-    lines = [method.name.partition(":")[0] for method in engines()]
+    lines = [method.name.partition(":")[0] for method in list_engines()]
     assert {name: lines.count(name) for name in set(lines)} == {"mujoco": 5, "pinocchio": 2, "heyoka": 3, "scipy": 1}
 
 
@@ -94,9 +95,9 @@ def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
         raise cv.MissingEngine("MuJoCo", "mujoco")
 
     monkeypatch.setattr(MuJoCo, "__post_init__", missing)
-    assert question(free_body()).missing == ("mujoco",)
+    assert ask(free_body()).missing == ("mujoco",)
     with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
-        question(free_body(), engine_names=("mujoco",))
+        ask(free_body(), engine_names=("mujoco",))
 
 
 @pytest.mark.parametrize(
@@ -113,7 +114,7 @@ def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
 )
 def test_bad_questions(arguments, argument, allowed):
     with pytest.raises(cv.BadInput) as caught:
-        question(free_body(), **arguments)
+        ask(free_body(), **arguments)
     assert caught.value.argument == argument
     assert allowed in caught.value.allowed
 
@@ -123,21 +124,21 @@ T = np.linspace(0, 10, 101)
 
 @pytest.mark.parametrize(("a", "b"), [(3e-9, 0.0), (0.0, 2e-9), (1e-9, 4e-10)])
 def test_polynomial_growth_is_found(a, b):
-    law = growth(T, a * T + b * T**2, 0.0, 1.0)
+    law = fit_law(T, a * T + b * T**2, 0.0, 1.0)
     assert law.at(1000.0) == pytest.approx(a * 1e3 + b * 1e6, rel=1e-9)  # measured 1e-15
     assert law.at(law.holds(1e-5)) == pytest.approx(1e-5, rel=1e-9)  # measured 1e-15
 
 
 def test_bounded_error_is_taken_as_linear_and_steady_drift_as_quadratic():
     error = 1e-8 * np.abs(np.sin(T))
-    assert growth(T, error, 0.0, 1.0).at(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
-    drifting = growth(T, error, 2e-6, 1.0)
+    assert fit_law(T, error, 0.0, 1.0).at(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
+    drifting = fit_law(T, error, 2e-6, 1.0)
     assert drifting.at(100.0) > 1e-2
     assert "extrapolated quadratically to 100 s" in drifting.law(100.0)
 
 
 def test_what_is_measured_is_not_extrapolated():
-    law = growth(T, 1e-8 * T, 0.0, math.inf)
+    law = fit_law(T, 1e-8 * T, 0.0, math.inf)
     assert law.at(10.0) == pytest.approx(1e-7)
     assert law.law(10.0) == "measured over all 10 s"
     assert math.isinf(law.at(11.0))
@@ -157,15 +158,15 @@ def test_amplification_tells_exponential_growth_from_linear():
 
 
 def test_an_unstable_motion_is_called_so():
-    found = recommend(question(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
-    assert found.bench.amplification.unstable
-    assert found.bench.amplification.steepness > growth_module.FASTER_THAN_LINEAR
+    found = recommend(ask(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
+    assert found.conditions.amplification.unstable
+    assert found.conditions.amplification.steepness > extrapolation.FASTER_THAN_LINEAR
 
 
 def test_steps_are_round_numbers(of_mujoco):
-    bench = of_mujoco.bench
+    conditions = of_mujoco.conditions
     for wanted in (0.37, 0.0123, 3.3e-5):
-        below, above = bench.step_at_most(wanted), bench.step_at_least(wanted)
+        below, above = conditions.step_at_most(wanted), conditions.step_at_least(wanted)
         assert below <= wanted <= above <= 2 * below * (1 + 1e-12)
         assert float(f"{below:.8g}") == pytest.approx(below, rel=1e-12)
-    assert bench.step_at_most(bench.spacing) == bench.step_at_least(bench.spacing) == bench.spacing
+    assert conditions.step_at_most(conditions.spacing) == conditions.step_at_least(conditions.spacing) == conditions.spacing

@@ -10,10 +10,13 @@ import pytest
 import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import errors
+from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import step_ladder, studies
 from conservative.benchmarks.studies.selection import Missing
-from conservative.benchmarks.studies.speed import SPEED
-from conservative.method import Grid, grid_for
+from conservative.benchmarks.studies.speed import MEASURES
+from conservative.benchmarks.studies.study import Study, Truths
+from conservative.method import Grid, Role, grid_for
+from conservative.outcome import OutcomeKind
 from conservative.references.exact.method import Exact
 from conservative.registry import method
 
@@ -30,7 +33,7 @@ class Broken(cv.Method):
 
     how: str
     family: ClassVar[str] = "broken"
-    role: ClassVar[str] = "engine"
+    role: ClassVar[Role] = Role.ENGINE
 
     @property
     def order(self):
@@ -49,12 +52,14 @@ class Broken(cv.Method):
 
 
 BROKEN = tuple(Broken(how) for how in ("unsupported", "refuses", "raises", "diverges"))
-STATUS = {
-    "unsupported": "unsupported",
-    "refuses": "unsupported",
-    "raises": "engine error",
-    "diverges": "diverged after t = 0 s (planted)",
+KINDS = {
+    "unsupported": OutcomeKind.UNSUPPORTED,
+    "refuses": OutcomeKind.UNSUPPORTED,
+    "raises": OutcomeKind.CRASHED,
+    "diverges": OutcomeKind.DIVERGED,
 }
+CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "import_time")]
+"""Studies with a row for every method, whatever comes of it."""
 
 
 @cache
@@ -63,7 +68,7 @@ def truth(scene, grid):
 
 
 def rows(name, *methods, quick=True, **settings):
-    study = studies.Study(name, (SCENE,), methods, quick=quick, truth=truth, **settings)
+    study = Study(name, (SCENE,), methods, quick=quick, truth=truth, **settings)
     return list(studies.rows(study))
 
 
@@ -72,7 +77,7 @@ def table(name):
     """Rows of a study of three orders, by (method, dt, measure)."""
     found = rows(name, cv.Reduced(), cv.Convected(tol=1e-12), method("scipy:rtol=1e-9"))
     assert all(row.study == name and row.scene == "generic" for row in found)
-    return {(row.method, row.dt, row.measure): row for row in found}
+    return {(row.method, row.dt, key(row.measure, row.quantity)): row for row in found}
 
 
 def test_paper_measures_every_method_at_three_steps():
@@ -80,21 +85,23 @@ def test_paper_measures_every_method_at_three_steps():
     assert {dt for name, dt, _ in found if name == "reduced"} == {0.02, 0.01, 0.005}
     assert {dt for name, dt, _ in found if name.startswith("scipy")} == {0.02}  # its accuracy does not depend on dt
     for dt in (0.02, 0.01, 0.005):
-        assert {measure for name, at, measure in found if (name, at) == ("reduced", dt)} > {n for n, _ in errors.names(SCENE)}
+        assert {measure for name, at, measure in found if (name, at) == ("reduced", dt)} > {
+            value.key for value in errors.blanks(SCENE)
+        }
         assert found["reduced", dt, "energy drift max"].value < 1e-14  # measured 8e-16
         assert found["reduced", dt, "steps"].value == round(2.0 / dt)
-    assert all(row.status == "ok" for row in found.values())
+    assert all(row.outcome.ok for row in found.values())
 
 
 def test_paper_says_how_well_the_truths_agree():
     row = table("paper")["truth", 0.02, "truth agreement"]
-    assert (row.value, row.unit, row.role, row.detail) == (2e-15, "rad", "truth", "exact and other")
+    assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
 
 
 def test_paper_errors_are_those_of_the_run():
     grid = grid_for(SCENE, 0.01)
     run = cv.integrate(SCENE, dt=0.01)
-    direct = {name: value for name, value, _ in errors.measure(run, truth(SCENE, grid).trajectory)}
+    direct = {value.key: value.value for value in errors.measure_errors(run, truth(SCENE, grid).trajectory)}
     assert table("paper")["reduced", 0.01, "attitude error final"].value == direct["attitude error final"]
 
 
@@ -106,7 +113,7 @@ def test_convergence_finds_the_order_of_each_method():
             assert found[name, f"{measure} stderr"].value < 0.02  # measured 4e-4 and 2e-3
             assert "points" in found[name, measure].detail
     without = found["scipy:rtol=1e-09", "observed order"]
-    assert without.status == "unsupported"
+    assert without.outcome.kind is OutcomeKind.UNSUPPORTED
     assert math.isnan(without.value)
 
 
@@ -114,7 +121,7 @@ def test_speed_has_times_per_step_and_per_second():
     found = table("speed")
     for name in {name for name, _, _ in found}:
         times = {measure: row for (who, _, measure), row in found.items() if who == name}
-        assert set(times) == {measure for measure, _ in SPEED}
+        assert set(times) == {measure.text for measure in MEASURES}
         assert times["time per simulated second"].value > 0
         assert times["time per step"].value <= times["time per step median"].value
     row = found["reduced", 0.02, "time per simulated second"]
@@ -127,52 +134,59 @@ def test_work_precision_pairs_error_and_time():
     points = {(name, dt) for name, dt, _ in found}
     assert len({point for point in points if point[0] == "reduced"}) == 4  # every second of eight steps
     assert len({point for point in points if point[0].startswith("scipy")}) >= 4
+    timed = set()
     for point in points:
-        pair = [found[*point, measure] for measure in ("attitude error final", "time per simulated second")]
-        # "skipped" where this machine, today, would take too long for a fine step
-        assert all(row.status == "skipped" or (row.status == "ok" and row.value > 0) for row in pair)
-        assert {row.status for row in pair} == {pair[0].status}
-        assert len({row.detail for row in pair}) == 1
-    assert {row.detail.partition(";")[0] for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
+        error, time = (found[*point, measure] for measure in ("attitude error final", "time per simulated second"))
+        assert (error.outcome, error.series) == (time.outcome, time.series)
+        if error.outcome.ok:
+            assert error.value > 0
+            assert time.value > 0
+            timed.add(error.series)
+        else:  # this machine, today, would take too long for a fine step
+            assert error.outcome.kind is OutcomeKind.SKIPPED
+            assert math.isnan(error.value)
+            assert math.isnan(time.value)
+    assert timed == {row.series for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
 
 
-@pytest.mark.parametrize("name", studies.NAMES)
+@pytest.mark.parametrize("name", CROSSING)
 def test_nothing_is_dropped_silently(name):
     found = rows(name, *BROKEN, ABSENT, skip_missing=True)
     for broken in BROKEN:
         mine = [row for row in found if row.method == broken.name]
         assert mine
-        assert {row.status for row in mine if row.measure in {n for n, _ in errors.names(SCENE)}} <= {STATUS[broken.how]}
-        assert all(math.isnan(row.value) and row.status != "ok" for row in mine)
+        assert KINDS[broken.how] in {row.outcome.kind for row in mine}
+        assert {row.outcome.kind for row in mine} <= {KINDS[broken.how], OutcomeKind.NO_ORDER}
+        assert all(math.isnan(row.value) for row in mine)
     missing = [row for row in found if row.method == "mujoco"]
     assert missing
-    assert all(row.status == "missing" and math.isnan(row.value) for row in missing)
+    assert all(row.outcome.kind is OutcomeKind.MISSING and math.isnan(row.value) for row in missing)
 
 
-@pytest.mark.parametrize("name", studies.NAMES)
+@pytest.mark.parametrize("name", [*CROSSING, "sphere_curves"])
 def test_a_missing_engine_is_an_error_unless_skipped(name):
     with pytest.raises(cv.MissingEngine, match="pip install mujoco"):
-        rows(name, ABSENT)
+        list(studies.findings(Study(name, (SCENE,), (ABSENT,), truth=truth)))
 
 
-def test_a_bug_of_our_own_is_not_a_status():
+def test_a_bug_of_our_own_is_not_an_outcome():
     class Ours(Broken):
-        role = "ours"
+        role = Role.OURS
 
     with pytest.raises(RuntimeError, match="planted"):
         rows("paper", Ours("raises"))
 
 
-@pytest.mark.parametrize("name", studies.NAMES)
+@pytest.mark.parametrize("name", [*CROSSING, "sphere_curves", "import_time"])
 def test_progress_counts_up_to_the_whole(name):
     seen = []
-    study = studies.Study(name, (SCENE, SCENE.renamed("again")), (cv.Reduced(),), quick=True, truth=truth)
-    list(studies.rows(study, lambda *call: seen.append(call)))
+    study = Study(name, (SCENE, SCENE.renamed("again")), (cv.Reduced(),), quick=True, truth=truth)
+    list(studies.findings(study, lambda *call: seen.append(call)))
     done, total, texts = zip(*seen, strict=True)
     assert list(done) == sorted(done)
     assert len(set(total)) == 1
     assert max(done) < total[0]
-    assert all("generic" in text or "again" in text for text in texts)
+    assert all(name == "import_time" or "generic" in text or "again" in text for text in texts)
 
 
 @pytest.mark.parametrize(
@@ -181,15 +195,53 @@ def test_progress_counts_up_to_the_whole(name):
 def test_bad_studies(change, argument):
     good = {"name": "speed", "scenes": (SCENE,), "methods": (cv.Reduced(),)}
     with pytest.raises(cv.BadInput) as caught:
-        studies.Study(**{**good, **change})
+        studies.findings(Study(**{**good, **change}))
     assert caught.value.argument == argument
 
 
 @pytest.mark.parametrize("name", ["reduced", "mujoco:Euler", "gauss:stages=4"])
-def test_all_steps_of_a_ladder_have_the_same_samples(name):
+def test_steps_of_all_sizes_have_the_same_samples(name):
     chosen = method(name)
     grids = step_ladder.steps(SCENE, chosen)
     expected = step_ladder.samples(SCENE, chosen).t
     assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
     assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
     assert isinstance(grids[0], Grid)
+
+
+def test_a_motion_is_found_once_by_the_studies_that_share_it():
+    asked = []
+
+    def find(scene, grid):
+        asked.append((scene, grid))
+        return truth(scene, grid)
+
+    truths = Truths(find)
+    for name in ("convergence", "work_precision"):
+        assert list(studies.rows(Study(name, (SCENE,), (cv.Reduced(), method("mujoco:Euler")), quick=True, truth=truths)))
+    assert asked == [(SCENE, step_ladder.samples(SCENE, cv.Reduced()))]
+    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=Truths(find))))
+    assert len(asked) == 2
+
+
+def test_the_studies_of_a_report_share_their_truths():
+    found = studies.crossed((SCENE,), (cv.Reduced(),))
+    assert [study.name for study in found] == list(studies.CROSSED)
+    assert len({id(study.truth) for study in found}) == 1
+    assert studies.crossed((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
+
+
+def test_preparation_is_timed_as_if_for_the_first_time():
+    converted = []
+
+    @dataclass(frozen=True)
+    class Converting(Broken):
+        """A method that keeps what it makes of a scene with the scene."""
+
+        def prepare(self, scene, grid):
+            scene.derive(converted.append)
+            return cv.Reduced().prepare(scene, grid)
+
+    SCENE.derive(converted.append)
+    list(studies.rows(Study("speed", (SCENE,), (Converting("works"),), quick=True, truth=truth)))
+    assert converted == [SCENE, SCENE]

@@ -1,79 +1,97 @@
 import gc
-import time
 
 import pytest
 
-from conservative.benchmarks.measures.timing import calls_per_sample, interleaved, prepared
+from conservative.benchmarks.measures import timing
+from conservative.benchmarks.measures.timing import count_calls, prepare_and_run, time_interleaved
 from conservative.errors import BadInput
 
+READING = 1
+"""Time, ns, between two readings of the clock."""
 
-def test_every_round_takes_each_run_once_and_the_order_changes():
+
+@pytest.fixture(autouse=True)
+def rest(monkeypatch):
+    """A clock that goes on by a little when it is read, and when a run rests for some s."""
+    now = [0]
+
+    def read():
+        now[0] += READING
+        return now[0]
+
+    def rest(seconds):
+        now[0] += round(seconds * 1e9)
+
+    monkeypatch.setattr(timing, "perf_counter_ns", read)
+    return rest
+
+
+def test_every_round_takes_each_run_once_and_the_order_changes(rest):
     calls = []
-    runs = {name: (lambda name=name: (calls.append(name), time.sleep(1e-3))) for name in "abc"}
-    timings = interleaved(runs, rounds=6, min_time=1e-4)
-    assert all((timing.rounds, timing.calls) == (6, 1) for timing in timings.values())
+    runs = {name: (lambda name=name: (calls.append(name), rest(1e-3))) for name in "abc"}
+    timings = time_interleaved(runs, rounds=6, min_time=1e-4)
+    assert all((each.rounds, each.calls) == (6, 1) for each in timings.values())
     rounds = ["".join(calls[-18:][i : i + 3]) for i in range(0, 18, 3)]
     assert all(sorted(order) == ["a", "b", "c"] for order in rounds)
     assert len(set(rounds)) > 1
 
 
-def test_the_first_call_is_not_counted():
-    naps = iter([0.05] + [0.0] * 10**6)
-    timing = interleaved({"slow at first": lambda: time.sleep(next(naps))}, rounds=3, min_time=1e-4)["slow at first"]
-    assert timing.median < 0.025
+def test_the_first_call_is_not_counted(rest):
+    rests = iter([0.05] + [1e-3] * 10**6)
+    found = time_interleaved({"slow at first": lambda: rest(next(rests))}, rounds=3, min_time=1e-4)["slow at first"]
+    assert found.minimum == found.median == pytest.approx(1e-3, rel=1e-5)  # measured 1e-6: one reading of the clock
 
 
-def test_fast_runs_are_repeated_within_a_sample():
-    assert calls_per_sample(lambda: None, 1e-3) > 100
-    assert calls_per_sample(lambda: time.sleep(2e-3), 1e-3) == 1
+def test_fast_runs_are_repeated_within_a_sample(rest):
+    assert count_calls(lambda: rest(1e-6), 1e-3) == 1000
+    assert count_calls(lambda: rest(2e-3), 1e-3) == 1
 
 
-def test_minimum_is_at_most_the_median_and_near_the_truth():
-    timing = interleaved({"nap": lambda: time.sleep(2e-3)}, rounds=5, min_time=1e-3)["nap"]
-    assert 2e-3 <= timing.minimum <= timing.median
+def test_minimum_and_median_of_the_rounds(rest):
+    rests = iter([1e-3, 1e-3, 5e-3, 2e-3, 3e-3, 9e-3, 4e-3])  # two before the rounds, to see how many calls make a sample
+    found = time_interleaved({"run": lambda: rest(next(rests))}, rounds=5, min_time=1e-3)["run"]
+    assert (found.minimum, found.median) == pytest.approx((2e-3, 4e-3), rel=1e-3)
 
 
-def test_a_run_over_its_budget_gets_three_rounds():
-    runs = {"slow": lambda: time.sleep(5e-3), "fast": lambda: None}
-    timings = interleaved(runs, rounds=8, min_time=1e-4, budget=1e-3)
-    assert timings["slow"].rounds == 3
-    assert timings["fast"].rounds > 3
+def test_a_run_over_its_budget_gets_three_rounds(rest):
+    runs = {"slow": lambda: rest(5e-3), "fast": lambda: rest(1e-6)}
+    timings = time_interleaved(runs, rounds=8, min_time=1e-4, budget=1e-3)
+    assert (timings["slow"].rounds, timings["fast"].rounds) == (3, 8)
 
 
-def test_the_collector_is_off_while_timing_and_on_afterwards():
+def test_the_collector_is_off_while_timing_and_on_afterwards(rest):
     seen = []
-    interleaved({"look": lambda: seen.append(gc.isenabled())}, rounds=3, min_time=1e-6)
+    time_interleaved({"look": lambda: (seen.append(gc.isenabled()), rest(1e-3))}, rounds=3, min_time=1e-6)
     assert seen[-1] is False
     assert gc.isenabled()
 
 
-def test_the_collector_comes_back_after_an_error():
+def test_the_collector_comes_back_after_an_error(rest):
     count = iter(range(100))
 
     def fails_late():
         if next(count) > 3:
             raise RuntimeError("planted")
-        time.sleep(1e-3)
+        rest(1e-3)
 
     with pytest.raises(RuntimeError, match="planted"):
-        interleaved({"run": fails_late}, rounds=9, min_time=1e-4)
+        time_interleaved({"run": fails_late}, rounds=9, min_time=1e-4)
     assert gc.isenabled()
 
 
-def test_preparation_and_first_call_are_apart():
+def test_preparation_and_first_call_are_apart(rest):
     def prepare():
-        time.sleep(2e-3)
-        return lambda: (time.sleep(1e-3), "result")[1]
+        rest(2e-3)
+        return lambda: (rest(1e-3), "result")[1]
 
-    run, result, cost = prepared(prepare)
+    run, result, cost = prepare_and_run(prepare)
     assert result == run() == "result"
-    assert cost.prepare >= 2e-3
-    assert cost.first_call >= 1e-3
+    assert (cost.prepare, cost.first_call) == pytest.approx((2e-3, 1e-3), rel=2e-3)
     assert cost.total == cost.prepare + cost.first_call
 
 
 @pytest.mark.parametrize("bad", [{"rounds": 0}, {"rounds": 2.5}, {"min_time": 0}, {"min_time": float("nan")}])
 def test_bad_input(bad):
     with pytest.raises(BadInput) as caught:
-        interleaved({}, **bad)
+        time_interleaved({}, **bad)
     assert caught.value.argument == next(iter(bad))

@@ -33,7 +33,7 @@ def test_grid_counts_the_samples_of_a_run_that_stopped(done):
 
 @pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10"])
 def test_names_are_read_back(text):
-    assert registry.method(text).name == text.replace("1e-10", "1e-10")
+    assert registry.method(text).name == text
     assert registry.method(registry.method(text).name) == registry.method(text)
 
 

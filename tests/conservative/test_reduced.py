@@ -7,7 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, cayley, rotation_about
-from conservative.methods.non_spinning import resolved
+from conservative.methods.non_spinning import resolve_frame
 from conservative.methods.principal_axes import principal_start
 
 TURN = rotation_about((3, -1, 2), 1.3)
@@ -119,11 +119,11 @@ def test_the_frame_that_does_not_spin_has_the_same_motion(free: bool, side: floa
 
 
 def test_frames_are_chosen_and_refused() -> None:
-    assert resolved("auto", symmetric(True)) == "non_spinning"
-    assert resolved("auto", symmetric(False)) == "non_spinning"
-    assert resolved("auto", cv.scenes.brick_flip()) == "body"
+    assert resolve_frame("auto", symmetric(True)) == "non_spinning"
+    assert resolve_frame("auto", symmetric(False)) == "non_spinning"
+    assert resolve_frame("auto", cv.scenes.brick_flip()) == "body"
     sphere = cv.Scene("sphere", cv.RigidBody((2, 2, 2)), np.eye(3), (1, 2, 3), 1.0)
-    assert resolved("auto", sphere) == "body"
+    assert resolve_frame("auto", sphere) == "body"
     with pytest.raises(cv.Unsupported, match="symmetric about one axis"):
         cv.integrate(cv.scenes.brick_flip(), method=cv.Reduced(frame="non_spinning"))
     with pytest.raises(cv.BadInput, match="frame"):

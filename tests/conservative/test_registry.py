@@ -3,11 +3,11 @@ from importlib.metadata import EntryPoint
 import pytest
 
 import conservative as cv
-from conservative import registry
+from conservative import entry_points, registry
 from conservative.errors import BadInput, NotLoadable
 
 
-@pytest.mark.parametrize("name", registry.registered(registry.SCENES))
+@pytest.mark.parametrize("name", registry.list_scenes())
 def test_every_scene_builds_under_its_name(name):
     scene = registry.scene(name)
     assert scene.name == name
@@ -15,9 +15,9 @@ def test_every_scene_builds_under_its_name(name):
     assert scene.group != "your own"
 
 
-@pytest.mark.parametrize("name", registry.registered(registry.METHODS))
+@pytest.mark.parametrize("name", registry.list_methods())
 def test_every_method_is_a_frozen_value_that_is_read_back_from_its_name(name):
-    family = registry.registered(registry.METHODS)[name].load()
+    family = entry_points.list_entries(entry_points.METHODS)[name].load()
     assert family.family == name
     for method in family.variants():
         assert registry.method(method.name) == method
@@ -43,8 +43,8 @@ def test_an_unknown_setting_is_answered_with_the_nearest():
 
 def with_entry(monkeypatch, name, value):
     """Register one more method, as an installed package would."""
-    known = registry.registered(registry.METHODS) | {name: EntryPoint(name, value, registry.METHODS)}
-    monkeypatch.setattr(registry, "registered", lambda group: known)
+    known = entry_points.list_entries(entry_points.METHODS) | {name: EntryPoint(name, value, entry_points.METHODS)}
+    monkeypatch.setattr(entry_points, "list_entries", lambda group: known)
 
 
 @pytest.mark.parametrize("value", ["conservative.body:Phantom", "conservative.nowhere:Phantom"])

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry
+from conservative import entry_points, registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.scenes.turned_frame import in_body_frame
 
-NAMES = tuple(registry.registered(registry.SCENES))
+NAMES = tuple(registry.list_scenes())
 REFERENCE = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
 BUILDERS = {
     "brick_flip": cv.scenes.brick_flip,
@@ -32,7 +32,7 @@ BUILDERS = {
 
 
 def builder_of(name):
-    return registry.registered(registry.SCENES)[name].load()
+    return entry_points.list_entries(entry_points.SCENES)[name].load()
 
 
 def numbers(case, key):

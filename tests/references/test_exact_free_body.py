@@ -20,7 +20,7 @@ FREE = ["brick_flip", "brick_flip_1e-6", "brick_flip_1e-12", "hairer_vilmart", "
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_bodies(seed, separatrix):
-    attitude, rates = study.free_case(np.random.default_rng(seed), separatrix).errors()
+    attitude, rates = study.draw_free(np.random.default_rng(seed), separatrix).errors()
     assert attitude < study.FREE_BOUND  # measured 1.4e-15 over the 1,000 cases of the study; the bound is 1e-13
     assert rates < study.FREE_BOUND  # measured 8e-16
 
@@ -57,7 +57,7 @@ SEPARATRIX = cv.RigidBody((4, 5, 9)), (3, 0.7, 1)
 def test_the_separatrix_itself():
     body, w0 = SEPARATRIX
     t = np.array([-50.0, -1.0, 0.0, 0.4, 2.0, 9.0])
-    case = study.Case("separatrix", body, None, R0, np.array(w0, dtype=float), t[t > 0])
+    case = study.Trial("separatrix", body, None, R0, np.array(w0, dtype=float), t[t > 0])
     attitude, rates = case.errors()
     assert attitude < 1e-14  # measured 7e-16
     assert rates < 1e-14  # measured 3e-16

@@ -16,18 +16,18 @@ def test_the_study_passes_on_a_few_cases(capsys):
 
 
 def test_the_study_fails_on_an_error_above_its_bound(monkeypatch, capsys):
-    monkeypatch.setattr(study.Case, "errors", lambda case: (2e-13, 0.0))
+    monkeypatch.setattr(study.Trial, "errors", lambda case: (2e-13, 0.0))
     assert study.main(["--free", "2", "--tops", "0"]) == 1
     assert "2.0e-13" in capsys.readouterr().out
 
 
 def test_its_near_cases_are_near():
     for number in range(0, 100, 20):
-        case = study.top_case(np.random.default_rng(number), 1e-6)
+        case = study.draw_top(np.random.default_rng(number), 1e-6)
         assert study.pole_distance(case, case.t[-1]) < 1e-5
         body, w = (
-            study.free_case(np.random.default_rng(number), 1e-6).body,
-            study.free_case(np.random.default_rng(number), 1e-6).w_WB_B0,
+            study.draw_free(np.random.default_rng(number), 1e-6).body,
+            study.draw_free(np.random.default_rng(number), 1e-6).w_WB_B0,
         )
         L = body.momentum(w)
         middle = np.sort(body.moments)[1]

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from conservative.references.exact.clock import Clock, rotation_clock
-from conservative.references.exact.theta import Lattice, Points, jacobi, mp
+from conservative.references.exact.digits import mp
+from conservative.references.exact.theta import Lattice, Points, jacobi
 
 # From the sphere's parameter to the separatrix's, and next to both.
 PARAMETERS = ["0", "1e-30", "0.3", "0.4999", "0.5001", "0.97"]
@@ -53,12 +54,12 @@ def test_jacobi_functions_on_the_separatrix_are_hyperbolic():
 def test_a_clock_keeps_its_digits_however_late(period):
     clock = Clock(mp.mpf(1) / 3, mp.sqrt(2), period)
     t = np.array([0.0, -3.3, 1e3 + 0.1, 1e9 + 0.3, -1e12 - 0.7, 123456789012345.6])
-    phase, odd = clock.reduced(t)
+    phase, odd = clock.reduce(t)
     for time, found, parity in zip(t, phase, odd, strict=True):
         off = (clock.start + clock.rate * mp.mpf(float(time)) - mp.mpf(float(found))) / period
         assert abs(off - mp.nint(off)) < 4e-16  # measured 1.1e-16
         assert int(mp.nint(off)) % 2 == parity
         assert abs(found) < 0.5000001 * period
     if period == 2 * mp.pi:
-        turned = rotation_clock(clock.start, clock.rate).turned(t)
+        turned = rotation_clock(clock.start, clock.rate).phasor(t)
         np.testing.assert_allclose(turned, np.exp(1j * phase), rtol=1e-15)

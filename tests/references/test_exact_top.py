@@ -21,7 +21,7 @@ CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json"
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_tops(seed, pole):
-    case = study.top_case(np.random.default_rng(seed), pole)
+    case = study.draw_top(np.random.default_rng(seed), pole)
     attitude, rates = case.errors()
     assert attitude < study.TOP_BOUND  # measured 1.2e-13 over the 1,000 tops of the study
     assert rates < study.TOP_BOUND  # measured 8.4e-14
@@ -71,7 +71,7 @@ STARTS = {
 def test_special_starts_agree_with_multi_precision(name):
     moments, moment, R, w0 = STARTS[name]
     body, field = cv.RigidBody(moments), cv.UniformGravity(1.0, moment)
-    case = study.Case(name, body, field, np.array(R, dtype=float), np.array(w0, dtype=float), np.array([0.3, 2.0, 8.0]))
+    case = study.Trial(name, body, field, np.array(R, dtype=float), np.array(w0, dtype=float), np.array([0.3, 2.0, 8.0]))
     attitude, rates = case.errors()
     assert attitude < 2e-14  # measured 1.2e-15 at most
     assert rates < 2e-14  # measured 1.3e-15 at most
@@ -91,7 +91,7 @@ def test_the_lie_group_top_passes_next_to_straight_down():
     # (1 + cos theta) = 2.6e-13 there: where Euler's angles, or a root taken by subtraction, lose everything
     case = CASES["heavy_top_lie_group"]
     body, field = cv.RigidBody(numbers(case["J"])), cv.UniformGravity(1.0, numbers(case["weight_com_B"]))
-    # Tilts from the vertical, sampled finely: the smallest is what hard_cases.md calls 7e-7 rad
+    # Tilts from the vertical, sampled finely: the smallest is 7e-7 rad
     t = np.linspace(0, 2, 400_001)
     R, w = lagrange_top(body, field, np.eye(3), numbers(case["w0"]), t)
     tilt = np.hypot(R[:, 0, 1], R[:, 1, 1])

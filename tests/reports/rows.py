@@ -1,15 +1,40 @@
 """Made-up measurements, so that what tables and pictures say of them is known beforehand."""
 
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement, frame
-from conservative.reports.tables.work_precision import ERROR, TIME
+from conservative.method import Role
+from conservative.outcome import OK, Outcome, OutcomeKind
 
 
-def point(line, role, error, time, dt=0.1, scene="made_up", label=None, method=None, status="ok"):
+def row(study, method, measure, value, dt=0.1, **fields):
+    """A row of a made-up study; `measure` may be a text such as `energy drift max`."""
+    quantity = ""
+    if isinstance(measure, str):
+        if " drift " in measure:
+            quantity, measure = measure.split(" drift ")
+            measure = f"drift {measure}"
+        measure = Measure.named(measure)
+    outcome = fields.pop("outcome", OK)
+    common = {"scene": "made_up", "label": method, "role": Role.OURS, "series": method, **fields}
+    common["role"] = Role(common["role"])
+    return Measurement(
+        study=study,
+        method=method,
+        dt=dt,
+        quantity=quantity,
+        measure=measure,
+        value=value,
+        outcome=outcome if isinstance(outcome, Outcome) else Outcome(OutcomeKind(outcome)),
+        **common,
+    )
+
+
+def point(line, role, error, time, dt=0.1, scene="made_up", label=None, method=None, outcome="ok"):
     method = method or line
-    common = ("work_precision", scene, method, label or method, role, dt)
+    common = {"dt": dt, "scene": scene, "label": label or method, "role": role, "series": line, "outcome": outcome}
     return [
-        Measurement(*common, ERROR, error, "rad", status, line),
-        Measurement(*common, TIME, time, "s/s", status, line),
+        row("work_precision", method, Measure.ATTITUDE_MAX, error, **common),
+        row("work_precision", method, Measure.TIME, time, **common),
     ]
 
 

@@ -49,16 +49,6 @@ def test_exact_solutions_and_engines_are_described(pages):
         assert {family, f"{family}.prepare"} <= described(pages[f"conservative/references/engines/{engine}.html"])
 
 
-def test_public_names_are_those_that_the_package_imports():
-    imported = {name for name, found in vars(conservative).items() if not name.startswith("_") and found_here(name, found)}
-    assert set(conservative.__all__) == imported
-
-
-def found_here(name, found):
-    """Submodules become attributes when anybody imports them; of those only the two that hold names for users are public."""
-    return name in ("scenes", "shapes") if isinstance(found, ModuleType) else True
-
-
 def test_pages_load_nothing_from_elsewhere(pages):
     loaded = {"".join(found) for page in pages.values() for found in LOADED.findall(page)}
     assert not [address for address in loaded if re.match(r"https?:|//", address)]

@@ -40,7 +40,7 @@ def test_run_equals_the_known_rates():
     done = conservative("run", "brick_flip", "--method", "reduced", "--dt", "0.01", "--json")
     assert done.exit_code == 0
     summary = json.loads(done.stdout)
-    # method.md, section 3: rates of the scheme itself at t = 6
+    # Rates of the scheme itself at t = 6
     error = np.abs(np.subtract(summary["last"]["w_WB_B"], (-0.2856185, 0.36022433, 9.99151229))).max()
     assert error < 1e-8  # measured 3.8e-9, the digits printed there
     assert summary["counters"]["steps"] == 600
@@ -66,7 +66,7 @@ def test_run_writes_samples(tmp_path):
 
 
 def test_a_run_of_many_steps_keeps_a_limited_number_of_samples(tmp_path, monkeypatch):
-    monkeypatch.setattr("conservative.reports.cli.run.SAMPLES", 100)
+    monkeypatch.setattr("conservative.reports.run.single_run.SAMPLES", 100)
     path = tmp_path / "run.csv"
     summary = json.loads(conservative("run", "brick_flip", "--dt", "0.007", "--csv", path, "--json").stdout)
     rows = list(csv.DictReader(path.read_text().splitlines()))
@@ -123,7 +123,7 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
     def broken():
         raise ValueError("not the user's mistake")
 
-    monkeypatch.setattr("conservative.reports.cli.list.show", broken)
+    monkeypatch.setattr("conservative.reports.tables.catalogue.tables", broken)
     assert isinstance(conservative("list").exception, ValueError)
 
 

@@ -2,10 +2,10 @@ import math
 
 import pytest
 
-from conservative.benchmarks.measures.measurement import Measurement
+from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.tables import headline, work_precision
 
-from .rows import point, table
+from .rows import point, row, table
 
 OURS = (point("ours", "ours", 1e-2, 1.0, dt=0.4), point("ours", "ours", 1e-4, 4.0, dt=0.2), point("ours", "ours", 1e-6, 16.0))
 ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine", 1e-8, 8.0))
@@ -38,9 +38,7 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
 
 def test_nothing_is_claimed_below_what_the_truth_is_known_to():
     def agreement(label):
-        return [
-            Measurement("paper", "made_up", "truth", label, "truth", 0.1, work_precision.AGREEMENT, 1e-5, "rad", "ok", label)
-        ]
+        return [row("paper", "truth", Measure.AGREEMENT, 1e-5, label=label, role="truth")]
 
     checked = work_precision.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
     assert [c.error for c in work_precision.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
@@ -61,7 +59,7 @@ def test_nothing_is_extrapolated():
 
 
 def test_points_of_failed_runs_and_of_truths_do_not_compete():
-    failed = point("ours", "ours", float("nan"), float("nan"), status="not converged", dt=0.01)
+    failed = point("ours", "ours", float("nan"), float("nan"), outcome="not converged", dt=0.01)
     truth = point("exact", "truth", 1e-15, 1e-9)
     found = contest(1e-5, *OURS, *ENGINE, failed, truth)
     assert found.ours.time == pytest.approx(8.0, rel=1e-14)

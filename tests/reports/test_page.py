@@ -1,71 +1,27 @@
 import copy
 import json
-import math
 import re
 from html.parser import HTMLParser
 
 import numpy as np
-import pandas as pd
 import pytest
 import vl_convert
 
-from conservative import Reduced, RigidBody, Scene, registry, scenes
-from conservative.attitude import rotation_about
-from conservative.benchmarks.measures.measurement import Measurement, frame
-from conservative.benchmarks.studies import import_time
-from conservative.reports import document
-from conservative.reports.charts import figures, spheres, vega_embed
+from conservative import Reduced, Scene, scenes
+from conservative.reports.charts import figures, vega_embed
+from conservative.reports.page import figures as page_figures
 from conservative.reports.page import page
+from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables import claims, overview
 from conservative.reports.tables.work_precision import points
+from conservative.reports.view import build
 
-from .rows import point
-
-
-def row(study, method, measure, value, dt=0.1, scene="brick_flip", status="ok", role="ours"):
-    return Measurement(study, scene, method, method, role, dt, measure, value, "1", status)
-
-
-def ladder(method, order, scene="brick_flip"):
-    """Errors over steps of a method that has just this order."""
-    return [
-        row("convergence", method, "attitude error max", dt**order, dt, scene) for dt in (0.1, 0.05, 0.025, 0.0125, 0.00625)
-    ]
-
-
-def made_up():
-    lines = [
-        *point("reduced", "ours", 1e-2, 1e-6, scene="brick_flip"),
-        *point("reduced", "ours", 1e-4, 1e-5, 0.01, "brick_flip"),
-    ]
-    lines += [*point("scipy:DOP853", "engine", 1e-3, 1e-4, scene="brick_flip")]
-    drift = [
-        row("drift", "reduced", "energy drift max", 2e-15),
-        row("drift", "mujoco", "energy drift max", 3e-2, role="engine"),
-    ]
-    return frame([*lines, *drift, *ladder("reduced", 2), row("speed", "reduced", "first call time", 0.25)])
-
-
-def measured():
-    samples = pd.DataFrame(
-        [("brick_flip", name, t, "energy", 1e-15 * t) for name in ("reduced", "mujoco") for t in np.linspace(0.5, 60, 120)],
-        columns=["scene", "series", "t", "invariant", "drift"],
-    )
-    return document.Measured(made_up(), samples)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def libraries():
-    """Libraries that are imported in no time, one of which is not there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(import_time, "MODULES", {"json": "ours", "no_such_library": "engine"})
-        yield
+from .made_up import measurements, table
 
 
 @pytest.fixture(scope="module")
-def text(libraries):
-    return page.render(document.plan(["brick_flip"], ["reduced"], quick=True), measured(), provenance(["report"]))
+def text():
+    return page.render(build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance(["report"])))
 
 
 class Outward(HTMLParser):
@@ -119,7 +75,7 @@ def test_text_cannot_become_markup():
     assert "</script" not in page._in_script({"name": "</script><b>"})
     assert json.loads(page._in_script({"name": "</script>"})) == {"name": "</script>"}
     scene = Scene("<b>", scenes.brick_flip().body, np.eye(3), (0.1, 0.2, 3.0), 1.0, dt=0.1, source="<i>")
-    shown = page.render(document.Plan((scene,), (Reduced(),), quick=True), measured(), provenance([]))
+    shown = page.render(build(Plan((scene,), (Reduced(),), quick=True), measurements(), provenance([])))
     assert "<i>" not in shown
     assert "&lt;i&gt;" in shown
     assert "Nothing was measured that could be drawn" in shown
@@ -134,7 +90,7 @@ def drawn(spec, hidden=()):
 
 
 def test_chart_draws_its_lines_and_the_switch_takes_one_away():
-    (spec,) = vega_embed.embedded(figures.work_precision(points(made_up()), "brick_flip"), page._hovering("error"))
+    (spec,) = vega_embed.embed(figures.work_precision(points(table()), "brick_flip"), page_figures.hover("error"))
     colour = vega_embed.legend(["reduced"], True)[0].colour
     assert drawn(spec).count(colour) > 1
     assert colour not in drawn(spec, ["reduced"])
@@ -143,140 +99,15 @@ def test_chart_draws_its_lines_and_the_switch_takes_one_away():
 
 
 def test_legend_has_the_lines_of_the_charts():
-    figure = page._work_precision(points(made_up()), "brick_flip")
-    assert [entry.name for entry in figure.legend] == ["reduced", "scipy DOP853"]
-    panels = page._drift(measured().drifts, "brick_flip").charts
+    (scene,) = build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance([])).scenes
+    found = page_figures.scene_figures(scene)
+    assert [entry.name for entry in found.work_precision.legend] == ["reduced", "scipy DOP853"]
+    panels = found.drift.charts
     assert len(panels) == 1
-    assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * page.DRIFT_SAMPLES + 1
+    assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * page_figures.DRIFT_SAMPLES + 1
 
 
 def test_data_are_short_and_exact_to_their_digits():
     data = vega_embed.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
     assert data["values"].splitlines() == ["name,x", '"a, b",0.3333333', "c,1e-17"]
     assert data["format"]["parse"] == {"x": "number"}
-
-
-def test_verdict_names_the_cheapest_and_what_it_keeps():
-    header, body = overview.verdict(made_up(), points(made_up()))
-    rows = [dict(zip(header, line, strict=True)) for line in body]
-    assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
-    assert rows[0]["cheapest"] == "reduced"
-    assert "energy ✓" in rows[0]["conserves"]
-    assert rows[0]["fails"] == "nowhere here"
-
-
-def test_verdict_tells_where_the_cheapest_fails():
-    failed = row("drift", "reduced", "energy drift max", math.nan, scene="other", status="diverged after t = 0.36 s (why)")
-    cannot = [row("drift", "reduced", "energy drift max", math.nan, scene=f"s{k}", status="unsupported") for k in range(5)]
-    found = overview.verdict(frame([failed, *cannot]), points(made_up()))
-    assert found[1][0][-1] == "diverged: other; unsupported: s0, s1 and 3 more scenes"
-
-
-def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
-    rows = [row("convergence", "a", "x", math.nan, status="unsupported"), row("drift", "a", "energy drift max", 1e-15)]
-    assert overview._troubles(frame(rows)).empty
-    assert len(overview._troubles(frame(rows[:1]))) == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "text", "status"),
-    [
-        (3e-15, "✓ 3.0e-15", "good"),
-        (2e-6, "≈ 2.0e-06", "fair"),
-        (0.3, "✗ 0.3", "bad"),
-        (math.inf, "✗ inf", "bad"),
-        (math.nan, "–", "none"),
-    ],
-)
-def test_drift_is_graded_by_symbol_and_colour(value, text, status):
-    assert overview.graded(value) == overview.Cell(text, status)
-
-
-def test_hard_cases_are_a_matrix():
-    rows = [
-        row("hard_cases", "reduced", "energy drift max", 1e-15, scene="needle"),
-        row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", status="not converged in step 3"),
-        row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", role="engine"),
-    ]
-    header, body = overview.hard_cases(frame(rows))
-    assert header == ["method", "needle", "falling_top"]
-    assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
-    assert overview.hard_cases(made_up()) is None
-
-
-def verdicts(rows, scene="brick_flip"):
-    return {found.claim: found.verdict for found in claims.findings(frame(rows), [registry.scene(scene)])}
-
-
-@pytest.mark.parametrize(("order", "verdict"), [(4, claims.HOLDS), (2, claims.FAILS)])
-def test_audit_of_an_order(order, verdict):
-    assert verdicts(ladder("reduced:order=4", order)) == {"reduced:order=4 is of order 4 (brick_flip)": verdict}
-
-
-@pytest.mark.parametrize(("drift", "verdict"), [(4e-16, claims.HOLDS), (1e-9, claims.FAILS), (math.nan, claims.FAILS)])
-def test_audit_of_a_conserved_quantity(drift, verdict):
-    rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
-    assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
-
-
-@pytest.mark.parametrize(("error", "verdict"), [(0.1, claims.HOLDS), (0.2, claims.FAILS), (math.nan, claims.FAILS)])
-def test_audit_of_one_map_in_two_programs(error, verdict):
-    rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
-    found = verdicts(rows)
-    assert found.get("reduced is the paper's map (brick_flip)", claims.FAILS) == verdict
-
-
-@pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, claims.HOLDS), (0.5, claims.FAILS), (math.nan, claims.FAILS)])
-def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
-    rows = [
-        row("paper", "mujoco", "energy drift max", coarse, 0.01, role="engine"),
-        row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, role="engine"),
-        row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, role="engine"),
-        row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, role="engine"),
-    ]
-    found = verdicts(rows)
-    assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
-    assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == claims.HOLDS
-
-
-@pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
-def test_curves_lie_on_the_unit_sphere(name):
-    found = spheres.curves([registry.scene(name)], [registry.method("reduced")])
-    assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
-    assert 200 < len(found) <= spheres.KEPT
-
-
-def test_polhode_is_the_same_whatever_the_body_axes():
-    base = scenes.brick_flip()
-    S = rotation_about((1.0, 2.0, -0.5), 0.7)
-    turned = Scene("turned", RigidBody(S.T @ base.body.inertia @ S), base.R_WB0 @ S, S.T @ base.w_WB_B0, base.t_end, dt=base.dt)
-    one, other = (np.abs(spheres.curves([scene], [Reduced()])[["x", "y", "z"]].to_numpy()) for scene in (base, turned))
-    assert np.abs(one - other)[:50].max() < 1e-9  # measured 3e-13
-
-
-def test_methods_without_a_curve_are_named():
-    found = spheres.curves([scenes.brick_flip()], [Reduced()])
-    assert spheres.absent(found, "brick_flip", [Reduced(), registry.method("lame")]) == ["lame"]
-
-
-def test_picks_one_method_of_each_family_that_has_no_preferred_one():
-    names = [
-        m.name
-        for m in spheres.chosen(
-            [registry.method(n) for n in ("gauss:stages=2", "gauss", "reduced:order=4", "reduced", "exact")]
-        )
-    ]
-    assert names == ["reduced", "gauss:stages=2"]
-
-
-def test_longest_steps_are_a_matrix():
-    largest, first = overview.LARGEST, "first"
-    rows = [
-        row("stability", "a", largest, 1.0, scene="needle"),
-        row("stability", "a", first, 3.2, scene="needle", status="not converged"),
-        row("stability", "b", largest, 10.0, scene="needle"),
-        row("stability", "c", largest, math.nan, scene="needle", status="unsupported"),
-    ]
-    _, body = overview.stability(frame(rows))
-    assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
-    assert overview._troubles(frame(rows)).empty

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from conservative.reports import document
+from conservative.reports.run.plan import plan_report
 
 pytestmark = pytest.mark.browser
 
@@ -31,7 +32,7 @@ PATIENCE = 60  # s, for a loaded machine; nothing is timed by it
 def folder(tmp_path_factory):
     """A real report of both scenes."""
     out = tmp_path_factory.mktemp("browser") / "report"
-    document.write(document.plan([], METHODS, quick=True), out, lambda share, what: None)
+    document.write(plan_report([], METHODS, quick=True), out, lambda share, what: None)
     return out
 
 

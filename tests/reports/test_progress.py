@@ -10,7 +10,7 @@ from conservative.reports.terminal import progress
 
 STEPS = """
 from time import sleep
-from reports.progress import progress
+from conservative.reports.terminal.progress import progress
 with progress() as step:
     for k in range(8):
         step(k / 8, "a study: a scene, with a long name")
@@ -18,7 +18,7 @@ with progress() as step:
 """
 SLOW = """
 from time import sleep
-from reports.progress import waiting
+from conservative.reports.terminal.progress import waiting
 with waiting("a scene: a method") as expect:
     expect(4.0)
     sleep(1.5)

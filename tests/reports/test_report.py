@@ -1,18 +1,28 @@
 import json
+import math
 import re
 import xml.etree.ElementTree as ET
 from itertools import pairwise
+from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
-from conservative.benchmarks.measures.measurement import COLUMNS
+from conservative.benchmarks.measures.measurement import COLUMNS, frame
+from conservative.benchmarks.studies import studies
 from conservative.reports import document
 from conservative.reports.charts import style
-from conservative.reports.cli.main import _listed, main
+from conservative.reports.cli.main import main
+from conservative.reports.cli.options import split_names
+from conservative.reports.run import plan
+from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
+from conservative.reports.tables import runs
+
+from .rows import row
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +49,15 @@ def test_progress_is_off_where_there_is_no_terminal(made):
 
 
 def test_progress_never_goes_back_and_ends_near_the_whole():
-    made = document.plan([], ["reduced", "mujoco:RK4"], quick=True)
-    spans = list(made.spans(made.pieces).values())
+    made = plan_report([], ["reduced", "mujoco:RK4"], quick=True)
+    spans = list(made.spans(made.names).values())
     assert spans[0][0] == 0
     assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
     assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
+
+
+def test_progress_knows_how_long_every_study_takes():
+    assert set(plan.SECONDS) == set(studies.MAKERS)
 
 
 def test_table_and_json_hold_the_same_rows_with_their_origin(made):
@@ -52,14 +66,23 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     stored = json.loads((folder / "measurements.json").read_text())
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
-    assert {"paper", "convergence", "speed", "work_precision", "drift"} == set(table["study"])
+    assert {"paper", "convergence", "speed", "work_precision", "long_runs", "import_time"} == set(table["study"])
     assert stored["schema"] == document.SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]
     for key in ("command", "python", "commit", "date"):
         assert stored[key]
-    energy = table[(table["study"] == "paper") & (table["measure"] == "energy drift max") & (table["method"] == "reduced")]
+    energy = table[
+        (table["study"] == "paper")
+        & (table["measure"] == "drift max")
+        & (table["quantity"] == "energy")
+        & (table["method"] == "reduced")
+    ]
     assert energy["value"].max() < 1e-13  # measured 5e-16
+    values = [math.nan if row["value"] is None else row["value"] for row in stored["rows"]]
+    assert np.array_equal(
+        values, table["value"], equal_nan=True
+    )  # pandas' own JSON has 15 decimals, and 1.33e-15 is one of them
 
 
 def test_text_shows_every_picture_table_and_what_cannot_be_done(made):
@@ -93,7 +116,7 @@ def test_report_that_is_stopped_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
+        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -104,7 +127,7 @@ def test_folder_is_checked_before_any_work(tmp_path):
         pytest.fail("work was begun")
 
     with pytest.raises(BadInput, match=r"out: got .*mine.txt"):
-        document.write(document.plan(["brick_flip"], ["reduced"]), tmp_path, fail)
+        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path, fail)
 
 
 @pytest.mark.parametrize(
@@ -132,8 +155,8 @@ def test_missing_engine_stops_the_plan_unless_it_is_skipped(monkeypatch):
 
     monkeypatch.setattr(type(registry.method("mujoco")), "label", property(missing))
     with pytest.raises(MissingEngine, match="pip install mujoco"):
-        document.plan(["brick_flip"], ["mujoco"])
-    assert len(document.plan(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
+        plan_report(["brick_flip"], ["mujoco"])
+    assert len(plan_report(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
 
 
 def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypatch):
@@ -144,36 +167,27 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
 
     monkeypatch.setattr(registry, "method", method)
     with pytest.raises(MissingEngine, match="pip install pin"):
-        document.plan(["brick_flip"], [])
-    assert "pinocchio" in [method.name for method in document.plan(["brick_flip"], [], skip_missing=True).methods]
+        plan_report(["brick_flip"], [])
+    assert "pinocchio" in [method.name for method in plan_report(["brick_flip"], [], skip_missing=True).methods]
 
 
 def test_failure_of_ours_is_told(monkeypatch):
-    from conservative.benchmarks.measures.measurement import Measurement, frame
-
-    status = str(NotConverged(3, 0.02, 1.0).outcome)
-    common = (
-        "paper",
-        "brick_flip",
-        "reduced",
-        "conservative==0.1.0/reduced",
-        "ours",
-        0.01,
-        "energy drift max",
-        float("nan"),
-        "1",
-    )
-    measured = document.Measured(frame([Measurement(*common, status), Measurement(*common, "unsupported")]), pd.DataFrame())
-    assert document.failed(measured) == [f"reduced on brick_flip, dt = 0.01 s: {status}"]
-    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: measured)
+    outcome = NotConverged(3, 0.02, 1.0).outcome
+    found = [
+        row("paper", "reduced", "energy drift max", float("nan"), 0.01, scene="brick_flip", outcome=each)
+        for each in (outcome, "unsupported")
+    ]
+    failed = runs.failures_of_ours(frame(found))
+    assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
+    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed))
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr
 
 
 def test_names_with_settings_are_kept_together():
-    assert _listed("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
-    assert _listed("methods", ()) == []
+    assert split_names("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
+    assert split_names("methods", ()) == []
 
 
 @pytest.mark.parametrize("option", ["--scenes", "--methods"])

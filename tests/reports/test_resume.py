@@ -8,18 +8,24 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from conservative import BadInput
-from conservative.benchmarks.measures.measurement import Measurement
+from conservative import BadInput, NotConverged
+from conservative.benchmarks.measures.samples import Samples
+from conservative.method import Role
 from conservative.reports import document
 from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
+from conservative.reports.run.measure import measure
+from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.terminal.interrupts import Terminated, interruptible, unstoppable
 
+from .rows import row
+
+OUTCOME = NotConverged(3, 0.02, 0.5, "why").outcome
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
 TIMES = ("s", "s/s")
 
@@ -73,7 +79,7 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     assert out == ""
     assert err.count("\n") == 1
     assert err.startswith("Interrupted; ")
-    assert f"{len(content['pieces'])} of 5 studies are finished (paper, convergence, speed" in err
+    assert f"{len(content['pieces'])} of 8 studies are finished (paper, convergence, speed" in err
     assert again == ["conservative", *SMALL, "--resume"]
     assert left == {"report", "report.partial.json"}
     assert earlier["report.md"] == "earlier"
@@ -90,25 +96,25 @@ def test_resume_does_the_rest_and_tidies_up(resumed):
 
 
 def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(resumed, tmp_path):
-    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
-    kept = checkpoint.begun(made, tmp_path / "report", provenance(SMALL), resume=False)
-    document.measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
+    made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    kept = checkpoint.begin(made, tmp_path / "report", provenance(SMALL), resume=False)
+    measure(made, lambda share, what: None, kept).table.to_csv(tmp_path / "whole.csv", index=False)
     found, whole = (pd.read_csv(path) for path in (resumed[0] / "report" / "measurements.csv", tmp_path / "whole.csv"))
     assert len(found) > 100
     timed = found["unit"].isin(TIMES)
     assert timed.any()
     pd.testing.assert_frame_equal(found[~timed], whole[~timed], check_exact=True)
-    same = ["study", "scene", "method", "label", "role", "dt", "measure", "unit", "status"]
+    same = ["study", "scene", "method", "label", "role", "dt", "quantity", "measure", "unit", "outcome"]
     pd.testing.assert_frame_equal(found.loc[timed, same], whole.loc[timed, same], check_exact=True)
 
 
 def test_what_was_finished_is_not_measured_again(resumed):
     folder, content = resumed[0], resumed[4]
     rows = json.loads((folder / "report" / "measurements.json").read_text())["rows"]
-    kept = [tuple(row) for row in content["pieces"]["speed"]["rows"]]
-    assert [tuple(row.values())[:7] for row in rows if row["study"] == "speed"] == [row[:7] for row in kept]
+    kept = content["pieces"]["speed"]["rows"]
+    assert [list(row.values())[:9] for row in rows if row["study"] == "speed"] == [list(row.values())[:9] for row in kept]
     times = [row["value"] for row in rows if row["study"] == "speed"]
-    assert times == pytest.approx([row[7] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
+    assert times == pytest.approx([row["value"] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
 
 
 def test_a_resumed_report_says_so(resumed):
@@ -117,12 +123,12 @@ def test_a_resumed_report_says_so(resumed):
     made = json.loads((folder / "report" / "measurements.json").read_text())
     assert len(made["resumed"]) == 1
     assert made["resumed"][0].startswith(f"{', '.join(content['pieces'])}: measured by an earlier process")
-    assert by["begun"] in made["resumed"][0]
+    assert by["start"] in made["resumed"][0]
     assert made["command"].endswith("--resume")
     for name in ("report.md", "index.html"):
         text = (folder / "report" / name).read_text()
         assert "interrupted and resumed" in text
-        assert by["begun"] in text
+        assert by["start"] in text
 
 
 def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
@@ -138,11 +144,12 @@ def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
 def unfinished(tmp_path, monkeypatch):
     """A folder with the file of a report that has finished one study."""
     monkeypatch.chdir(tmp_path)
-    made = document.plan(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     source = provenance(SMALL)
-    kept = checkpoint.begun(made, Path("report"), source, resume=False)
-    row = ("paper", "brick_flip", "reduced", "reduced", "ours", 0.1, "energy drift max", float("nan"), "1", "ok")
-    kept.keep("paper", [Measurement(*row)], [["brick_flip", 0.1 + 0.2]])
+    kept = checkpoint.begin(made, Path("report"), source, resume=False)
+    line = {"study": "paper", "scene": "brick_flip", "method": "reduced", "label": "reduced", "role": Role.OURS, "dt": 0.1}
+    lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
+    kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
     return tmp_path
 
 
@@ -150,7 +157,9 @@ def test_floats_come_back_as_they_are(unfinished):
     _, found = checkpoint.read(unfinished / "report.partial.json")
     assert found["paper"].rows[0].dt == 0.1
     assert found["paper"].rows[0].value != found["paper"].rows[0].value
-    assert found["paper"].samples == (("brick_flip", 0.1 + 0.2),)
+    assert found["paper"].rows[0].outcome == OUTCOME
+    assert found["paper"].samples[0].t[0] == 0.1 + 0.2
+    assert np.isnan(found["paper"].samples[0].value[0])
 
 
 @pytest.mark.parametrize(
@@ -191,7 +200,7 @@ def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 1, "pieces": {"paper": {}}}'])
+@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}'])
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
 def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -208,7 +217,7 @@ def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finish
     def stop(share, what):
         raise KeyboardInterrupt
 
-    made = document.plan(["brick_flip"], ["reduced:order=4"], quick=True)
+    made = plan_report(["brick_flip"], ["reduced:order=4"], quick=True)
     with pytest.raises(KeyboardInterrupt):
         document.write(made, unfinished / "report", stop)
     assert (unfinished / "report.partial.json").read_text() == before
@@ -219,53 +228,11 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
         if what.startswith("convergence"):
             raise BadInput("dt", "0", "above 0")
 
-    made = document.plan(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+    made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         document.write(made, tmp_path / "report", fail)
-    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
+    assert "1 of 8 studies are finished (paper)" in caught.value.__notes__[0]
     assert pieces(tmp_path / "report.partial.json") == ["paper"]
-
-
-@pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt, 130), (Terminated, 143)])
-def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
-    def stopping(*arguments):
-        raise stop
-
-    monkeypatch.setattr("conservative.reports.cli.recommend.run", stopping)
-    done = CliRunner().invoke(main, ["recommend", "brick_flip"])
-    assert (done.exit_code, done.stdout, done.stderr) == (code, "", "Interrupted\n")
-
-
-def test_sigterm_is_an_interrupt_only_inside():
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(Terminated), interruptible(signal.SIGTERM):
-        signal.raise_signal(signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) == before
-
-
-def lost(number):
-    try:
-        signal.raise_signal(number)
-    except BaseException as error:
-        other = SystemError("what numba makes of it while it loads compiled code")
-        other.add_note("kept")
-        raise other from error
-
-
-@pytest.mark.parametrize(("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated)])
-def test_an_interrupt_is_not_lost_in_another_exception(number, kind):
-    with pytest.raises(kind) as caught, interruptible(number):
-        lost(number)
-    assert caught.value.__notes__ == ["kept"]
-
-
-def test_what_is_ignored_stays_ignored():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with interruptible(signal.SIGINT):
-            signal.raise_signal(signal.SIGINT)
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])
@@ -276,9 +243,3 @@ def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
     found = (here / checkpoint.path_for(Path(out))).resolve()
     folder = (here / out).resolve()
     assert found == folder.parent / f"{folder.name}.partial.json"
-
-
-def test_interrupts_wait_outside_of_what_belongs_together():
-    with unstoppable():
-        signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

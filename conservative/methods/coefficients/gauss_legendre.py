@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,18 +36,19 @@ class Tableau:
     E: Array
 
 
-@cache
+@lru_cache(maxsize=MOST_STAGES)
 def tableau(stages: int) -> Tableau:
     """Return the coefficients for `stages` stages, 1 to `MOST_STAGES` (Hairer, Lubich & Wanner, II.1.3)."""
-    import mpmath as mp
+    from mpmath import MPContext
 
-    with mp.workdps(DIGITS):
-        c = _nodes(mp, stages)
-        inverse = mp.matrix([[node**k for node in c] for k in range(stages)]) ** -1
-        b = _integrals(mp, inverse, [mp.mpf(0)], [mp.mpf(1)])
-        A = _integrals(mp, inverse, [mp.mpf(0)] * stages, c)
-        E = _integrals(mp, inverse, [mp.mpf(1)] * stages, [1 + node for node in c])
-        return Tableau(np.array(c, dtype=float), _high(b)[0], _low(b)[0], _high(A), _low(A), _high(E))
+    mp = MPContext()  # that of the user has one precision for all threads
+    mp.dps = DIGITS
+    c = _nodes(mp, stages)
+    inverse = mp.matrix([[node**k for node in c] for k in range(stages)]) ** -1
+    b = _integrals(mp, inverse, [mp.mpf(0)], [mp.mpf(1)])
+    A = _integrals(mp, inverse, [mp.mpf(0)] * stages, c)
+    E = _integrals(mp, inverse, [mp.mpf(1)] * stages, [1 + node for node in c])
+    return Tableau(np.array(c, dtype=float), _high(b)[0], _low(b)[0], _high(A), _low(A), _high(E))
 
 
 def _nodes(mp: Any, stages: int) -> list[Any]:

@@ -1,0 +1,89 @@
+"""Everything that is ever measured, once: what it is called, and its unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+
+class Measure(Enum):
+    """What a value is of: its text, and its unit. A drift is one of a quantity, which is named beside it."""
+
+    ATTITUDE_MAX = "attitude error max", "rad"
+    ATTITUDE_FINAL = "attitude error final", "rad"
+    ATTITUDE_RMS = "attitude error rms", "rad"
+    RATES_MAX = "rate error max", "1"
+    RATES_FINAL = "rate error final", "1"
+    POSITION_MAX = "position error max", "m"
+    POSITION_FINAL = "position error final", "m"
+    DRIFT_MAX = "drift max", "1"
+    DRIFT_FINAL = "drift final", "1"
+    DRIFT_SLOPE = "drift slope", "1/s"
+    DRIFT_SLOPE_STDERR = "drift slope stderr", "1/s"
+    ORTHONORMALITY = "orthonormality max", "1"
+    STEPS = "steps", "1"
+    NEWTON_ITERATIONS = "newton iterations", "1"
+    EVALUATIONS = "evaluations", "1"
+    ORDER = "observed order", "1"
+    ORDER_STDERR = "observed order stderr", "1"
+    ORDER_RATES = "observed order rates", "1"
+    ORDER_RATES_STDERR = "observed order rates stderr", "1"
+    TIME_PER_STEP = "time per step", "s"
+    TIME_PER_STEP_MEDIAN = "time per step median", "s"
+    TIME = "time per simulated second", "s/s"
+    TIME_MEDIAN = "time per simulated second median", "s/s"
+    PREPARE = "prepare time", "s"
+    FIRST_CALL = "first call time", "s"
+    IMPORT = "import time", "s"
+    AGREEMENT = "truth agreement", "rad"
+    LONGEST_STEP = "largest |w| dt that works", "rad"
+    FAILING_STEP = "first |w| dt that does not", "rad"
+    PERIOD = "whole number of steps next to one period", "s"
+    PERIOD_X1 = "error of x1 after one period", "m"
+    PERIOD_DISTANCE = "distance after one period", "m"
+
+    def __init__(self, text: str, unit: str) -> None:
+        self.text, self.unit = text, unit
+
+    @classmethod
+    def named(cls, text: str) -> Measure:
+        """Return the measure with this text; `KeyError` where there is none."""
+        return _BY_TEXT[text]
+
+    def __str__(self) -> str:
+        return self.text
+
+
+_BY_TEXT = {measure.text: measure for measure in Measure}
+
+
+@dataclass(frozen=True)
+class Value:
+    """What was measured and how much of it, in the measure's unit; nan where it could not be measured.
+
+    `quantity` is the name of the invariant that a drift is of, and empty for everything else.
+    """
+
+    measure: Measure
+    value: float
+    quantity: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name in tables and in a baseline, such as `energy drift max`."""
+        return key(self.measure, self.quantity)
+
+    @property
+    def blank(self) -> Value:
+        """The same without its value."""
+        return replace(self, value=float("nan"))
+
+
+def key(measure: Measure, quantity: str = "") -> str:
+    """Return what a measure, of a quantity where it is a drift, is called: `energy drift max`."""
+    return f"{quantity} {measure.text}".lstrip()
+
+
+def blanks(*measures: Measure) -> list[Value]:
+    """Return measures without values."""
+    return [Value(measure, float("nan")) for measure in measures]

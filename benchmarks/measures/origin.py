@@ -1,0 +1,84 @@
+"""Where a measurement comes from: the machine, and the commit of the source."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What a computer is.
+
+    Attributes
+    ----------
+    processor, model
+        Its name, and its family and model as Linux numbers them; the latter empty elsewhere.
+    architecture, system
+        Such as `x86_64`, and name and release of the operating system.
+    cores
+        How many this process may use.
+    memory
+        All of it, as Linux says it; "unknown" elsewhere.
+    """
+
+    processor: str
+    model: str
+    architecture: str
+    cores: str
+    memory: str
+    system: str
+
+    @property
+    def times_key(self) -> str:
+        """What ratios of times depend on, as far as it is known: processor and compiler."""
+        processor = " ".join(filter(None, (self.processor, self.model)))
+        return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
+
+    @property
+    def described(self) -> dict[str, str]:
+        """What a reader is told of it."""
+        names = ("processor", "architecture", "cores", "memory", "system")
+        return {name: getattr(self, name) for name in names}
+
+
+def machine() -> Machine:
+    """Return the computer that this runs on."""
+    processor = first_values("/proc/cpuinfo")
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return Machine(
+        processor=processor.get("model name", "") or platform.processor() or platform.machine(),
+        model=" ".join(f"{key} {processor[key]}" for key in ("cpu family", "model") if key in processor),
+        architecture=platform.machine(),
+        cores=str(usable),
+        memory=first_values("/proc/meminfo").get("MemTotal", "unknown"),
+        system=f"{platform.system()} {platform.release()}",
+    )
+
+
+def first_values(path: str) -> dict[str, str]:
+    """Return the first value of every key in a file of lines `key: value`, as the Linux kernel has them; nothing elsewhere."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return {}
+    pairs = ((key.strip(), value.strip()) for key, _, value in (line.partition(":") for line in reversed(lines)))
+    return dict(pairs)
+
+
+def git(folder: Path, *arguments: str) -> str:
+    """Return what git says about a folder; "" where it fails, or there is no git."""
+    try:
+        done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()
+
+
+def commit(folder: Path) -> str:
+    """Return the commit of a folder; "" outside git."""
+    return git(folder, "rev-parse", "HEAD")

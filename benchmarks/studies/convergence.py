@@ -1,0 +1,97 @@
+"""The study of convergence: errors over shorter and shorter steps, and the order that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from conservative.method import Method
+from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.scene import Scene
+
+from ..measures import errors
+from ..measures.convergence_order import observed_order
+from ..measures.measure import Measure, Value, blanks
+from ..measures.measurement import Measurement
+from ..measures.timing import wall_time
+from . import step_ladder
+from .case import Case, Done, Failed, at_no_step, attempt, unsupported
+from .selection import Missing
+from .study import Progress, Study
+
+ORDERS = {
+    Measure.ATTITUDE_MAX: (Measure.ORDER, Measure.ORDER_STDERR),
+    Measure.RATES_MAX: (Measure.ORDER_RATES, Measure.ORDER_RATES_STDERR),
+}
+"""What an order is fitted to, and the measures of the order and of its standard error."""
+ERRORS = (Measure.ATTITUDE_MAX, Measure.ATTITUDE_FINAL, Measure.RATES_MAX)
+"""What is measured at every step."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield errors over shorter and shorter steps, and the observed order, of every method that has a step."""
+    methods = study.competitors
+    total = len(study.scenes) * len(methods)
+    for i, scene in enumerate(study.scenes):
+        for j, method in enumerate(methods):
+            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+            case = Case(study.name, scene, method, step_ladder.samples(scene, method))
+            failed = no_order(case, study.skip_missing)
+            yield from without_order(case, failed) if failed else converge(study, scene, method)
+
+
+def no_order(case: Case, skip_missing: bool) -> Failed | None:
+    """Return why a method has no order on a scene; None where it may have one."""
+    if isinstance(case.method, Missing):
+        missing = attempt(case, skip_missing)
+        return missing if isinstance(missing, Failed) else None
+    reason = case.method.unsupported(case.scene) or ("its accuracy does not depend on dt" if case.method.order is None else "")
+    return unsupported(reason) if reason else None
+
+
+def without_order(case: Case, failed: Failed) -> list[Measurement]:
+    """Return the rows of a method that has no order."""
+    measures = blanks(*(order for order, _ in ORDERS.values()))
+    return [at_no_step(row) for row in case.blanks(measures, failed.outcome)]
+
+
+def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
+    """Yield the errors of one method at all its steps, then the orders they show."""
+    truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
+    found: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
+    cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
+    for case, outcome in attempt_each(cases, study.longest_run, study.skip_missing):
+        if isinstance(outcome, Failed):
+            yield from case.blanks(blanks(*ERRORS), outcome.outcome)
+            continue
+        for value in errors.measure_errors(outcome.trajectory, truth):
+            if value.measure in found:
+                found[value.measure][case.grid.dt] = value.value
+                yield case.row(value)
+    for measure in ORDERS:
+        yield from fit(cases[0], measure, found[measure])
+
+
+def attempt_each(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Done | Failed]]:
+    """Yield the outcome of each case, coarse to fine; what would take more than `longest` s is skipped and says so."""
+    per_step = 0.0
+    for case in cases:
+        expected = per_step * case.grid.n_steps
+        if expected > longest:
+            reason = f"would take about {expected:.2g} s, more than {longest:g} s"
+            yield case, Failed(Outcome(OutcomeKind.SKIPPED, reason))
+            continue
+        outcome = attempt(case, skip_missing)
+        if isinstance(outcome, Done):
+            # The very first call may include compilation, so that only a short one is taken for the cost of a run.
+            first = outcome.cost.first_call
+            per_step = (first if per_step or first < longest / 4 else wall_time(outcome.run)) / case.grid.n_steps
+        yield case, outcome
+
+
+def fit(case: Case, measure: Measure, errors_by_step: dict[float, float]) -> list[Measurement]:
+    """Return the observed order and its standard error."""
+    order = observed_order(list(errors_by_step), list(errors_by_step.values()))
+    outcome = Outcome(OutcomeKind.NO_ORDER, order.reason) if order.reason else OK
+    detail = "" if order.reason else str(order)
+    values = zip(ORDERS[measure], (order.slope, order.stderr), strict=True)
+    return [at_no_step(case.row(Value(name, value), outcome, detail)) for name, value in values]

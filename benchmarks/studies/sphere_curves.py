@@ -1,0 +1,77 @@
+"""The study of what a motion looks like: a curve on a sphere for each method that is drawn.
+
+The run is that of the drift over time. Of a free body the curve is its polhode: the angular momentum in principal axes,
+relative to its length at the start. Of a body in a field it is the trace of its axis, as a unit vector in world axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from conservative.attitude import Array
+from conservative.method import Method, Role
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..measures.samples import Samples
+from .case import Case, Failed, attempt
+from .long_runs import case_for
+from .study import Progress, Study
+
+SAMPLES = 700
+"""Samples of a curve at most."""
+AXES = ("x", "y", "z")
+"""Quantities of a curve, in units of the sphere's radius."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Samples]:
+    """Yield three lines for each curve, one a coordinate; methods that cannot do the scene, or fail, have none.
+
+    The first truth among the methods that can do the scene comes first.
+    """
+    pairs = [(scene, method) for scene in study.scenes for method in [*truth(scene, study.methods), *pick(study.methods)]]
+    for k, (scene, method) in enumerate(pairs):
+        progress(k, len(pairs), f"{scene.name}: {method.name}")
+        case = case_for(study.name, scene, method)
+        outcome = attempt(case, study.skip_missing)
+        if not isinstance(outcome, Failed):
+            yield from curve(case, outcome.trajectory)
+
+
+def pick(methods: Sequence[Method]) -> list[Method]:
+    """Return the methods that are drawn: of each family its `picture_settings`, or the first where it has none of those."""
+    competitors = [method for method in methods if method.role != Role.TRUTH]
+    preferred = [method for method in competitors if method in method.picture_settings()]
+    firsts = {method.family: method for method in reversed(competitors)}
+    return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
+
+
+def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
+    """Return the first truth that can do a scene, if there is one."""
+    return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
+
+
+def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
+    """Yield the coordinates of the curve of one run, at evenly spaced times."""
+    some = np.unique(np.linspace(0, len(trajectory) - 1, SAMPLES).round().astype(int))
+    for axis, values in zip(AXES, points(trajectory)[some].T, strict=True):
+        yield case.samples(axis, trajectory.t[some], values)
+
+
+def points(trajectory: Trajectory) -> Array:
+    """Return the points (n, 3) of a curve, in units of the sphere's radius at the start."""
+    scene = trajectory.scene
+    if scene.free:
+        momentum = trajectory.w_WB_B @ scene.body.inertia  # symmetric
+        return np.asarray(momentum @ np.linalg.eigh(scene.body.inertia)[1] / np.linalg.norm(momentum[0]))
+    return np.asarray(trajectory.R_WB @ traced_axis(scene))
+
+
+def traced_axis(scene: Scene) -> Array:
+    """Return the unit vector (3,) that is traced, body axes: towards the centre of mass where there is one, else the third."""
+    com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)
+    length = float(np.linalg.norm(com_B))
+    return com_B / length if length else np.eye(3)[2]

@@ -1,0 +1,97 @@
+"""What a study is: which rows to make, of scenes x methods x steps, and whom to tell how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from conservative.errors import BadInput
+from conservative.method import Grid, Method, Role
+from conservative.references.truth import Truth, reference
+from conservative.scene import Scene
+
+from ..measures.measurement import Measurement
+from ..measures.samples import Samples
+
+Progress = Callable[[int, int, str], None]
+"""Called before each piece of work: pieces done, pieces in all, and what comes next."""
+FindTruth = Callable[[Scene, Grid], Truth]
+Finding = Measurement | Samples
+"""What a study yields: rows of the table, and lines of pictures."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truths:
+    """The exact motions of some studies, each found once and kept for as long as they take.
+
+    `find` gives the motion of a scene at the samples of a grid, by default from two independent truths that agree.
+    """
+
+    find: FindTruth = reference
+    known: dict[tuple[Scene, Grid], Truth] = field(default_factory=dict, repr=False)
+
+    def __call__(self, scene: Scene, grid: Grid) -> Truth:
+        """Return the motion of a scene at the samples of a grid."""
+        if (scene, grid) not in self.known:
+            self.known[scene, grid] = self.find(scene, grid)
+        return self.known[scene, grid]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Attributes
+    ----------
+    name
+        One of those in `conservative.benchmarks.studies.studies`.
+    scenes, methods
+        What is crossed; methods that cannot do a scene get rows that say so.
+    quick
+        Fewer points and rounds.
+    skip_missing
+        Rows with the outcome "missing" instead of `MissingEngine`.
+    truth
+        Where the exact motion comes from; studies of the same scenes can share what they find.
+
+    Raises
+    ------
+    BadInput
+        There is nothing to cross.
+    """
+
+    name: str
+    scenes: tuple[Scene, ...]
+    methods: tuple[Method, ...]
+    quick: bool = False
+    skip_missing: bool = False
+    truth: FindTruth = field(default_factory=Truths)
+
+    @property
+    def rounds(self) -> int:
+        """Rounds of interleaved timing."""
+        return 3 if self.quick else 9
+
+    @property
+    def timing_budget(self) -> float:
+        """Time, s, for all rounds of one run; slow ones get fewer rounds."""
+        return 0.06 if self.quick else 0.6
+
+    @property
+    def longest_run(self) -> float:
+        """Time, s, of the longest single run that the study waits for on the way to shorter steps."""
+        return 0.15 if self.quick else 0.6
+
+    @property
+    def competitors(self) -> tuple[Method, ...]:
+        """The methods without those that the others are measured against."""
+        return tuple(method for method in self.methods if method.role != Role.TRUTH)
+
+    def __post_init__(self) -> None:
+        for argument in ("scenes", "methods"):
+            if not getattr(self, argument):
+                raise BadInput(argument, "none", "one or more")
+
+
+Maker = Callable[[Study, Progress], Iterator[Finding]]
+"""What makes the findings of a study."""

@@ -1,0 +1,86 @@
+"""The study of work against precision: error and wall time over steps, and over tolerances of adaptive methods."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from conservative.method import Method
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..measures import errors
+from ..measures.measure import Measure, Value, blanks
+from ..measures.measurement import Measurement
+from ..measures.timing import time_interleaved
+from . import step_ladder
+from .case import Case, Done, Failed, attempt
+from .convergence import attempt_each
+from .selection import at_tolerance, series, tolerance_setting
+from .speed import CALL, TimedRun, end_only, lengthen
+from .study import Progress, Study
+
+ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
+ROUNDS = 5
+"""Rounds at most for each of the hundreds of points of a picture over many decades."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield error and time of every point; rows of one point share scene, method and dt, those of one line their series."""
+    methods = one_of_each_series(study)
+    pieces = len(methods) + 1
+    for i, scene in enumerate(study.scenes):
+        good: list[Case] = []
+        for j, method in enumerate(methods):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+            truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
+            for case, outcome in attempt_each(points(study, scene, method), study.longest_run, study.skip_missing):
+                yield from error_rows(case, outcome, truth)
+                good += [case] * isinstance(outcome, Done)
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} points")
+        yield from time_rows(study, good)
+
+
+def one_of_each_series(study: Study) -> list[Method]:
+    """Return one method for each line of the picture: variants that differ in tolerance alone are one line."""
+    return list({series(method): method for method in study.competitors}.values())
+
+
+def points(study: Study, scene: Scene, method: Method) -> list[Case]:
+    """Return the cases of one line, cheap to dear: steps, or tolerances of an adaptive method."""
+    setting = tolerance_setting(method)
+    if method.unsupported(scene):
+        return [Case(study.name, scene, method, step_ladder.samples(scene, method))]  # its one row says so
+    if method.order is not None:
+        longest = step_ladder.LENGTH if method.order == 1 else None  # what comes after is dear and still far off
+        grids = step_ladder.steps(scene, method)[:longest][:: 2 if study.quick else 1]
+        return [Case(study.name, scene, method, grid) for grid in grids]
+    grid = step_ladder.samples(scene, method)
+    if setting is None:
+        return [Case(study.name, scene, method, grid)]
+    tolerances = {*step_ladder.TOLERANCES[:: 2 if study.quick else 1], getattr(method, setting)}
+    return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in sorted(tolerances, reverse=True)]
+
+
+def error_rows(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:
+    """Return the errors of one point; of one that failed the time as well, all without values."""
+    if isinstance(outcome, Failed):
+        return case.blanks(blanks(*ERRORS, Measure.TIME), outcome.outcome)
+    found = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
+    return [case.row(found[measure]) for measure in ERRORS]
+
+
+def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
+    """Yield the times of all points of a scene, interleaved; the runs timed keep no sample but the last."""
+    ready: dict[str, TimedRun] = {}
+    for case in cases:
+        bare = replace(case, grid=end_only(case.grid))
+        outcome = attempt(bare)
+        if isinstance(outcome, Done):
+            ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome), outcome)
+        else:
+            yield from case.blanks(blanks(Measure.TIME), outcome.outcome)
+    runs = {key: timed.done.run for key, timed in ready.items()}
+    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
+    for key, timed in ready.items():
+        yield timed.case.row(Value(Measure.TIME, timings[key].minimum / timed.simulated))

@@ -1,0 +1,106 @@
+"""What a family of methods says about itself, as frozen values on its class: whoever needs to know it asks there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Candidacy:
+    """How a family takes part in the automatic choice of a method, `integrate(scene, error=...)`.
+
+    Attributes
+    ----------
+    rank
+        Families are tried in the order of their ranks, those of equal rank in that of their names.
+    group
+        Of the families of a group only the first that supports the scene is probed; "" for a family outside all groups.
+    exact
+        Whether there is no truncation error: the first such family that supports the scene is taken, and no other is probed.
+    """
+
+    rank: int = 10
+    group: str = ""
+    exact: bool = False
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What the work of a method costs on one and the same machine, ns: the automatic choice compares nothing but ratios.
+
+    Attributes
+    ----------
+    step
+        Cost of a step besides its corrections.
+    correction
+        Cost of a correction of the nonlinear solver.
+    """
+
+    step: float
+    correction: float = 0.0
+
+
+@dataclass(frozen=True)
+class SameErrors:
+    """The claim that two methods make the same attitude errors at the same steps.
+
+    Attributes
+    ----------
+    words
+        The claim.
+    methods
+        Names of both, with the settings that are not defaults.
+    tolerance
+        Difference, relative to the error of the second, up to which two errors are the same.
+    free
+        Whether the claim is about free bodies only.
+    """
+
+    words: str
+    methods: tuple[str, str]
+    tolerance: float
+    free: bool = False
+
+
+@dataclass(frozen=True)
+class BetterEnergy:
+    """The claim that a method at its longest step drifts less in energy than another one at its shortest.
+
+    Attributes
+    ----------
+    words
+        The claim, to which a report adds how much longer the step is.
+    better, worse
+        Names of the methods, with the settings that are not defaults.
+    """
+
+    words: str
+    better: str
+    worse: str
+
+
+Comparison = SameErrors | BetterEnergy
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What somebody claims of a family. `Method.order` and `Method.conserves` say what; this says where, and what else.
+
+    Attributes
+    ----------
+    source
+        Where the claims are made.
+    drift_per_step
+        Relative drift in each step that conserved quantities may have, where the claim is about the tolerance of an iteration;
+        None where it is about round-off.
+    comparisons
+        Claims about two methods.
+    """
+
+    source: str
+    drift_per_step: float | None = None
+    comparisons: tuple[Comparison, ...] = ()
+
+
+README = "README, Methods"
+"""Source of what this project claims of its own methods."""

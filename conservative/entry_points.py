@@ -1,0 +1,61 @@
+"""What installed packages register, read from their metadata: nothing is imported before it is asked for by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import BadInput, MissingEngine, NotLoadable, nearest
+
+if TYPE_CHECKING:
+    from .shapes import MassDistribution
+
+METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
+"""Groups of entry points; `conservative.registry` says what stands in each."""
+
+
+@lru_cache(maxsize=8)
+def list_entries(group: str) -> dict[str, EntryPoint]:
+    """Return the entry points of a group such as `SCENES` by name, in order of their names; nothing is imported."""
+    return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+
+
+def load_entry(group: str, argument: str, name: str) -> Any:
+    """Return what is registered under a name; `argument` is what messages call the name.
+
+    Raises
+    ------
+    BadInput
+        The name is unknown.
+    NotLoadable
+        It is registered, but importing what is registered fails.
+    MissingEngine
+        It needs an engine that is not installed.
+    """
+    known = list_entries(group)
+    if name not in known:
+        files = ", or a file whose name ends with .toml" if group == SCENES else ""
+        raise BadInput(argument, repr(name), nearest(name, known) + files)
+    try:
+        return known[name].load()
+    except MissingEngine:
+        raise
+    except Exception as error:
+        raise NotLoadable(argument, name, known[name].value, error) from error
+
+
+def load_body_reader(kind: str) -> Callable[[Path, str], MassDistribution]:
+    """Return the function that reads a named body out of a file of a kind such as `mjcf` or `urdf`.
+
+    Raises
+    ------
+    BadInput
+        The kind is unknown.
+    NotLoadable
+        It is registered, but importing what is registered fails.
+    """
+    reader: Callable[[Path, str], MassDistribution] = load_entry(BODY_FILES, "kind of file", kind)
+    return reader

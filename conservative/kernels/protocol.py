@@ -1,0 +1,55 @@
+"""What every kernel that takes steps is given and what it returns.
+
+    march(model, coefficients, workspace) -> Result
+
+- `model`: what moves, what acts on it and how it starts, a named tuple `Model` of the kernel's file;
+- `coefficients`: what a step is made of, its length included, a named tuple `Coefficients` of the same file;
+- `workspace`: a `Workspace`, the samples to fill and the steps after which they are taken.
+
+Where a step can fail, the constant `FAILURE` of the file says why.
+
+Python calls `enter(*model, *coefficients, *workspace)`, which is `march` with a plain tuple for a result: numba finds the class
+of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us for each; loose values cost
+nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from . import small
+
+
+class Workspace(NamedTuple):
+    """Samples to fill: of attitudes q (n, 4), of any length, and momenta L (n, 3), kg m^2/s, both in principal axes.
+
+    They are the start, every `every`-th of n_steps steps, and the last.
+    """
+
+    n_steps: int
+    every: int
+    q: Any
+    L: Any
+
+
+class Result(NamedTuple):
+    """How far the steps got.
+
+    `done` steps were taken, made of `stages` stages with `corrections` corrections (sweeps, projections) and `evaluations` of
+    the torque, which is None where they are not counted. `size` is the relative size of the last correction or, where done <
+    n_steps, what is left of the equations of the step that failed; `elsewhere` then says whether these have another solution
+    than the one that the state leads to continuously.
+    """
+
+    done: int
+    stages: int
+    corrections: int
+    evaluations: Any
+    size: float
+    elsewhere: bool
+
+
+@small
+def loosen(result):
+    """The plain tuple of a result."""
+    return (result.done, result.stages, result.corrections, result.evaluations, result.size, result.elsewhere)

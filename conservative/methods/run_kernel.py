@@ -1,0 +1,52 @@
+"""The one runner of all kernels that take steps: it calls the kernel and makes a trajectory of the samples. Source: our own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+from ..errors import Diverged, IntegrationFailed, NotConverged, WrongBranch
+from ..lazy_kernels import kernels
+from ..method import Grid, Run
+from ..scene import Scene
+from ..trajectory import Counters, Trajectory
+from .principal_axes import PrincipalStart
+
+
+def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, kernel: Any, model: Any, coefficients: Any) -> Run:
+    """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
+
+    `start` is what its samples, in principal axes, are turned back with.
+    """
+    enter, n, n_steps, every = kernel.enter, grid.n_samples, grid.n_steps, grid.every
+
+    def run() -> Trajectory:
+        q, L = np.empty((n, 4)), np.empty((n, 3))
+        # The fields of `conservative.kernels.protocol.Result`.
+        done, stages, corrections, evaluations, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
+        t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
+        if failure is None and done < n_steps:
+            kind = WrongBranch if elsewhere else NotConverged
+            failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
+        work = Counters(done, stages, corrections, evaluations)
+        return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
+
+    return run
+
+
+def turn_back(
+    start: PrincipalStart, grid: Grid, n: int, q: Array, L: Array
+) -> tuple[Array, Array, Array, IntegrationFailed | None]:
+    """Return times (n,), s, attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes; and the failure, if some are not finite.
+
+    They are made of the first n of q (., 4) and L (., 3), kg m^2/s, principal axes, up to the first that is not finite.
+    The quaternion is normalised here: its length carries no information, as the kernels' products are homogeneous in it.
+    """
+    t, R_WB, w_WB_B = grid.t, np.empty((n, 3, 3)), np.empty((n, 3))
+    finite = kernels("samples").to_body_axes(t, q, L, start.J_inverse, start.spin, start.R_BP, R_WB, w_WB_B)
+    if finite == len(t):
+        return t, R_WB, w_WB_B, None
+    failure = None if finite == n else Diverged(float(t[max(finite - 1, 0)]))
+    return t[:finite], R_WB[:finite], w_WB_B[:finite], failure

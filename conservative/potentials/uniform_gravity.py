@@ -1,0 +1,76 @@
+"""A uniform field, such as gravity near the ground. Source: definitions of any mechanics textbook."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import Array
+from ..check import finite_array, finite_number
+
+
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    weight: float
+    com_B: Array
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class UniformGravity(_Fields):
+    """A uniform field along the world's -z axis: V = weight (R_WB com_B).e_z.
+
+    Parameters
+    ----------
+    weight
+        m g in N. Negative turns the field over.
+    com_B
+        Centre of mass (3,) from the fixed point, m, body axes.
+
+    Raises
+    ------
+    BadInput
+        A parameter is not finite or of another shape.
+    """
+
+    def __init__(self, weight: float, com_B: ArrayLike) -> None:
+        super().__init__(
+            finite_number("weight", weight, "a finite number, N"),
+            finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
+        )
+
+    @property
+    def moment_B(self) -> Array:
+        """Weight times centre of mass (3,), N m, body axes: all that the motion needs."""
+        return self.weight * self.com_B
+
+    def energy(self, R_WB: Array) -> Array:
+        """Return V, (...), in J."""
+        return R_WB[..., 2, :] @ self.moment_B
+
+    def gradient(self, R_WB: Array) -> Array:
+        """Return dV/dR, (..., 3, 3), in J: constant, with `moment_B` in its last row."""
+        out = np.zeros(np.shape(R_WB))
+        out[..., 2, :] = self.moment_B
+        return out
+
+    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
+        """Return V*, (3, 3): V is linear in the base vectors, so the gradient itself is exact."""
+        return self.gradient(R_0)
+
+    @property
+    def axis_W(self) -> Array:
+        """Return the vertical, (3,)."""
+        return np.array([0.0, 0.0, 1.0])
+
+    def scale(self) -> float:
+        """Return weight times lever arm, J."""
+        return float(np.linalg.norm(self.moment_B))
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return the moment in principal axes as the kernels want it."""
+        from ..kernels.fields import Uniform
+
+        return Uniform(*(self.moment_B @ R_BP))

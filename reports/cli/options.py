@@ -1,0 +1,33 @@
+"""What the commands share: the end of every --help, and the reading of lists of names."""
+
+from __future__ import annotations
+
+import click
+
+EXIT_CODES = """Exit codes:
+    0    done
+    1    a run failed: it did not converge, or diverged; or the gate is not passed
+    2    the command or an input cannot be used, or an engine or a baseline is missing
+    130  interrupted by Ctrl-C, 143 by SIGTERM; a report keeps what is finished, and --resume goes on
+"""
+
+
+def epilog(*examples: str) -> str:
+    """Return what every --help ends with; a backspace on a line of its own keeps click from joining the lines after it."""
+    return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])
+
+
+def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:
+    """Return names out of `a,b:setting=1,other=2,c`: what has an equals sign and no colon belongs to the name before it.
+
+    An option that is given but names nothing, as `--scenes "$EMPTY"` does, would mean everything: it is a mistake.
+    """
+    names: list[str] = []
+    for item in (item.strip() for text in texts for item in text.split(",")):
+        if names and "=" in item and ":" not in item:
+            names[-1] += f",{item}"
+        elif item:
+            names.append(item)
+    if texts and not names:
+        raise click.BadParameter("it names nothing", param_hint=f"--{argument}")
+    return names

@@ -1,0 +1,64 @@
+"""`conservative report`."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import click
+
+from conservative.errors import require_extra
+
+from ..terminal.interrupts import interruptible
+from . import completion
+from .options import epilog, split_names
+
+
+@click.command(
+    short_help="Measure everything and write a report.",
+    epilog=epilog(
+        "conservative report",
+        "conservative report --quick --out quick_report",
+        "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
+        "conservative report --resume                 go on after Ctrl-C, with the same options",
+    ),
+)
+@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the paper's two]")
+@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
+@click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
+@click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option("--png", is_flag=True, help="Pictures as PNG, too.")
+@click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
+@click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), default="report", show_default=True, help="Folder, replaced as a whole."
+)
+def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], methods: tuple[str, ...], **extent: Any) -> None:
+    """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
+
+    The folder is there whole or not at all; until then, what is finished is in a file beside it, OUT.partial.json.
+    A family's bare name, such as mujoco, stands for all its variants.
+    """
+    require_extra("conservative report", "report")
+    from .. import document
+    from ..run.plan import plan_report
+    from ..terminal.atomic_files import MANIFEST
+    from ..terminal.progress import progress
+
+    plan = plan_report(split_names("scenes", scenes), split_names("methods", methods), **extent)
+    _announce(out, resume)
+    with interruptible(signal.SIGTERM), progress() as step:
+        view = document.write(plan, out, step, resume)
+    click.echo((out / MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
+    if view.failed:
+        raise click.ClickException("; ".join(view.failed))
+
+
+def _announce(out: Path, resume: bool) -> None:
+    """Say which unfinished work a report that begins anew replaces."""
+    from ..run.checkpoint import path_for
+
+    path = path_for(out)
+    if not resume and path.exists():
+        click.echo(f"{path}: unfinished work that --resume goes on with; without it, to be replaced", err=True)

@@ -1,0 +1,58 @@
+"""The report as Markdown, with pictures beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from conservative.benchmarks.studies import long_runs
+
+from ..charts import figures, paper
+from ..tables.cells import Table, markdown
+from ..view import PaperView, SceneView, View
+
+Draw = Callable[[str, Any], str]
+"""Draws a chart under a name, and returns the name of its file."""
+NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
+
+
+def render(view: View, draw: Draw) -> str:
+    """Return report.md; `draw(name, chart)` makes a picture and returns the name of its file."""
+    environment = Environment(
+        loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
+    )
+    environment.filters["table"] = _table
+    return environment.get_template("report.md.j2").render(
+        view=view,
+        pictures={scene.name: _pictures(scene, draw) for scene in view.scenes},
+        durations=f"{long_runs.DURATIONS:g}",
+        paper=list(_paper(view.paper, draw)),
+    )
+
+
+def _table(table: Table | None) -> str:
+    return NO_STUDY if table is None else markdown(table)
+
+
+def _pictures(scene: SceneView, draw: Draw) -> dict[str, str]:
+    name = scene.name
+    return {
+        "work_precision": draw(f"work_precision_{name}", figures.work_precision(scene.points, name)),
+        "drift": draw(f"drift_{name}", figures.drift(scene.drifts, name)),
+        "convergence": draw(f"convergence_{name}", figures.convergence(scene.errors, scene.fits, name)),
+    }
+
+
+def _paper(view: PaperView, draw: Draw) -> Iterator[str]:
+    """Yield the paper's figures that belong to the scenes of the report."""
+    if len(view.body_rates):
+        picture = draw("paper_figure_1", paper.figure_1(view.body_rates, view.conservation_errors))
+        yield f"![Figure 1 of the paper: rates of the brick, errors of energy and momentum]({picture})"
+    if len(view.centre_of_mass):
+        picture = draw("paper_figure_2", paper.figure_2(view.centre_of_mass))
+        yield f"![Figure 2 of the paper: centre of mass of the top]({picture})"
+    if view.position_errors:
+        yield "Error of the centre of mass of the top after one period of precession (the whole number of steps next to it):"
+        yield markdown(view.position_errors)

@@ -1,0 +1,65 @@
+"""The terms of a report: what has to be the same for measurements of two processes to be put together."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from conservative.benchmarks.suite.points import Point
+from conservative.methods.reduced import Reduced
+
+from .plan import Plan
+from .provenance import Provenance
+
+_ROOMS = (".", "references", "benchmarks")
+"""What decides about a measurement; `reports` only shows it."""
+
+
+def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
+    """Return what has to be the same for measurements to be put together, as what JSON knows."""
+    return {
+        "studies": list(plan.names),
+        # What a scene is, whatever its file is called; that it is hashed as a point of `Reduced` is the same for all.
+        "scenes": {scene.name: Point(scene, Reduced()).definition for scene in plan.scenes},
+        "methods": {method.name: method.label for method in plan.methods},
+        "--quick": plan.quick,
+        "--skip-missing": plan.skip_missing,
+        "source": _source_hash(),
+        "machine": {key: source.machine[key] for key in ("processor", "cores")},
+        "versions": {"python": source.python, **source.compared},
+    }
+
+
+def _source_hash() -> str:
+    """Return the hash of all source that decides about a measurement: a commit would not tell of changes, nor without git."""
+    root = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for file in sorted({file for room in _ROOMS for file in (root / room).rglob("*.py")} - set((root / "reports").rglob("*"))):
+        digest.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in words what differs between two terms."""
+    for name in {**before, **now}:
+        old, new = before.get(name), now.get(name)
+        if isinstance(old, dict) and isinstance(new, dict):
+            yield from (f"{name}: {key} {text}" for key, text in _between(old, new))
+        elif old != new:
+            yield f"{name} {_text(old)}, now {_text(new)}"
+
+
+def _between(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for key in {**old, **new}:
+        if key not in new:
+            yield key, "(now without)"
+        elif key not in old:
+            yield key, "missing (now with)"
+        elif old[key] != new[key]:
+            yield key, f"{_text(old[key])}, now {_text(new[key])}"
+
+
+def _text(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, list) else str(value)

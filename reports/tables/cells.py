@@ -1,0 +1,78 @@
+"""What tables are made of: numbers as text, and cells with a grade."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from conservative.outcome import Outcome, OutcomeKind
+
+DASH = "–"
+CONSERVED, SMALL = 1e-10, 1e-4
+"""Relative drift up to which a quantity counts as conserved, and as drifting little."""
+
+
+class Grade(StrEnum):
+    """How good a cell is, which the page shows by symbol, word and colour."""
+
+    GOOD = "good"
+    FAIR = "fair"
+    BAD = "bad"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell with a grade."""
+
+    text: str
+    grade: Grade
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Row = Sequence[str | Cell]
+Table = tuple[Sequence[str], Sequence[Row]]
+"""Header and rows."""
+
+_ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
+_DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Return a number to `digits` significant digits, a dash for nan."""
+    if math.isnan(value):
+        return DASH
+    plain = value == 0 or 0.01 <= abs(value) < 1e4
+    return f"{value:.{digits}g}" if plain else f"{value:.{digits - 1}e}"
+
+
+def grade_drift(value: float) -> Cell:
+    """Return a drift with a symbol that is not its colour alone."""
+    if math.isnan(value):
+        return Cell(DASH, Grade.NONE)
+    symbol, grade = ("✓", Grade.GOOD) if value <= CONSERVED else ("≈", Grade.FAIR) if value <= SMALL else ("✗", Grade.BAD)
+    return Cell(f"{symbol} {number(value)}", grade)
+
+
+def outcome_text(outcome: Outcome) -> str:
+    """Return an outcome as a table shows it: when and why for what happens during a run, otherwise the kind alone."""
+    return str(outcome) if outcome.kind in _DURING_A_RUN else outcome.kind.value
+
+
+def outcome_cell(outcome: Outcome) -> Cell:
+    """Return how a run ended, with a symbol."""
+    if outcome.ok:
+        return Cell("✓ done", Grade.GOOD)
+    absent = outcome.kind in _ABSENT
+    return Cell(f"{DASH if absent else '✗'} {outcome_text(outcome)}", Grade.NONE if absent else Grade.BAD)
+
+
+def markdown(table: Table) -> str:
+    """Return a table in Markdown; cells are not padded, as no reader of the page would see that."""
+    header, body = table
+    lines = [header, ["---", *["---:"] * (len(header) - 1)], *body]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

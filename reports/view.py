@@ -1,0 +1,194 @@
+"""The report as one frozen value, computed from the measurements in one pass; what renders it neither measures nor fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import sphere_curves
+from conservative.method import Method
+from conservative.scene import Scene
+
+from .run.measure import Measurements
+from .run.plan import Plan
+from .run.provenance import Provenance
+from .tables import claims, hard_cases, headline, lines, orders, overview, paper, runs, scene, work_precision
+from .tables.cells import Table
+
+
+@dataclass(frozen=True, eq=False)
+class SceneView:
+    """What a report shows of one scene.
+
+    Attributes
+    ----------
+    name, source, t_end, dt
+        As the scene has them; times, s, as text.
+    free
+        Whether the body is free, so that its curve is a polhode.
+    points, drifts, errors, fits, curves
+        Data of its charts: see `work_precision.points`, `lines.drifts`, `orders.errors`, `orders.fits` and `lines.curves`.
+    without_curve
+        Names of the methods whose curve should be drawn and could not.
+    """
+
+    name: str
+    source: str
+    t_end: str
+    dt: str
+    free: bool
+    points: pd.DataFrame
+    drifts: pd.DataFrame
+    errors: pd.DataFrame
+    fits: pd.DataFrame
+    curves: pd.DataFrame
+    without_curve: tuple[str, ...]
+    contests: Table
+    drift: Table
+    conservation: Table
+    accuracy: Table
+    order: Table
+    time: Table
+    costs_paid_once: Table
+
+
+@dataclass(frozen=True, eq=False)
+class PaperView:
+    """The paper's figures, drawn again: data of the charts (see `lines`), empty without the figure's scene, and a table."""
+
+    body_rates: pd.DataFrame
+    conservation_errors: pd.DataFrame
+    centre_of_mass: pd.DataFrame
+    position_errors: Table | None
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What a report shows.
+
+    Attributes
+    ----------
+    source
+        Where the numbers come from.
+    quick
+        Whether the report is coarser than it could be.
+    table
+        The measurements, a row each.
+    headline
+        Sentences: where an engine beats us, and where it does not.
+    failed
+        What of ours failed at the steps of the paper, one line each.
+    hard_cases, stability
+        None where the report has no such study.
+    """
+
+    source: Provenance
+    quick: bool
+    table: pd.DataFrame
+    headline: tuple[str, ...]
+    failed: tuple[str, ...]
+    verdict: Table
+    scenes: tuple[SceneView, ...]
+    paper: PaperView
+    hard_cases: Table | None
+    stability: Table | None
+    claims: Table
+    imports: Table
+    truths: Table
+    failures: Table
+    unsupported: Table
+
+
+def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
+    """Return the view of measurements; every number that a report shows is computed here, and once."""
+    table, samples = measurements.table, measurements.samples
+    builder = _Builder.of(table, samples, plan.methods)
+    return View(
+        source=source,
+        quick=plan.quick,
+        table=table,
+        headline=tuple(headline.lines(builder.contests)),
+        failed=tuple(runs.failures_of_ours(table)),
+        verdict=overview.verdict(table, builder.points),
+        scenes=tuple(builder.scene(value) for value in plan.scenes),
+        paper=_paper(table, samples),
+        hard_cases=hard_cases.hard_cases(table),
+        stability=hard_cases.stability(table),
+        claims=claims.as_table(claims.findings(table, builder.fits, plan.scenes)),
+        imports=runs.imports(table),
+        truths=runs.truths(table),
+        failures=runs.failures(table),
+        unsupported=runs.unsupported(table),
+    )
+
+
+def _paper(table: pd.DataFrame, samples: pd.DataFrame) -> PaperView:
+    return PaperView(
+        lines.body_rates(samples),
+        lines.conservation_errors(samples),
+        lines.centre_of_mass(samples),
+        paper.position_errors(table),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Builder:
+    """What the views of all scenes are made from."""
+
+    table: pd.DataFrame
+    points: pd.DataFrame
+    contests: Sequence[work_precision.Contest]
+    drifts: pd.DataFrame
+    errors: pd.DataFrame
+    fits: pd.DataFrame
+    rate_fits: pd.DataFrame
+    curves: pd.DataFrame
+    pictures: tuple[Method, ...]
+
+    @classmethod
+    def of(cls, table: pd.DataFrame, samples: pd.DataFrame, methods: Sequence[Method]) -> _Builder:
+        """Return what all scenes share."""
+        points, errors = work_precision.points(table), orders.errors(table, Measure.ATTITUDE_MAX)
+        return cls(
+            table,
+            points,
+            work_precision.contests(points),
+            lines.drifts(samples),
+            errors,
+            orders.fits(errors),
+            orders.fits(orders.errors(table, Measure.RATES_MAX)),
+            lines.curves(samples),
+            tuple(sphere_curves.pick(methods)),
+        )
+
+    def scene(self, value: Scene) -> SceneView:
+        """Return the view of one scene."""
+        name, table = value.name, self.table
+        fits, curves = _of(self.fits, name), _of(self.curves, name)
+        return SceneView(
+            name=name,
+            source=value.source,
+            t_end=f"{value.t_end:g}",
+            dt=f"{value.dt:g}",
+            free=value.free,
+            points=_of(self.points, name),
+            drifts=_of(self.drifts, name),
+            errors=_of(self.errors, name),
+            fits=fits,
+            curves=curves,
+            without_curve=tuple(method.name for method in self.pictures if method.name not in set(curves["method"])),
+            contests=scene.contests(contest for contest in self.contests if contest.scene == name),
+            drift=scene.drift(table, name),
+            conservation=overview.conservation(table, name),
+            accuracy=scene.accuracy(table, name),
+            order=scene.order(fits, _of(self.rate_fits, name)),
+            time=scene.time(table, name),
+            costs_paid_once=scene.costs_paid_once(table, name),
+        )
+
+
+def _of(rows: pd.DataFrame, scene_name: str) -> pd.DataFrame:
+    return rows[rows["scene"] == scene_name].reset_index(drop=True)

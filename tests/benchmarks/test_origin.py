@@ -1,0 +1,59 @@
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from conservative.benchmarks.measures import origin
+from conservative.benchmarks.measures.origin import Machine, commit, machine
+
+CPU = """processor\t: 0
+cpu family\t: 25
+model\t\t: 1
+model name\t: AMD EPYC
+
+processor\t: 1
+cpu family\t: 26
+model\t\t: 2
+model name\t: another
+"""
+
+
+@pytest.fixture
+def linux(tmp_path, monkeypatch):
+    """A machine whose kernel says this of itself."""
+    (tmp_path / "cpuinfo").write_text(CPU)
+    (tmp_path / "meminfo").write_text("MemTotal:       16000000 kB\nMemFree: 1 kB\n")
+    read = origin.first_values
+    monkeypatch.setattr(origin, "first_values", lambda path: read(str(tmp_path / path.rpartition("/")[2])))
+    return machine()
+
+
+def test_a_machine_is_that_of_its_first_processor(linux):
+    assert (linux.processor, linux.model, linux.memory) == ("AMD EPYC", "cpu family 25 model 1", "16000000 kB")
+    assert set(linux.described) == {"processor", "architecture", "cores", "memory", "system"}
+
+
+def test_times_are_compared_on_one_processor_with_one_compiler(linux):
+    known = replace(linux, architecture="x86_64")
+    assert known.times_key.startswith("AMD EPYC cpu family 25 model 1, x86_64, numba ")
+    assert replace(known, model="cpu family 25 model 2").times_key != known.times_key
+    assert replace(known, cores="1", memory="?", system="?").times_key == known.times_key
+    assert replace(known, model="").times_key.startswith("AMD EPYC, x86_64, numba ")
+
+
+def test_elsewhere_the_system_is_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr(origin, "first_values", lambda path: {})
+    found = machine()
+    assert isinstance(found, Machine)
+    assert found.processor
+    assert (found.model, found.memory) == ("", "unknown")
+    assert origin.first_values(str(tmp_path / "nothing")) == {}
+
+
+def test_commit(tmp_path):
+    assert commit(tmp_path) == ""
+    who = ["-c", "user.name=a", "-c", "user.email=a@b"]
+    for words in (["init", "-q"], [*who, "commit", "-q", "--allow-empty", "-m", "first"]):
+        subprocess.run(["git", "-C", tmp_path, *words], check=True)
+    assert len(commit(tmp_path)) == 40
+    assert origin.git(tmp_path, "no-such-command") == ""

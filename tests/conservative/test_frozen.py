@@ -1,0 +1,114 @@
+"""Values that others hand out: `dataclasses.replace` works on each, nothing is assigned to one, its arrays are read-only."""
+
+from dataclasses import FrozenInstanceError, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry, shapes
+
+ROOT = Path(cv.__file__).parent.parent
+DIRECTION = (0.3, -0.2, 1.7)
+
+
+def quartic_energy(R):
+    return (R[2] @ np.array([0.0, 0.1, 0.4])) ** 4
+
+
+def quartic_gradient(R):
+    hook = np.array([0.0, 0.1, 0.4])
+    return np.outer([0, 0, 1], 4 * (R[2] @ hook) ** 3 * hook)
+
+
+BODY = cv.RigidBody([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]])
+VALUES = {
+    "moments": cv.RigidBody((1.0, 2.0, 2.5)),
+    "tensor": BODY,
+    "mass": shapes.cone(0.05, 0.1, density=2700).about((0, 0, 0.075)),
+    "uniform gravity": cv.UniformGravity(3.0, (0.1, 0.2, 0.3)),
+    "gravity gradient": cv.GravityGradient(0.5, (1.0, 2.0, 2.5), DIRECTION),
+    "spring": cv.LinearSpring(2.0, (0.1, 0, 0), (0, 0, 1), 0.3),
+    "attraction": cv.PointAttraction(2, (0.1, 0, 0), (0, 0, 1)),
+    "functions": cv.FunctionPotential(quartic_energy, quartic_gradient, axis_W=(0, 0, 1)),
+    "scene": cv.Scene("own", BODY, np.eye(3), (0, 1, 2), 3, cv.UniformGravity(1, (0, 0, 1)), source="here"),
+    "trajectory": cv.Trajectory(cv.scenes.brick_flip(), np.zeros(1), np.eye(3)[None], np.zeros((1, 3)), "nobody"),
+    "grid": cv.Grid(0.01, 10),
+    **{method.name: method for name in registry.list_methods() for method in type(registry.method(name)).variants()},
+}
+
+
+def same(a, b):
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.tobytes() == b.tobytes()
+    return a is b or a == b
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_replacing_nothing_changes_nothing(name):
+    value = VALUES[name]
+    other = replace(value)
+    assert type(other) is type(value)
+    assert repr(other) == repr(value)
+    assert all(same(getattr(value, field.name), getattr(other, field.name)) for field in fields(value))
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_nothing_is_assigned_to_a_value(name):
+    value = VALUES[name]
+    for attribute in (fields(value)[0].name if fields(value) else "label", "something_new"):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, attribute, 3)
+
+
+@pytest.mark.parametrize("name", sorted(set(VALUES) - {"trajectory"}))
+def test_arrays_that_a_value_made_are_read_only(name):
+    value = VALUES[name]
+    arrays = [getattr(value, field.name) for field in fields(value)]
+    assert not any(array.flags.writeable for array in arrays if isinstance(array, np.ndarray))
+
+
+def test_a_value_keeps_no_array_of_the_callers():
+    rates = np.array([0.0, 1.0, 2.0])
+    scene = cv.Scene("own", BODY, np.eye(3), rates, 3.0)
+    rates[0] = 7.0
+    assert scene.w_WB_B0[0] == 0
+    assert rates.flags.writeable
+
+
+def test_what_is_replaced_is_checked_and_converted():
+    assert replace(VALUES["spring"], point_B=[1, 2, 3]).point_B.tolist() == [1.0, 2.0, 3.0]
+    assert replace(VALUES["scene"], t_end=7).t_end == 7.0
+    with pytest.raises(cv.BadInput, match="t_end"):
+        replace(VALUES["scene"], t_end=-1)
+    with pytest.raises(cv.BadInput, match="inertia"):
+        replace(BODY, inertia=(1, 2))
+
+
+def test_the_exact_step_of_moser_and_veselov_by_all_its_names():
+    names = [
+        cv.MoserVeselov(),
+        cv.MoserVeselov("exact"),
+        registry.method("moser_veselov:order=exact"),
+        replace(cv.MoserVeselov()),
+    ]
+    assert {(method.name, method.order) for method in names} == {("moser_veselov", None)}
+    assert len(set(names)) == 1
+    assert replace(cv.MoserVeselov(), order=4).name == "moser_veselov:order=4"
+    for order in (True, 3, "best"):
+        with pytest.raises(cv.BadInput, match="'exact'"):
+            cv.MoserVeselov(order)
+
+
+def test_functions_are_wrapped_once():
+    potential = replace(replace(VALUES["functions"]))
+    assert potential.energy.function is quartic_energy
+    assert potential.gradient.function is quartic_gradient
+    assert potential.scale() == VALUES["functions"].scale() > 0
+
+
+def test_no_file_goes_around_a_frozen_value():
+    found = [path for room in ("conservative", "references", "benchmarks", "reports") for path in (ROOT / room).rglob("*.py")]
+    assert len(found) > 100
+    assert not [str(path) for path in found if "__setattr__" in path.read_text(encoding="utf-8")]

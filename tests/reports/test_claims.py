@@ -1,0 +1,47 @@
+import math
+
+import pytest
+
+from conservative import registry
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import frame
+from conservative.reports.tables import claims, orders
+
+from .made_up import convergence, row
+
+
+def verdicts(rows, scene="brick_flip"):
+    table = frame(rows)
+    fits = orders.fits(orders.errors(table, Measure.ATTITUDE_MAX))
+    return {found.claim: found.verdict for found in claims.findings(table, fits, [registry.scene(scene)])}
+
+
+@pytest.mark.parametrize(("order", "verdict"), [(4, claims.HOLDS), (2, claims.FAILS)])
+def test_audit_of_an_order(order, verdict):
+    assert verdicts(convergence("reduced:order=4", order)) == {"reduced:order=4 is of order 4 (brick_flip)": verdict}
+
+
+@pytest.mark.parametrize(("drift", "verdict"), [(4e-16, claims.HOLDS), (1e-9, claims.FAILS), (math.nan, claims.FAILS)])
+def test_audit_of_a_conserved_quantity(drift, verdict):
+    rows = [row("paper", "reduced", "energy drift max", value, dt) for dt, value in ((0.01, 4e-16), (0.005, drift))]
+    assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.1, claims.HOLDS), (0.2, claims.FAILS), (math.nan, claims.FAILS)])
+def test_audit_of_one_map_in_two_programs(error, verdict):
+    rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]
+    found = verdicts(rows)
+    assert found.get("reduced is the paper's map (brick_flip)", claims.FAILS) == verdict
+
+
+@pytest.mark.parametrize(("coarse", "verdict"), [(1e-8, claims.HOLDS), (0.5, claims.FAILS), (math.nan, claims.FAILS)])
+def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
+    rows = [
+        row("paper", "mujoco", "energy drift max", coarse, 0.01, role="engine"),
+        row("paper", "mujoco:integrator=Euler", "energy drift max", 0.05, 0.0025, role="engine"),
+        row("paper", "mujoco:integrator=implicit", "attitude error max", 0.2, 0.01, role="engine"),
+        row("paper", "mujoco:integrator=implicitfast", "attitude error max", 0.2, 0.01, role="engine"),
+    ]
+    found = verdicts(rows)
+    assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
+    assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == claims.HOLDS

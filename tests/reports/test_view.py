@@ -1,0 +1,99 @@
+"""The view holds every number that a report shows: rendering it integrates nothing and starts no process."""
+
+import dataclasses
+import subprocess
+
+import pytest
+
+from conservative import Method, Reduced, registry
+from conservative.benchmarks.measures import samples
+from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.studies import import_time, studies
+from conservative.benchmarks.studies.study import Study
+from conservative.reports import document, view
+from conservative.reports.run.measure import Measurements
+from conservative.reports.run.plan import plan_report
+from conservative.reports.run.provenance import provenance
+from conservative.reports.tables import orders, work_precision
+
+from .made_up import curves, table
+
+
+def classes(base):
+    return {base, *(found for kind in base.__subclasses__() for found in classes(kind))}
+
+
+@pytest.fixture
+def nothing_is_measured(monkeypatch):
+    """Make every method that is about to run, and every process that is about to start, an error."""
+
+    def integrate(self, scene, grid):
+        pytest.fail(f"{self.name} runs on {scene.name}")
+
+    def start(self, arguments, *rest, **options):
+        pytest.fail(f"a process starts: {arguments}")
+
+    for name in registry.list_methods():
+        registry.method(name)  # so that its class is there
+    for kind in classes(Method):
+        if "prepare" in vars(kind):
+            monkeypatch.setattr(kind, "prepare", integrate)
+    monkeypatch.setattr(subprocess.Popen, "__init__", start)
+
+
+@pytest.fixture(scope="module")
+def report():
+    """Plan, measurements and origin of a report of both scenes: the paper's figures, curves and imports are measured."""
+    plan = plan_report([], ["reduced"], quick=True)
+    found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
+    found += studies.findings(Study("paper_figures", plan.scenes, plan.methods))
+    lines = [finding for finding in found if isinstance(finding, Samples)]
+    return plan, Measurements(table(), samples.frame(lines)), provenance(["report"])
+
+
+def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):
+    shown = []
+    document.render(view.build(*report), tmp_path, png=False, announce=shown.append)
+    assert shown == ["pictures", "page"]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"report.md", "index.html", "measurements.json", "paper_figure_1.svg", "paper_figure_2.svg"} < names
+    assert "sphere_lagrange_top" in (tmp_path / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "measure",
+    [
+        lambda: curves(registry.scene("brick_flip"), Reduced()),
+        lambda: list(studies.findings(Study("paper_figures", (registry.scene("brick_flip"),), (Reduced(),)))),
+        lambda: import_time.import_time("json"),
+    ],
+    ids=["curves", "figures of the paper", "imports"],
+)
+def test_what_rendering_once_measured_would_be_noticed(measure, nothing_is_measured):
+    with pytest.raises(pytest.fail.Exception, match=r"runs on|a process starts"):
+        measure()
+
+
+def test_the_view_is_computed_once_for_all_scenes(report, monkeypatch):
+    calls = []
+    for module, name in ((work_precision, "points"), (orders, "errors"), (orders, "fits")):
+        monkeypatch.setattr(module, name, counting(getattr(module, name), calls))
+    view.build(*report)
+    assert calls.count("points") == 1
+    assert calls.count("errors") == 2  # of the attitude, and of the rates
+    assert calls.count("fits") == 2
+
+
+def counting(function, calls):
+    def call(*arguments):
+        calls.append(function.__name__)
+        return function(*arguments)
+
+    return call
+
+
+def test_the_view_is_frozen(report):
+    built = view.build(*report)
+    for value in (built, built.paper, built.scenes[0]):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            value.name = "another"

@@ -1,0 +1,255 @@
+"""A method is one file: what is written in it and in one entry point is found wherever methods are used, and nowhere else."""
+
+import ast
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+import conservative as cv
+from conservative import entry_points, registry
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import frame
+from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
+from conservative.benchmarks.suite import points
+from conservative.methods import automatic
+from conservative.reports.charts import style
+from conservative.reports.tables import claims, orders
+
+from .reports.rows import row
+
+ROOT = Path(__file__).parent.parent
+GENERIC = (
+    "conservative/declarations.py",
+    "conservative/methods/automatic.py",
+    "benchmarks/studies/hard_cases.py",
+    "benchmarks/studies/import_time.py",
+    "benchmarks/studies/selection.py",
+    "benchmarks/studies/sphere_curves.py",
+    "benchmarks/suite/points.py",
+    "benchmarks/suite/test_speed.py",
+    "reports/charts/spheres.py",
+    "reports/charts/style.py",
+    "reports/tables/claims.py",
+    "reports/tables/overview.py",
+)
+"""Files that have methods to do with, and know none."""
+
+SOURCE = '''
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.declarations import Candidacy, Claims, Cost
+from conservative.method import Method, Role
+from conservative.methods.reduced import Reduced
+
+
+@dataclass(frozen=True)
+class Borrowed(Method):
+    """The map of `Reduced`, which says that it costs next to nothing."""
+
+    parts: int = 1
+
+    family: ClassVar[str] = "borrowed"
+    role: ClassVar[Role] = Role.OURS
+    candidacy: ClassVar[Candidacy] = Candidacy(-1, "implicit")
+    claims: ClassVar[Claims] = Claims("its manual")
+    colour: ClassVar[str] = "#123456"
+
+    @property
+    def order(self):
+        return 2
+
+    @property
+    def conserves(self):
+        return frozenset({"energy"})
+
+    @property
+    def cost(self):
+        return Cost(step=1e-9)
+
+    @classmethod
+    def variants(cls):
+        return cls(1), cls(2), cls(3)
+
+    @classmethod
+    def suite_settings(cls):
+        return (cls(2),)
+
+    @classmethod
+    def picture_settings(cls):
+        return (cls(3),)
+
+    def prepare(self, scene, grid):
+        return Reduced().prepare(scene, grid)
+'''
+SILENT = (
+    SOURCE.partition("    candidacy:")[0]
+    + """
+    order = None
+
+    def prepare(self, scene, grid):
+        raise NotImplementedError
+"""
+)
+"""The same method with nothing but what has no default."""
+
+
+def install(folder, monkeypatch, source, entry="borrowed = borrowed_method:Borrowed"):
+    """Put a package of one file into a folder as pip would, and the folder onto the path."""
+    (folder / "borrowed_method.py").write_text(source)
+    info = folder / "borrowed_method-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: borrowed_method\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{entry_points.METHODS}]\n{entry}\n")
+    monkeypatch.syspath_prepend(folder)
+    importlib.invalidate_caches()
+    entry_points.list_entries.cache_clear()
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    yield lambda *text: install(tmp_path, monkeypatch, *text)
+    sys.modules.pop("borrowed_method", None)
+    monkeypatch.undo()
+    entry_points.list_entries.cache_clear()
+
+
+def test_the_automatic_choice_considers_it(installed):
+    top = cv.scenes.asymmetric_top(t_end=0.5)
+    before = [method.family for method in automatic.candidates(top)]
+    assert "borrowed" not in before
+    installed(SOURCE)
+    found = [method.family for method in automatic.candidates(top)]
+    assert found == ["borrowed"] * 3 + ["projected"]  # of its group the first, and still what is in no group
+    assert automatic.candidates(cv.scenes.brick_flip()) == (cv.MoserVeselov(),)  # an exact family stays alone
+    assert cv.integrate(top, error=1e-3).choice.method.family == "borrowed"
+
+
+def test_the_suite_times_the_settings_that_it_names(installed):
+    installed(SOURCE)
+    found = [point for point in points.points() if point.method.family == "borrowed"]
+    assert [point.scene.name for point in found] == list(points.SCENES)
+    assert {point.method.name for point in found} == {"borrowed:parts=2"}
+
+
+def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
+    names = ["heyoka 7.13.2 body", "borrowed parts=2", "reduced"]
+    assert style.colours(names)["borrowed parts=2"] != "#123456"
+    installed(SOURCE)
+    assert style.colours(names)["borrowed parts=2"] == "#123456"
+    assert style.series_order(names) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
+    methods = selection.methods(["borrowed", "reduced:order=4"])
+    assert [method.name for method in sphere_curves.pick(methods)] == ["borrowed:parts=3", "reduced:order=4"]
+
+
+@pytest.mark.parametrize(("drift", "order", "verdict"), [(1e-15, 2, claims.HOLDS), (1e-3, 1, claims.FAILS)])
+def test_its_claims_are_checked(installed, drift, order, verdict):
+    steps = (0.1, 0.05, 0.025, 0.0125, 0.00625)
+    common = {"scene": "brick_flip"}
+    rows = [row("convergence", "borrowed:parts=2", "attitude error max", dt**order, dt, **common) for dt in steps]
+    rows += [row("paper", "borrowed", f"{quantity} drift max", drift, 0.01, **common) for quantity in ("energy", "momentum")]
+    table, scenes = frame(rows), [cv.scenes.brick_flip()]
+    fits = orders.fits(orders.errors(table, Measure.ATTITUDE_MAX))
+    assert not claims.findings(table, fits, scenes)
+    installed(SOURCE)
+    found = {each.claim: each for each in claims.findings(table, fits, scenes)}
+    assert {claim: each.verdict for claim, each in found.items()} == {
+        "borrowed keeps energy to round-off (brick_flip)": verdict,
+        "borrowed:parts=2 is of order 2 (brick_flip)": verdict,
+    }
+    assert {each.where for each in found.values()} == {"its manual"}
+
+
+def test_the_import_of_an_engine_is_timed(installed):
+    before = import_time.modules()
+    installed(
+        SOURCE.replace("Role.OURS", "Role.ENGINE").replace("    colour:", '    module: ClassVar[str] = "json"\n    colour:')
+    )
+    assert import_time.modules() == before | {"json": cv.Role.ENGINE}
+
+
+def test_a_method_need_not_say_anything(installed):
+    installed(SILENT)
+    method = registry.method("borrowed")
+    assert method in [point.method for point in points.points()]
+    assert method in hard_cases.settings(selection.methods())
+    assert method in sphere_curves.pick(selection.methods())
+    assert style.colours(["borrowed"])["borrowed"] not in style.PALETTE.values()
+    assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
+
+
+NEEDY = SOURCE.replace(
+    "    @property\n    def order",
+    "    def __post_init__(self):\n        raise MissingEngine('Engine', 'engine')\n\n    @property\n    def order",
+).replace("from conservative.method ", "from conservative.errors import MissingEngine\nfrom conservative.method ")
+"""The same method, which needs something that is not installed."""
+
+
+def test_a_method_without_what_it_needs_breaks_nothing(installed):
+    top = cv.scenes.asymmetric_top()
+    nothing = frame([])
+    fits = orders.fits(orders.errors(nothing, Measure.ATTITUDE_MAX))
+    before = automatic.candidates(top), claims.findings(nothing, fits, [])
+    installed(NEEDY)
+    assert "borrowed" in registry.list_families()
+    assert (automatic.candidates(top), claims.findings(nothing, fits, [])) == before
+    missing = [point.method for point in points.points() if point.method.name == "borrowed"]
+    assert {type(method) for method in missing} == {selection.Missing}
+
+
+BROKEN = {
+    "nothing there": ("", "borrowed = borrowed_nowhere:Borrowed"),
+    "fails on import": ("raise OSError('no licence')", "borrowed = borrowed_method:Borrowed"),
+    "no class": (SOURCE, "borrowed = borrowed_method:Role"),
+    "another name": (SOURCE, "lent = borrowed_method:Borrowed"),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_entry_point_breaks_nothing(installed, what):
+    top = cv.scenes.asymmetric_top()
+    families, chosen = registry.list_families(), automatic.candidates(top)
+    installed(*BROKEN[what])
+    assert registry.list_families() == families
+    assert automatic.candidates(top) == chosen
+    assert style.series_order(["mujoco 4.0.0 RK4", "reduced"]) == ["reduced", "mujoco 4.0.0 RK4"]
+
+
+def names_of_methods(source):
+    """Return the names of registered methods and of their classes that a source has in texts or imports; not in docstrings."""
+    families = registry.list_families()
+    classes = {family.__name__ for family in families.values()}
+    tree = ast.parse(source)
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            found |= families.keys() & {re.split(r"[:\s=]", node.value)[0]}
+        elif isinstance(node, ast.Name | ast.Attribute):
+            found |= classes & {node.id if isinstance(node, ast.Name) else node.attr}
+        elif isinstance(node, ast.ImportFrom | ast.Import):
+            found |= classes & {alias.name for alias in node.names}
+    return found
+
+
+@pytest.mark.parametrize("path", GENERIC)
+def test_no_method_is_known_by_name(path):
+    assert not names_of_methods((ROOT / path).read_text(encoding="utf-8"))
+
+
+BREACHES = {
+    "COLOURS = {'reduced': BLUE}": {"reduced"},
+    "rows = table['method'].str.startswith('mujoco')": {"mujoco"},
+    "GOALS = ('mujoco:RK4', 100)": {"mujoco"},
+    "from .gauss import Gauss": {"Gauss"},
+    "if isinstance(method, methods.Projected): pass": {"Projected"},
+    "'''reduced, in prose'''\nexact = reduced = 1": set(),
+}
+
+
+@pytest.mark.parametrize("source", BREACHES)
+def test_a_name_is_found(source):
+    assert names_of_methods(source) == BREACHES[source]
