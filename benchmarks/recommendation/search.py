@@ -20,9 +20,9 @@ from .probe import RUN_LIMIT, Conditions, Probe
 
 ATTEMPTS = 12
 SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8
-"""Largest cut of a step from one probe to the next, and the cut where a probe says nothing."""
+"""Smallest factor by which a step is cut from one probe to the next; and the factor used when a probe gave no usable error."""
 LONGER = 8
-"""Ratio of two steps: that of a long run, which shows how errors grow later on, and the step in question."""
+"""Step of the long run, relative to the candidate step."""
 TIGHTEST = -16
 """Smallest tolerance asked for, power of ten: a rounding unit."""
 LARGEST_TOLERANCE_CUT = 4
@@ -132,8 +132,8 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     factor = DEFAULT_CUT
     if expected < math.inf and last.method.order is not None:
         factor = min(0.8, max(SMALLEST_CUT, (conditions.target / expected) ** (1 / last.method.order)))
-    telling = sum(conditions.shows_growth(probe) for probe in probes)
-    if conditions.shows_growth(last) and telling < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
+    growing = sum(conditions.shows_growth(probe) for probe in probes)
+    if conditions.shows_growth(last) and growing < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that there is an order to be seen
     dt = conditions.step_at_most(last.dt * factor)
     if dt < per_step / conditions.cost_limit:
