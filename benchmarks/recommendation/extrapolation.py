@@ -9,6 +9,7 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.invariants import sizes
+from conservative.methods.automatic import ASYMPTOTIC
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope
@@ -19,8 +20,6 @@ SIGNIFICANT = 3.0
 """Standard errors that its slope must be away from zero."""
 FASTER_THAN_LINEAR = 10.0
 """How far above a straight line a disturbance must rise before it is called amplified."""
-LOST = 0.2
-"""Errors above this, rad, are saturated (angles end at pi) and are not used."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class ErrorLaw:
 
     def extrapolate(self, duration: float) -> float:
         """Return the error to expect over `duration` s, rad; infinite where the body's attitude is lost."""
-        if self.error >= LOST:
+        if self.error >= ASYMPTOTIC:
             return math.inf
         if self.is_measured(duration):
             return self.error
@@ -143,7 +142,7 @@ class ErrorLaw:
         if self.is_measured(duration):
             return f"measured over all {duration:g} s"
         run = f"measured over {self.length:.3g} s{self.scaling or ''}"
-        if self.error >= LOST:
+        if self.error >= ASYMPTOTIC:
             return f"{run}, lost there"
         if math.isinf(self.excess):
             return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
@@ -200,7 +199,7 @@ class Amplification:
     @property
     def _known(self) -> int:
         """Return how many samples come before the two motions have nothing in common any more."""
-        lost = self.factor * self.disturbance > LOST
+        lost = self.factor * self.disturbance > ASYMPTOTIC
         return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
 
     @property

@@ -14,6 +14,7 @@ from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
 from conservative.integration import integrate
 from conservative.method import Grid, Method
+from conservative.methods.automatic import bound_rate
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
@@ -55,8 +56,7 @@ def prepare_conditions(scene: Scene, error: float, duration: float, cost_limit: 
 
 def find_largest_rate(scene: Scene, duration: float) -> float:
     """Return the largest angular speed, rad/s, of a trial run, and at least a turn by one radian in the whole duration."""
-    bound = math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound))
+    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound_rate(scene)))
     return max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)
 
 

@@ -15,15 +15,14 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.method import Grid, Method
+from conservative.methods.automatic import ASYMPTOTIC, SAFETY
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..studies.case import Case, Success, attempt
 from ..studies.selection import tolerance_setting
-from .extrapolation import LOST, Amplification, Drift, ErrorLaw, Scaling, extrapolate_drifts, fit_law
+from .extrapolation import Amplification, Drift, ErrorLaw, Scaling, extrapolate_drifts, fit_law
 
-SAFETY = 0.5
-"""Share of the wanted error that settings are chosen for."""
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
 """Longest run of a short and of a long probe, s of wall time: with a short step it covers less of the motion."""
 LONG_SAMPLES = 256
@@ -213,4 +212,4 @@ class Conditions:
     def shows_growth(self, probe: Probe) -> bool:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
-        return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < LOST
+        return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < ASYMPTOTIC
