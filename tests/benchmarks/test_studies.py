@@ -94,7 +94,7 @@ def test_paper_measures_every_method_at_three_steps():
 
 
 def test_paper_says_how_well_the_truths_agree():
-    row = table("paper")["truth", 0.02, "truth agreement"]
+    row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
 
 
