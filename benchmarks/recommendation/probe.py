@@ -193,18 +193,14 @@ class Conditions:
         where the finer run is about as long itself.
         """
         whole = [probe for probe in before if self.shows_growth(probe)]
-        if not whole or ((name := tolerance_setting(method)) is None and method.order is None):
+        if not whole or (tolerance_setting(method) is None and method.order is None):
             return None
         base = max(whole, key=lambda probe: (probe.length, -probe.setting))
         enough = min(base.length / MUCH_LONGER, self.duration)
         if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
             return None
         assert base.error_law is not None  # or it would tell nothing
-        order = method.order or 0
-        by_order = Scaling("dt", base.dt, (dt / base.dt) ** order, order)
-        carried = base.error_law.scale(
-            by_order if name is None else Scaling(name, base.setting, getattr(method, name) / base.setting, None)
-        )
+        carried = base.error_law.scale(find_scaling(base, method, dt))
         # What rounding leaves: a random walk of the rate, a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
@@ -213,3 +209,12 @@ class Conditions:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < ASYMPTOTIC
+
+
+def find_scaling(base: Probe, method: Method, dt: float) -> Scaling:
+    """Return how the error of a probe changes at the tolerance of a method, or at a step of dt s where it has none."""
+    name = tolerance_setting(method)
+    if name is not None:
+        return Scaling(name, base.setting, getattr(method, name) / base.setting, None)
+    assert method.order is not None  # nothing is carried over where neither is there
+    return Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)
