@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
+from conservative.benchmarks.gate.results import TIME_RATIO
 from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import time_ratio, time_ratio_elsewhere
 from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
-from conservative.benchmarks.studies.case import Case, Done, attempt
-from conservative.benchmarks.studies.speed import end_only, lengthen
+from conservative.benchmarks.studies.case import Case, Success, attempt
+from conservative.benchmarks.studies.speed import keep_end, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.integration import integrate
@@ -23,7 +24,7 @@ from conservative.scene import Scene
 
 POINTS = [pytest.param(point, id=point.id) for point in points.points()]
 RATIOS, CALLS = "33f1e1d237a63627", "b069cf647739a756"
-"""Definitions of the rows of ratios and of calls: nothing of them is gated, so a change of their source is none of theirs."""
+"""Fixed ids: these rows gate nothing, so editing the test must not change their definition."""
 FEW_STEPS, OVERHEAD_GOAL = 5, 20
 
 
@@ -34,7 +35,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     if reason:
         pytest.skip(reason)
     benchmark.group = scene.name
-    run, last, cost = prepare_and_run(lambda: method.prepare(scene, end_only(point.grid)))
+    run, last, cost = prepare_and_run(lambda: method.prepare(scene, keep_end(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
@@ -43,7 +44,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     benchmark.extra_info.update({name: found.value for name, found in values.items()})
     benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}
     if point.timed:
-        benchmark.extra_info["time ratio"] = time_ratio(method, scene, scene.dt)
+        benchmark.extra_info[TIME_RATIO] = time_ratio(method, scene, scene.dt)
         request.node.stash[REPEAT] = partial(time_ratio_elsewhere, scene.name, method.name)
     benchmark(run)
 
@@ -109,9 +110,9 @@ def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.Mo
     return partial(enter, *handed[0])
 
 
-def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
+def long_run(scene: Scene, method: Method) -> tuple[Case, Success]:
     """Return a run so long that what a call costs beside its steps does not count."""
-    case = Case("ratios", scene, method, end_only(grid_for(scene, scene.dt)))
+    case = Case("ratios", scene, method, keep_end(grid_for(scene, scene.dt)))
     done = attempt(case)
-    assert isinstance(done, Done), done
+    assert isinstance(done, Success), done
     return lengthen(case, done)

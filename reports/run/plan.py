@@ -57,8 +57,8 @@ class Plan:
     @property
     def studies(self) -> tuple[Study, ...]:
         """What is measured, in this order; the hard cases only where nobody asked for less."""
-        crossed = studies.crossed(self.scenes, self.methods, self.quick, self.skip_missing)
-        return (*crossed, *studies.hard(self.methods, self.skip_missing)) if self.hard else crossed
+        crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing)
+        return (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
 
     @property
     def names(self) -> tuple[str, ...]:
