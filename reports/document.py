@@ -32,12 +32,13 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     BadInput
         The folder cannot be written, or there is nothing that can be resumed; told before any work.
     """
-    progress = checkpoint.begin(plan, out, provenance(), resume)
+    source = provenance()  # before any work: files, and the commit, can change while that goes on
+    progress = checkpoint.begin(plan, out, source, resume)
     spans = plan.spans(name for name in plan.names if name not in progress.pieces)
     with atomic_files.report_folder(out) as folder:
         try:
             measurements = measure(plan, step, progress)
-            view = build(plan, measurements, replace(provenance(), resumed=progress.earlier))
+            view = build(plan, measurements, replace(source, resumed=progress.earlier))
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
         except BaseException as error:
             error.add_note(progress.story)

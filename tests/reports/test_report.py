@@ -2,6 +2,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -22,6 +23,7 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import runs
 
+from .made_up import measurements
 from .rows import row
 
 
@@ -54,6 +56,20 @@ def test_progress_never_goes_back_and_ends_near_the_whole():
     assert spans[0][0] == 0
     assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
     assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
+
+
+def test_the_studies_of_a_plan_are_built_once_and_share_their_truths():
+    made = plan_report(["brick_flip"], ["reduced"], quick=True)
+    assert made.studies is made.studies
+    assert len({id(study.truth) for study in made.studies}) == 1
+
+
+def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
+    commits = iter(["before", "after"])
+    monkeypatch.setattr(document, "provenance", lambda: replace(provenance([]), commit=next(commits)))
+    monkeypatch.setattr(document, "measure", lambda plan, step, progress: measurements())
+    written = document.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
+    assert written.source.commit == "before"
 
 
 def test_progress_knows_how_long_every_study_takes():
