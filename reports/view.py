@@ -161,7 +161,7 @@ class _Builder:
             orders.fits(errors),
             orders.fits(orders.errors(table, Measure.RATES_MAX)),
             lines.curves(samples),
-            tuple(sphere_curves.pick(methods)),
+            tuple(sphere_curves.select_methods(methods)),
         )
 
     def scene(self, value: Scene) -> SceneView:

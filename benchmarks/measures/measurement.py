@@ -87,7 +87,7 @@ def from_flat(record: Mapping[str, Any]) -> Measurement:
     return Measurement(
         **{name: record[name] for name in _AS_THEY_ARE},
         role=Role(record["role"]),
-        measure=Measure.named(record["measure"]),
+        measure=Measure.from_text(record["measure"]),
         outcome=outcome_of(record),
     )
 

@@ -65,7 +65,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Done:
+class Success:
     """A case that reached its end: the run, which can be called again, its first trajectory and what both cost."""
 
     run: Run
@@ -74,13 +74,13 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Failed:
+class Failure:
     """A case that did not: the outcome that its rows carry."""
 
     outcome: Outcome
 
 
-def at_no_step(row: Measurement) -> Measurement:
+def drop_step(row: Measurement) -> Measurement:
     """Return a row that belongs to no single step."""
     return replace(row, dt=float("nan"))
 
@@ -93,12 +93,12 @@ def label_of(method: Method) -> str:
         return method.name
 
 
-def unsupported(reason: str) -> Failed:
+def fail_unsupported(reason: str) -> Failure:
     """Return the failure of a case that the method cannot do."""
-    return Failed(Outcome(OutcomeKind.UNSUPPORTED, reason))
+    return Failure(Outcome(OutcomeKind.UNSUPPORTED, reason))
 
 
-def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
+def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
     """Prepare and run a case once.
 
     Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become an outcome.
@@ -112,18 +112,18 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     try:
         reason = case.method.unsupported(case.scene)
         if reason:
-            return unsupported(reason)
-        done = Done(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
+            return fail_unsupported(reason)
+        done = Success(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return Failed(Outcome(OutcomeKind.MISSING, str(error)))
+        return Failure(Outcome(OutcomeKind.MISSING, str(error)))
     except BadInput as error:  # a step that the method does not have
-        return unsupported(str(error))
+        return fail_unsupported(str(error))
     except IntegrationFailed as failure:
-        return Failed(failure.outcome)
+        return Failure(failure.outcome)
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
         if case.method.role != Role.ENGINE:
             raise
-        return Failed(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
-    return done if done.trajectory.ok else Failed(done.trajectory.outcome)
+        return Failure(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
+    return done if done.trajectory.ok else Failure(done.trajectory.outcome)

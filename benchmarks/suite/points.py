@@ -20,7 +20,7 @@ from ..measures import errors
 from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Done, attempt
+from ..studies.case import Case, Success, attempt
 from ..studies.study import Truths
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
@@ -130,7 +130,7 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
     exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
     grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
     found = [attempt(Case("order", scene, method, grid)) for grid in grids]
-    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
+    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in found]
     order = observed_order([grid.dt for grid in grids], sizes)
     return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 

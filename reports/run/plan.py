@@ -34,8 +34,8 @@ QUICK = 0.3
 class Plan:
     """What a report is made of.
 
-    `studies` is what is measured, in this order; the hard cases only where nobody asked for less. Studies of the same scenes and
-    methods share their truths.
+    `studies` is what is measured, in this order; the hard cases only where nobody asked for less. Studies of the same scenes
+    and methods share their truths.
 
     Raises
     ------
@@ -57,8 +57,8 @@ class Plan:
         if not self.skip_missing:
             for method in self.methods:
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
-        crossed = studies.crossed(self.scenes, self.methods, self.quick, self.skip_missing)
-        every = (*crossed, *studies.hard(self.methods, self.skip_missing)) if self.hard else crossed
+        crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing)
+        every = (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
         object.__setattr__(self, "studies", every)
 
     @property

@@ -66,4 +66,4 @@ def _case(rows: pd.DataFrame) -> Cell:
 
 def _first(rows: pd.DataFrame) -> str:
     row = rows.iloc[0]
-    return f"{key(Measure.named(row['measure']), row['quantity'])} {number(float(row['value']))}"
+    return f"{key(Measure.from_text(row['measure']), row['quantity'])} {number(float(row['value']))}"

@@ -84,9 +84,9 @@ def _motion(recommendation: Recommendation) -> dict[str, Any]:
     return {
         "unstable": amplified.unstable,
         "disturbance": amplified.disturbance,
-        "becomes": amplified.becomes,
-        "lost": amplified.lost,
-        "measured_until": amplified.until,
+        "becomes": amplified.final_size,
+        "lost": amplified.is_lost,
+        "measured_until": amplified.end,
         "by": amplified.label,
     }
 
@@ -164,10 +164,10 @@ def _truth_text(recommendation: Recommendation) -> str:
 def _stability_text(recommendation: Recommendation) -> str:
     amplified = recommendation.conditions.amplification
     stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
-    after = ", and by anything after that" if amplified.lost else ""
+    after = ", and by anything after that" if amplified.is_lost else ""
     return (
-        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.becomes:.2g} rad within "
-        f"{amplified.until:.4g} s{after} ({amplified.label}): {stable}."
+        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.final_size:.2g} rad "
+        f"within {amplified.end:.4g} s{after} ({amplified.label}): {stable}."
     )
 
 

@@ -13,7 +13,7 @@ def row(study, method, measure, value, dt=0.1, **fields):
         if " drift " in measure:
             quantity, measure = measure.split(" drift ")
             measure = f"drift {measure}"
-        measure = Measure.named(measure)
+        measure = Measure.from_text(measure)
     outcome = fields.pop("outcome", OK)
     common = {"scene": "made_up", "label": method, "role": Role.OURS, "series": method, **fields}
     common["role"] = Role(common["role"])

@@ -41,7 +41,7 @@ def test_methods_without_a_curve_are_named():
 def test_picks_one_method_of_each_family_that_has_no_preferred_one():
     names = [
         m.name
-        for m in sphere_curves.pick(
+        for m in sphere_curves.select_methods(
             [registry.method(n) for n in ("gauss:stages=2", "gauss", "reduced:order=4", "reduced", "exact")]
         )
     ]
