@@ -19,6 +19,8 @@ FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
 TRUTH = "truth"
 """What stands for the method in rows about the truth itself."""
+APPROXIMATE = "approximate"
+"""Detail of such a row where nothing below the agreement is known."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -50,6 +52,7 @@ def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
         dt=dt,
         measure=Measure.AGREEMENT,
         value=truth.agreement_rad,
+        detail=APPROXIMATE if truth.approximate else "",
     )
 
 

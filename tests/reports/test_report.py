@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
-from conservative.benchmarks.measures.measurement import COLUMNS, frame
+from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.benchmarks.studies import studies
 from conservative.reports import document
 from conservative.reports.charts import style
@@ -24,7 +24,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import runs
 
 from .made_up import measurements
-from .rows import row
+from .rows import frame, row
 
 
 @pytest.fixture(scope="module")
@@ -216,19 +216,23 @@ def test_an_option_that_names_nothing_does_not_mean_everything(option, value, tm
     assert list(tmp_path.iterdir()) == []
 
 
+MUJOCO = dict.fromkeys(("mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler"), "mujoco")
+
+
 def test_colours_belong_to_families_whatever_else_is_drawn():
-    some = style.colours(["reduced", "mujoco 4.0.0 RK4"])
-    more = style.colours(["heyoka 7.13.2 body", "mujoco 4.0.0 Euler", "reduced", "their_own x"])
+    some = style.colours({"reduced": "reduced", **MUJOCO})
+    more = style.colours({"heyoka 7.13.2 body": "heyoka", **MUJOCO, "reduced": "reduced", "their_own x": "their_own"})
     assert some["reduced"] == more["reduced"]
     assert some["mujoco 4.0.0 RK4"] == more["mujoco 4.0.0 Euler"]
     assert len(set(more.values())) == 4
-    marks = style.within_family(["mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler", "reduced"])
-    assert list(marks.values()) == [0, 1, 0]
+    assert list(style.number_in_family({**MUJOCO, "reduced": "reduced"}).values()) == [0, 1, 0]
 
 
 def test_legends_follow_the_families_and_the_numbers_in_a_name():
     names = ["mujoco 4.0.0 RK4", "reduced order=10", "their_own", "reduced order=4", "reduced", "heyoka 7.13.2 tol=1e-06,body"]
-    assert style.series_order(names) == [names[4], names[3], names[1], names[5], names[0], names[2]]
+    families = ["mujoco", "reduced", "their_own", "reduced", "reduced", "heyoka"]
+    ordered = style.order_lines(dict(zip(names, families, strict=True)))
+    assert list(ordered) == [names[4], names[3], names[1], names[5], names[0], names[2]]
 
 
 def test_provenance_names_what_can_change_a_number():
