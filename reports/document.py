@@ -8,6 +8,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from conservative.errors import BadInput
+
 from .charts.figures import scene_charts
 from .page import markdown, page
 from .run import checkpoint
@@ -36,14 +38,15 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     source = provenance()  # before any work: files, and the commit, can change while that goes on
     progress = checkpoint.begin(plan, out, source, resume)
     spans = plan.spans(name for name in plan.names if name not in progress.results)
-    with atomic_files.report_folder(out) as folder:
-        try:
+    try:
+        with atomic_files.report_folder(out) as folder:
             measurements = measure(plan, step, progress)
             view = build(plan, measurements, replace(source, resumed=progress.describe_earlier()))
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
-        except BaseException as error:
+    except BaseException as error:
+        if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
-            raise
+        raise
     progress.remove()
     return view
 
