@@ -10,8 +10,7 @@ from typing import Any
 
 from conservative.errors import BadInput
 
-from .charts.figures import scene_charts
-from .page import markdown, page
+from .page import markdown, page, scene_charts
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
@@ -54,7 +53,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
 def render(view: View, folder: Path, png: bool, announce: Callable[[str], None]) -> None:
     """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
     announce("pictures")
-    charts = {scene.name: scene_charts(scene) for scene in view.scenes}
+    charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
     (folder / "report.md").write_text(text, encoding="utf-8")
     announce("page")
