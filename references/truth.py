@@ -12,7 +12,6 @@ motion amplifies errors. Source: our own.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -86,7 +85,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     end, fastest = float(grid.t[-1]), float(np.linalg.norm(trajectory.w_WB_B, axis=-1).max())
     if isinstance(first, Exact):
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end
-        agreement = _agreement(scene, first, second, until)
+        agreement = scene.derive(_agreement, first, second, until)  # grids change more often than scenes
     else:
         until, agreement = end, difference(trajectory, second.prepare(scene, grid)())
     # Times are products rounded to double in one truth and not in the other.
@@ -115,17 +114,7 @@ def _pair(scene: Scene) -> tuple[Method, Method, float]:
     return SciPy("DOP853", TIGHTEST), SciPy("LSODA", 1e-12), 1e-6
 
 
-_AGREEMENTS: WeakKeyDictionary[Scene, tuple[tuple[Method, Method, float], float]] = WeakKeyDictionary()
-"""The last check of each scene that is in use: grids change more often than scenes."""
-
-
 def _agreement(scene: Scene, first: Method, second: Method, until: float) -> float:
     """Return the difference over the first `until` s."""
-    key = first, second, until
-    known = _AGREEMENTS.get(scene)
-    if known is not None and known[0] == key:
-        return known[1]
     grid = Grid(until / CHECKED_SAMPLES, CHECKED_SAMPLES)
-    found = difference(first.prepare(scene, grid)(), second.prepare(scene, grid)())
-    _AGREEMENTS[scene] = key, found
-    return found
+    return difference(first.prepare(scene, grid)(), second.prepare(scene, grid)())

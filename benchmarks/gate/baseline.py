@@ -1,4 +1,4 @@
-"""The baseline: what each row was, how far it may move, why it was last changed; a file that no hand and no merge may edit."""
+"""The baseline: the value and the limit of every row, and the reason for every change. A hash shows edits by hand."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ ROUND_OFF = 8 * 2.0**-52
 ORDER_MARGIN = 0.05
 """How far an observed order may fall."""
 FALSE_ALARMS = 0.01
-"""Runs of an unchanged commit in which the time of any row may raise an alarm."""
+"""Share of the runs of an unchanged commit that may fail because of a time, all rows together."""
 REPEATS = 5
-"""Repeats without which there is no spread to speak of, and the widest threshold is taken."""
+"""With fewer repeats the spread is unknown, and the threshold is the widest."""
 NARROWEST, WIDEST = 0.05, 0.10
 """Limits of the threshold of a time ratio, as a part: below the first, another build differs as much; above the second, a
 slow-down of 20 % would not be seen 95 times in 100."""

@@ -137,7 +137,7 @@ def row_id(item: pytest.Item) -> str:
 
 
 def row(item: pytest.Item, report: pytest.TestReport) -> Row:
-    """Return what a benchmark left in `extra_info`: see README on benchmarks of one's own for the keys."""
+    """Return what a benchmark left in `extra_info`: see benchmarks/README.md, Benchmarks of your own, for the keys."""
     benchmark = getattr(item, "funcargs", {}).get("benchmark")
     info: dict[str, Any] = benchmark.extra_info if benchmark else {}
     spreads = {str(name): float(spread) for name, spread in info.get("spreads", {}).items()}

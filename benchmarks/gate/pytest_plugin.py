@@ -44,7 +44,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--gate-times",
-        choices=("required", "known"),
+        choices=("required", "known"),  # those of `compare.Times`, which is not imported here
         default="required",
         dest="conservative_gate_times",
         help="required: fail where the baseline has no times of this machine; known: then gate all but time, and say so.",

@@ -20,10 +20,10 @@ SHRINKING = 1 / 3
 """An error is still shrinking with the step where its local slope is above this part of the steepest slope seen."""
 ABOVE_FLOOR = 10.0
 """How far above the floor a point must be, so that the floor changes it by less than a tenth."""
-BEND = 0.05
-"""Relative difference between the slopes of the coarsest pair and of the rest above which the coarsest point is left out."""
-CALMER = 1.1
-"""Part by which the scatter about the fit must shrink when that point is left out: noise does not shrink, a bend does."""
+BEND, CALMER = 0.05, 1.1
+"""Drop the coarsest point if its slope differs by more than BEND, relative, and the scatter falls by more than a factor CALMER.
+
+Dropping a point of a bend lessens the scatter; dropping one of noise does not."""
 
 
 @dataclass(frozen=True)

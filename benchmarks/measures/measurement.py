@@ -25,7 +25,8 @@ class Measurement:
     study, scene
         Names of the study that made the row and of the scene; the latter empty for what belongs to none.
     method
-        Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back.
+        Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back. Empty for
+        what belongs to no one method.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
     family, version, setting

@@ -105,7 +105,7 @@ def time_interleaved(
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a model costs once, s: `prepare` (conversion, compilation) and the first call of what it returned."""
+    """What a model costs once, s: `prepare` (conversion; compilation where code is not warm) and the first call of the run."""
 
     prepare: float
     first_call: float

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from conservative.method import Role
+from conservative.outcome import Outcome
 
 from ..measures.convergence_order import Order, observed_order
 from ..studies.selection import tolerance_setting
@@ -45,10 +46,10 @@ class Advice:
     reason: str
 
 
-def advise(conditions: Conditions, line: str, role: Role, refinement: Refinement | str, cost: float | None) -> Advice:
-    """Return what to say about one line of settings; a text instead of probes is why there are none."""
-    if isinstance(refinement, str):
-        return Advice(line, role, None, False, math.nan, None, (), refinement)
+def advise(conditions: Conditions, line: str, role: Role, refinement: Refinement | Outcome, cost: float | None) -> Advice:
+    """Return what to say about one line of settings; an outcome instead of probes is why there are none."""
+    if isinstance(refinement, Outcome):
+        return Advice(line, role, None, False, math.nan, None, (), refinement.reason)
     probe = refinement.best(conditions.target)
     reached = probe.expected <= conditions.error
     order = None if probe.method.order is None else observed_order(*refinement.converging())

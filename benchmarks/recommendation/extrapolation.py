@@ -9,6 +9,7 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.invariants import sizes
+from conservative.methods.automatic import ASYMPTOTIC
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope
@@ -19,8 +20,6 @@ SIGNIFICANT = 3.0
 """Standard errors that its slope must be away from zero."""
 FASTER_THAN_LINEAR = 10.0
 """How far above a straight line a disturbance must rise before it is called amplified."""
-LOST = 0.2
-"""Error, rad, from which on one says nothing any more about how errors grow: angles end at pi."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,31 @@ def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, 
 
 
 @dataclass(frozen=True)
+class Scaling:
+    """How the law of a coarser setting is carried to a finer one.
+
+    Attributes
+    ----------
+    setting, base
+        What differs, "dt" or the name of a tolerance, and its coarser value.
+    factor
+        Error at the finer setting, in units of that at the coarser one.
+    order
+        The method's, by which its error shrinks with dt; None of a tolerance, which the error is proportional to.
+    """
+
+    setting: str
+    base: float
+    factor: float
+    order: int | None
+
+    def __str__(self) -> str:
+        if self.order is None:
+            return f" at {self.setting} = {self.base:g}, carried here in proportion to it"
+        return f" at {self.setting} = {self.base:.3g} s, carried here by order {self.order}"
+
+
+@dataclass(frozen=True)
 class ErrorLaw:
     """The law by which an error is carried from a run to the duration.
 
@@ -77,8 +101,8 @@ class ErrorLaw:
         invariant makes of the phase.
     excess
         Factor by which the motion itself amplifies errors beyond that, between the length and the duration.
-    scaled
-        Where the law is that of a coarser setting, how it was carried over; else empty.
+    scaling
+        How the law was carried over from a coarser setting; None where it is that of the run itself.
     """
 
     length: float
@@ -87,38 +111,38 @@ class ErrorLaw:
     linear: float
     quadratic: float
     excess: float
-    scaled: str = ""
+    scaling: Scaling | None = None
 
-    def at(self, duration: float) -> float:
+    def extrapolate(self, duration: float) -> float:
         """Return the error to expect over `duration` s, rad; infinite where the body's attitude is lost."""
-        if self.error >= LOST:
+        if self.error >= ASYMPTOTIC:
             return math.inf
-        if self.covers(duration):
+        if self.is_measured(duration):
             return self.error
         return self.excess * max(self.error, self.linear * duration + self.quadratic * duration**2)
 
-    def holds(self, error: float) -> float:
+    def find_duration(self, error: float) -> float:
         """Return for how long, s, the error to expect stays within `error`, rad; without amplification by the motion."""
         if not self.linear + self.quadratic > 0:
             return math.inf
         root = math.sqrt(self.linear**2 + 4 * self.quadratic * error)
         return 2 * error / (self.linear + root)
 
-    def covers(self, duration: float) -> bool:
+    def is_measured(self, duration: float) -> bool:
         """Whether nothing needs to be extrapolated."""
-        return not self.scaled and self.length >= duration * (1 - 1e-9)
+        return self.scaling is None and self.length >= duration * (1 - 1e-9)
 
-    def finer(self, factor: float, how: str) -> ErrorLaw:
-        """Return the law for a setting with `factor` times the error; `how` says in words where the factor comes from."""
-        linear, quadratic = self.linear * factor, self.quadratic * factor
-        return replace(self, error=self.error * factor, linear=linear, quadratic=quadratic, scaled=how)
+    def scale(self, scaling: Scaling) -> ErrorLaw:
+        """Return the law for a finer setting."""
+        linear, quadratic = self.linear * scaling.factor, self.quadratic * scaling.factor
+        return replace(self, error=self.error * scaling.factor, linear=linear, quadratic=quadratic, scaling=scaling)
 
-    def law(self, duration: float) -> str:
-        """Return in words what `at` did."""
-        if self.covers(duration):
+    def describe(self, duration: float) -> str:
+        """Return in words what `extrapolate` does."""
+        if self.is_measured(duration):
             return f"measured over all {duration:g} s"
-        run = f"measured over {self.length:.3g} s{self.scaled}"
-        if self.error >= LOST:
+        run = f"measured over {self.length:.3g} s{self.scaling or ''}"
+        if self.error >= ASYMPTOTIC:
             return f"{run}, lost there"
         if math.isinf(self.excess):
             return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
@@ -175,7 +199,7 @@ class Amplification:
     @property
     def _known(self) -> int:
         """Return how many samples come before the two motions have nothing in common any more."""
-        lost = self.factor * self.disturbance > LOST
+        lost = self.factor * self.disturbance > ASYMPTOTIC
         return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
 
     @property

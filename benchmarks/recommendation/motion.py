@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
 from conservative.integration import integrate
 from conservative.method import Grid, Method
+from conservative.methods.automatic import bound_rate
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
@@ -30,8 +32,10 @@ SAMPLES = 32
 DISTURBANCE = 1e-9
 """Relative change of the rates at the start."""
 AFFORDABLE = 0.3
-"""Wall time, s, of one of the two runs that show what becomes of it, where there is no closed form."""
+"""Wall-time budget, s, of each of the two disturbed runs, where there is no closed form."""
 DENSE = 256
+MOST_GRIDS = 16
+"""Grids whose exact attitudes are kept: methods that are probed alike share theirs."""
 
 
 def prepare_conditions(scene: Scene, error: float, duration: float, cost_limit: float) -> tuple[Conditions, Truth]:
@@ -52,8 +56,7 @@ def prepare_conditions(scene: Scene, error: float, duration: float, cost_limit: 
 
 def find_largest_rate(scene: Scene, duration: float) -> float:
     """Return the largest angular speed, rad/s, of a trial run, and at least a turn by one radian in the whole duration."""
-    bound = math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound))
+    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound_rate(scene)))
     return max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)
 
 
@@ -72,13 +75,11 @@ def round_down(value: float) -> float:
 
 
 def sample_closed_form(scene: Scene) -> Callable[[Grid], Array]:
-    """Return the function from a grid to exact attitudes; each grid is computed once."""
-    known: dict[Grid, Array] = {}
+    """Return the function from a grid to exact attitudes, which keeps those of the last `MOST_GRIDS` grids."""
 
+    @lru_cache(maxsize=MOST_GRIDS)
     def attitudes(grid: Grid) -> Array:
-        if grid not in known:
-            known[grid] = Exact().prepare(scene, grid)().R_WB
-        return known[grid]
+        return Exact().prepare(scene, grid)().R_WB
 
     return attitudes
 
@@ -110,7 +111,7 @@ def measure_amplification(conditions: Conditions) -> Amplification:
 
 
 def choose_ours(conditions: Conditions, error: float) -> tuple[Method, float]:
-    """Return the method and the longest round step, s, that our own chooser takes for an error, rad, over a short window."""
+    """Return the method and the longest round step, s, of the automatic choice for an error, rad, over a short window."""
     length = conditions.short
     choice = integrate_quietly(conditions.scene, error, length).choice
     assert choice is not None  # an error was asked for

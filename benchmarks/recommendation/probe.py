@@ -15,15 +15,14 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.method import Grid, Method
+from conservative.methods.automatic import ASYMPTOTIC, SAFETY
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..studies.case import Case, Success, attempt
 from ..studies.selection import tolerance_setting
-from .extrapolation import LOST, Amplification, Drift, ErrorLaw, extrapolate_drifts, fit_law
+from .extrapolation import Amplification, Drift, ErrorLaw, Scaling, extrapolate_drifts, fit_law
 
-SAFETY = 0.5
-"""Share of the wanted error that settings are chosen for."""
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
 """Longest run of a short and of a long probe, s of wall time: with a short step it covers less of the motion."""
 LONG_SAMPLES = 256
@@ -31,7 +30,7 @@ LEAST_SAMPLES = 4
 STEPS = 8
 """Least number of steps in a short window."""
 MUCH_LONGER = 4
-"""How much longer than a run at a finer setting one at a coarser setting has to be for its law to be taken."""
+"""Use the coarser run's law only if that run is this many times longer."""
 
 _ROUND = sorted({2**a * 5**b for a in range(44) for b in range(19) if 2**a * 5**b <= 10**13})
 
@@ -181,10 +180,10 @@ class Conditions:
         law = fit_law(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
         law = self._carry_over(method, grid.dt, length, before) or law
         exceeded = error > self.error
-        holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.holds(self.error))
-        expected, cost = law.at(self.duration), outcome.cost.first_call / length
+        holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.find_duration(self.error))
+        expected, cost = law.extrapolate(self.duration), outcome.cost.first_call / length
         return Probe(
-            method, grid.dt, length, largest, expected, law.law(self.duration), holds, law, found, cost, trajectory.outcome
+            method, grid.dt, length, largest, expected, law.describe(self.duration), holds, law, found, cost, trajectory.outcome
         )
 
     def _carry_over(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> ErrorLaw | None:
@@ -194,22 +193,14 @@ class Conditions:
         where the finer run is about as long itself.
         """
         whole = [probe for probe in before if self.shows_growth(probe)]
-        if not whole or ((name := tolerance_setting(method)) is None and method.order is None):
+        if not whole or (tolerance_setting(method) is None and method.order is None):
             return None
         base = max(whole, key=lambda probe: (probe.length, -probe.setting))
         enough = min(base.length / MUCH_LONGER, self.duration)
         if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
             return None
         assert base.error_law is not None  # or it would tell nothing
-        if name is not None:
-            factor, how = (
-                getattr(method, name) / base.setting,
-                f" at {name} = {base.setting:g}, carried here in proportion to it",
-            )
-        else:
-            order = method.order or 0
-            factor, how = (dt / base.dt) ** order, f" at dt = {base.dt:.3g} s, carried here by order {order}"
-        carried = base.error_law.finer(factor, how)
+        carried = base.error_law.scale(find_scaling(base, method, dt))
         # What rounding leaves: a random walk of the rate, a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
@@ -217,4 +208,13 @@ class Conditions:
     def shows_growth(self, probe: Probe) -> bool:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
-        return whole and probe.error_law is not None and not probe.error_law.scaled and probe.error < LOST
+        return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < ASYMPTOTIC
+
+
+def find_scaling(base: Probe, method: Method, dt: float) -> Scaling:
+    """Return how the error of a probe changes at the tolerance of a method, or at a step of dt s where it has none."""
+    name = tolerance_setting(method)
+    if name is not None:
+        return Scaling(name, base.setting, getattr(method, name) / base.setting, None)
+    assert method.order is not None  # nothing is carried over where neither is there
+    return Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)

@@ -14,11 +14,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from conservative.method import Grid, Method, Role
+from conservative.outcome import Outcome
 from conservative.references.truth import Truth
 
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Success, attempt
+from ..studies.case import Case, Success, attempt, fail_unsupported
 from .advice import Advice, advise
 from .motion import choose_ours, prepare_conditions
 from .probe import STEPS, Conditions
@@ -31,7 +32,7 @@ RUN_TIME = 0.005
 """Wall time, s, that one timed run is meant to last."""
 ROUNDS, TIMING_BUDGET = 7, 0.25
 COARSER_START = 4
-"""How much longer than the chooser's step the first of our probes is, so that there is an order to be seen."""
+"""How much longer than the step of the automatic choice the first of our probes is, so that there is an order to be seen."""
 LOOSEST = 1e-3
 """Tolerance that adaptive methods start with at most."""
 
@@ -79,12 +80,12 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     conditions, truth = prepare_conditions(asked.scene, asked.error, asked.duration, asked.cost_limit)
     own, step = choose_ours(conditions, conditions.target * min(1.0, conditions.short / conditions.duration))
     roles: dict[str, Role] = {}
-    refinements: dict[str, Refinement | str] = {}
+    refinements: dict[str, Refinement | Outcome] = {}
     for i, method in enumerate((own, *asked.methods)):
         line = selection.series(method)
         progress(0.2 + 0.7 * i / (1 + len(asked.methods)), f"probing {line}")
         roles[line] = method.role
-        refinements[line] = method.unsupported(asked.scene) or refine(conditions, *first_setting(conditions, method, step))
+        refinements[line] = refine_from_start(conditions, method, step)
     progress(0.9, "timing what was found")
     costs = time_settings(conditions, refinements)
     advice = tuple(
@@ -93,8 +94,14 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     return Recommendation(conditions, truth, advice, asked.missing)
 
 
+def refine_from_start(conditions: Conditions, method: Method, step: float) -> Refinement | Outcome:
+    """Return the probes of a method from its first setting on; the outcome of one that cannot do the scene."""
+    reason = method.unsupported(conditions.scene)
+    return fail_unsupported(reason).outcome if reason else refine(conditions, *first_setting(conditions, method, step))
+
+
 def first_setting(conditions: Conditions, method: Method, step: float) -> tuple[Method, float]:
-    """Return the method and the step to begin with: ours near where the chooser ends, others far off."""
+    """Return the method and the step to begin with: ours near the step of the automatic choice, others far off."""
     setting = selection.tolerance_setting(method)
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))
@@ -105,11 +112,11 @@ def first_setting(conditions: Conditions, method: Method, step: float) -> tuple[
     return method, step if method.order is None else min(COARSER_START * step, longest)
 
 
-def time_settings(conditions: Conditions, refinements: dict[str, Refinement | str]) -> dict[str, float]:
+def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Outcome]) -> dict[str, float]:
     """Return the wall time per simulated second of the settings found, s/s, by line: interleaved minimums."""
     runs, lengths = {}, {}
     for line, refinement in refinements.items():
-        probe = None if isinstance(refinement, str) else refinement.best(conditions.target)
+        probe = None if isinstance(refinement, Outcome) else refinement.best(conditions.target)
         if probe is None or not probe.outcome.ok:
             continue
         length = RUN_TIME / probe.cost

@@ -12,17 +12,16 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import BadInput
 from conservative.method import Method
+from conservative.methods.automatic import ASYMPTOTIC, ATTEMPTS, stops_falling
 
 from ..measures.convergence_order import MIN_POINTS
 from ..studies.selection import at_tolerance, tolerance_setting
-from .extrapolation import LOST
 from .probe import RUN_LIMIT, Conditions, Probe
 
-ATTEMPTS = 12
 SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8
-"""Largest cut of a step from one probe to the next, and the cut where a probe says nothing."""
+"""Smallest factor by which a step is cut from one probe to the next; and the factor used when a probe gave no usable error."""
 LONGER = 8
-"""Ratio of two steps: that of a long run, which shows how errors grow later on, and the step in question."""
+"""Step of the long run, relative to the candidate step."""
 TIGHTEST = -16
 """Smallest tolerance asked for, power of ten: a rounding unit."""
 LARGEST_TOLERANCE_CUT = 4
@@ -60,7 +59,7 @@ class Refinement:
     def converging(self) -> tuple[Array, Array]:
         """Return settings (n,) and errors (n,) that an order is fitted to: of short ones over the same time and not lost."""
         length = self.short[0].length
-        found = {p.setting: p.error for p in self.short if math.isclose(p.length, length) and p.error < LOST}
+        found = {p.setting: p.error for p in self.short if math.isclose(p.length, length) and p.error < ASYMPTOTIC}
         return np.array(list(found)), np.array(list(found.values()))
 
 
@@ -86,7 +85,7 @@ def expect(probe: Probe) -> float:
 def expect_linear(conditions: Conditions, probe: Probe) -> float:
     """Return the error, rad, to expect over the duration if that of a probe grows linearly."""
     law = probe.error_law
-    return law.error * max(1.0, conditions.duration / law.length) if law and law.error < LOST else math.inf
+    return law.error * max(1.0, conditions.duration / law.length) if law and law.error < ASYMPTOTIC else math.inf
 
 
 def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
@@ -121,8 +120,7 @@ def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: b
 
 def at_round_off(probes: Sequence[Probe]) -> bool:
     """Whether finer settings have stopped helping where they once did: round-off."""
-    found = [probe.expected for probe in probes if probe.expected < LOST]
-    return len(found) >= 3 and min(found[-2:]) > 0.7 * found[-3]
+    return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
 
 
 def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
@@ -132,8 +130,8 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     factor = DEFAULT_CUT
     if expected < math.inf and last.method.order is not None:
         factor = min(0.8, max(SMALLEST_CUT, (conditions.target / expected) ** (1 / last.method.order)))
-    telling = sum(conditions.shows_growth(probe) for probe in probes)
-    if conditions.shows_growth(last) and telling < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
+    growing = sum(conditions.shows_growth(probe) for probe in probes)
+    if conditions.shows_growth(last) and growing < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that there is an order to be seen
     dt = conditions.step_at_most(last.dt * factor)
     if dt < per_step / conditions.cost_limit:

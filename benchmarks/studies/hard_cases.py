@@ -22,9 +22,9 @@ from .study import Progress, Study
 from .time_limit import attempt_within
 
 TURN = 60.0
-"""Part of the motion that is looked at, rad turned by the body at its first rate: multi-precision truth costs seconds."""
+"""Length of the runs, rad turned at the rate of the start. Limited, because multi-precision truth costs seconds."""
 LIMIT = 20.0
-"""Time, s, that a run is waited for; compilation is in it."""
+"""Wall-time limit of a run, s, compilation included."""
 
 
 def scenes() -> tuple[Scene, ...]:

@@ -17,10 +17,8 @@ from .study import Progress, Study
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
-TRUTH = "truth"
-"""What stands for the method in rows about the truth itself."""
 APPROXIMATE = "approximate"
-"""Detail of such a row where nothing below the agreement is known."""
+"""Detail of the row of an agreement where nothing below it is known."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -41,14 +39,14 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
-    """Return how well the two truths agree."""
+    """Return how well the two truths agree: a row of no one method, with the labels of both."""
     return Measurement(
         study=study.name,
         scene=scene.name,
-        method=TRUTH,
+        method="",
         label=" and ".join(truth.names),
         role=Role.TRUTH,
-        series=TRUTH,
+        series="",
         dt=dt,
         measure=Measure.AGREEMENT,
         value=truth.agreement_rad,

@@ -14,7 +14,10 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import Array
 from conservative.method import Method, grid_for
+from conservative.methods.convected import Convected
+from conservative.methods.reduced import Reduced
 from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.references.exact.method import Exact
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -25,8 +28,8 @@ from .study import Finding, Progress, Study
 
 BRICK, TOP = "brick_flip", "lagrange_top"
 """Scenes of the figures; a study without one of them is one without its figure."""
-PAPER_MAP, REDUCED_MAP, EXACT = "convected", "reduced", "exact"
-"""The paper's map, ours, and the analytical solution."""
+PAPER_MAP, REDUCED_MAP, EXACT = Convected().name, Reduced().name, Exact().name
+"""Methods of the figures: the paper's map, the same in three unknowns, and the analytical solution."""
 BRICK_STEP = 0.01
 TOP_STEPS = (0.01, 0.005, 0.0025)
 """Steps, s; of the top the figure shows the first two."""

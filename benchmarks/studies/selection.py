@@ -131,8 +131,8 @@ def series(method: Method) -> str:
 def identifier(scene: Scene, method: Method, dt: float) -> str:
     """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
 
-    A setting is in the id if it is not the default, or if it comes first and is a text: that is what an engine's integrators
-    are told apart by.
+    A setting is in the id if it is not the default. The first setting always is where it is a text, as the name of an engine's
+    integrator is.
     """
     settings = [(field.name, getattr(method, field.name), field.default) for field in fields(_value(method))]
     shown = [

@@ -1,4 +1,8 @@
-"""The study of speed: wall time of every method at the scene's step, and what is paid once."""
+"""The study of speed: wall time of every method at the scene's step, and the time to prepare a run.
+
+Preparation and first call are measured with compiled code warm: a report runs other studies first, in the same process, and
+what they compiled is not compiled again. Preparation is then the conversion of the scene.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +28,9 @@ MEASURES = (
     Measure.FIRST_CALL,
 )
 CALL = 0.004
-"""Duration, s, that one timed call is stretched to, so that what a call costs beside its steps stays a few per cent."""
+"""Target duration of a timed call, s: long enough that the overhead of a call stays a few per cent."""
 LONGEST = 2**16
-"""How many times as long a timed run is at most."""
+"""Largest factor by which the number of steps of a timed run is raised."""
 UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
 
 
@@ -74,7 +78,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         ready: dict[str, TimedRun] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
-            scene.forget()  # what other studies have paid for
+            scene.forget()  # so that the scene is converted again; compiled code stays warm
             case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
             if isinstance(outcome, Success):

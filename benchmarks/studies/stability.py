@@ -57,9 +57,9 @@ STEP_SIZES = (1, 2, 3, 5, 7, 10, 15, 20, 25, 30, 40, 50, 70, 100)
 """|w| dt in units of `UNIT` rad, short to long."""
 STEPS = 24
 LIMIT, FIRST_LIMIT = 1.0, 60.0
-"""Time, s, that a run is waited for. The first of a method on a scene may have to compile."""
+"""Wall-time limits, s: of a run, and of the first run of a method on a scene, which may compile."""
 TOLERANCE = 1e-6
-"""Tolerance, rad, when comparing two distances: a body at rest turns by round-off only."""
+"""Tolerance, rad, when comparing two angles: round-off turns even a body at rest."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:

@@ -18,7 +18,7 @@ RADIANS = 1.0
 LENGTH, FIRST_ORDER_LENGTH = 8, 12
 """Number of steps, each half of the one before. First-order methods begin to converge late."""
 HIGH_ORDER = 6
-"""From this order on half a step can be all that lies between no accuracy and round-off: steps are closer, and begin longer."""
+"""From this order on one halving can go from no accuracy to round-off, so steps are spaced closer and start longer."""
 HIGH_SAMPLES, HIGH_LENGTH = 4, 17
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 """Tolerances of adaptive methods, beside their own."""

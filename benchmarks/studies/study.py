@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role
@@ -15,26 +16,25 @@ from ..measures.samples import Samples
 
 Progress = Callable[[int, int, str], None]
 """Called before each piece of work: pieces done, pieces in all, and what comes next."""
+MOST_TRUTHS = 32
+"""Motions that `Truths` keeps: some six for each scene of a report."""
 FindTruth = Callable[[Scene, Grid], Truth]
 Finding = Measurement | Samples
 """What a study yields: rows of the table, and lines of pictures."""
 
 
-@dataclass(frozen=True, eq=False)
 class Truths:
-    """The exact motions of some studies, each found once and kept for as long as they take.
+    """A cache of exact motions, which studies of the same scenes share: it keeps the last `MOST_TRUTHS` that were asked for.
 
     `find` gives the motion of a scene at the samples of a grid, by default from two independent truths that agree.
     """
 
-    find: FindTruth = reference
-    known: dict[tuple[Scene, Grid], Truth] = field(default_factory=dict, repr=False)
+    def __init__(self, find: FindTruth = reference) -> None:
+        self._find = lru_cache(maxsize=MOST_TRUTHS)(find)
 
     def __call__(self, scene: Scene, grid: Grid) -> Truth:
         """Return the motion of a scene at the samples of a grid."""
-        if (scene, grid) not in self.known:
-            self.known[scene, grid] = self.find(scene, grid)
-        return self.known[scene, grid]
+        return self._find(scene, grid)
 
 
 @dataclass(frozen=True)

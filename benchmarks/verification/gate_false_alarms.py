@@ -18,7 +18,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from conservative.method import Grid, Method, Role, Run
-from conservative.registry import method as named
+from conservative.methods.reduced import Reduced
 from conservative.registry import scene
 from conservative.scene import Scene
 
@@ -26,7 +26,7 @@ from ..gate import yardstick
 from ..gate.baseline import time_limit
 from ..suite import points
 
-SLOWED = ("brick_flip", "reduced")
+SLOWED_SCENE, SLOWED_METHOD = points.PAPER[0], Reduced()
 """Scene and method that are also measured slower."""
 SLOW = "slowed"
 
@@ -56,7 +56,7 @@ class Slower(Method):
 
 def measures() -> dict[str, Callable[[], float]]:
     """Return what measures the time ratio of every timed point of the suite, and of the slowed one, by name."""
-    slowed = points.Point(scene(SLOWED[0]), Slower(named(SLOWED[1]), 1.2))
+    slowed = points.Point(scene(SLOWED_SCENE), Slower(SLOWED_METHOD, 1.2))
     found = {point.id: point for point in list_timed_points()} | {SLOW: slowed}
     return {name: partial(yardstick.time_ratio, point.method, point.scene, point.scene.dt) for name, point in found.items()}
 
@@ -70,7 +70,7 @@ def limits_from(runs: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the largest ratio that passes, by row; that of the slowed row is the one of the row it is a slower version of."""
     names = [name for name in runs[0] if name != SLOW]
     limits = {name: time_limit([run[name] for run in runs], len(names)).limit for name in names}
-    return limits | {SLOW: limits[points.Point(scene(SLOWED[0]), named(SLOWED[1])).id]}
+    return limits | {SLOW: limits[points.Point(scene(SLOWED_SCENE), SLOWED_METHOD).id]}
 
 
 def summary(runs: Sequence[Mapping[str, float]], limits: Mapping[str, float]) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m conservative.benchmarks.verification.gate_false_alarms", description=__doc__
     )
-    parser.add_argument("--runs", type=int, default=100, help="runs that are judge")
+    parser.add_argument("--runs", type=int, default=100, help="runs that are judged")
     parser.add_argument("--learning", type=int, default=10, help="runs before those, from which the thresholds come")
     parser.add_argument("--once", nargs="+", metavar="NAME", help="print the ratios of these rows, from this process")
     options = parser.parse_args()

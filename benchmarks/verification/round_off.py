@@ -20,14 +20,17 @@ from conservative.attitude import Array
 from conservative.check import positive_integer, positive_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method
+from conservative.methods.reduced import Reduced
 from conservative.scene import Scene
+
+from ..suite.points import PAPER
 
 BLOCKS = 64
 """Equal parts of a run between which drifts are read."""
 SPREAD = 1e-3
 """Relative spread of the members' rates at the start."""
 LEVEL = 1e-6
-"""How improbable under a random walk the drifts are that are called linear."""
+"""Drifts are called linear if a random walk has a smaller probability than this."""
 
 
 @dataclass(frozen=True)
@@ -153,8 +156,8 @@ def measure_growth(method: Method, scene: Scene, dt: float, steps: int, members:
 @click.option("--steps", default=1e6, help="Steps of each run.", show_default=True)
 @click.option("--members", default=8, help="Runs.", show_default=True)
 @click.option("--dt", default=0.01, help="Step, s.", show_default=True)
-@click.option("--method", default="reduced", help="Method with its settings.", show_default=True)
-@click.option("--scene", default="brick_flip", help="Scene with its parameters.", show_default=True)
+@click.option("--method", default=Reduced().name, help="Method with its settings.", show_default=True)
+@click.option("--scene", default=PAPER[0], help="Scene with its parameters.", show_default=True)
 def main(steps: float, members: int, dt: float, method: str, scene: str) -> None:
     """Print the growth of each invariant's drift."""
     try:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -35,6 +36,8 @@ LARGEST_FACTOR = 30.0
 ASYMPTOTIC = 0.2
 """Difference of two runs, rad, from which on it says nothing about the error of either: angles end at pi."""
 ATTEMPTS = 12
+STALLED = 0.7
+"""Shorter steps have stopped helping when two in a row leave more than this share of the error before them."""
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
 
@@ -100,7 +103,7 @@ def _find_cheapest(scene: Scene, error: float, t_end: float) -> tuple[Method, fl
 
 def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[float, float]:
     """Return (work per second, step) with which a short run of the method has its share of the error."""
-    duration = min(t_end, PROBE_RADIANS / _fastest_rate(scene))
+    duration = min(t_end, PROBE_RADIANS / bound_rate(scene))
     share = error * min(1.0, 4 * duration / t_end)
     dt = duration / 2 if method.order else min(method.longest_step(scene) / 2, t_end / 16)
     attempts: Attempts = []
@@ -114,8 +117,8 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
     return (_count_work(method, trajectory) / duration if math.isfinite(estimate) else math.inf), grid.dt
 
 
-def _fastest_rate(scene: Scene) -> float:
-    """Return a rate, rad/s, that bounds how fast the scene moves: energy all kinetic about the axis of least inertia."""
+def bound_rate(scene: Scene) -> float:
+    """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
     return math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
 
 
@@ -174,6 +177,10 @@ def _step_factor(estimate: float, error: float, method: Method) -> float:
 
 
 def _stalls(attempts: Attempts) -> bool:
-    """Return whether shorter steps have stopped helping, as at round-off."""
-    estimates = [estimate for _, estimate in attempts if math.isfinite(estimate)]
-    return len(estimates) >= 3 and min(estimates[-2:]) > 0.7 * estimates[-3]
+    """Return whether shorter steps have stopped helping."""
+    return stops_falling([estimate for _, estimate in attempts if math.isfinite(estimate)])
+
+
+def stops_falling(errors: Sequence[float]) -> bool:
+    """Return whether errors, rad, of finer and finer settings have stopped falling, as at round-off."""
+    return len(errors) >= 3 and min(errors[-2:]) > STALLED * errors[-3]

@@ -10,7 +10,7 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
 from conservative.benchmarks.recommendation import extrapolation
-from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, fit_law
+from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, Scaling, fit_law
 from conservative.benchmarks.recommendation.question import ask, list_engines
 from conservative.benchmarks.recommendation.recommend import recommend
 from conservative.method import Grid
@@ -55,7 +55,7 @@ def test_settings_extrapolated_from_short_probes_reach_the_error():
 
 def test_a_law_that_promises_too_much_is_caught(monkeypatch):
     """The negative control of the tests above."""
-    monkeypatch.setattr(ErrorLaw, "at", lambda self, duration: self.error / 1e4)
+    monkeypatch.setattr(ErrorLaw, "extrapolate", lambda self, duration: self.error / 1e4)
     assert largest_excess(free_body(), 1e-6, 20.0, ("mujoco:RK4",)) > 3  # measured 650
 
 
@@ -125,25 +125,35 @@ T = np.linspace(0, 10, 101)
 @pytest.mark.parametrize(("a", "b"), [(3e-9, 0.0), (0.0, 2e-9), (1e-9, 4e-10)])
 def test_polynomial_growth_is_found(a, b):
     law = fit_law(T, a * T + b * T**2, 0.0, 1.0)
-    assert law.at(1000.0) == pytest.approx(a * 1e3 + b * 1e6, rel=1e-9)  # measured 1e-15
-    assert law.at(law.holds(1e-5)) == pytest.approx(1e-5, rel=1e-9)  # measured 1e-15
+    assert law.extrapolate(1000.0) == pytest.approx(a * 1e3 + b * 1e6, rel=1e-9)  # measured 1e-15
+    assert law.extrapolate(law.find_duration(1e-5)) == pytest.approx(1e-5, rel=1e-9)  # measured 1e-15
 
 
 def test_bounded_error_is_taken_as_linear_and_steady_drift_as_quadratic():
     error = 1e-8 * np.abs(np.sin(T))
-    assert fit_law(T, error, 0.0, 1.0).at(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
+    assert fit_law(T, error, 0.0, 1.0).extrapolate(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
     drifting = fit_law(T, error, 2e-6, 1.0)
-    assert drifting.at(100.0) > 1e-2
-    assert "extrapolated quadratically to 100 s" in drifting.law(100.0)
+    assert drifting.extrapolate(100.0) > 1e-2
+    assert "extrapolated quadratically to 100 s" in drifting.describe(100.0)
 
 
 def test_what_is_measured_is_not_extrapolated():
     law = fit_law(T, 1e-8 * T, 0.0, math.inf)
-    assert law.at(10.0) == pytest.approx(1e-7)
-    assert law.law(10.0) == "measured over all 10 s"
-    assert math.isinf(law.at(11.0))
-    assert "without bound" in law.law(11.0)
-    assert math.isinf(replace(law, error=1.0).at(10.0))
+    assert law.extrapolate(10.0) == pytest.approx(1e-7)
+    assert law.describe(10.0) == "measured over all 10 s"
+    assert math.isinf(law.extrapolate(11.0))
+    assert "without bound" in law.describe(11.0)
+    assert math.isinf(replace(law, error=1.0).extrapolate(10.0))
+
+
+def test_a_law_carried_to_a_finer_setting_says_so_and_is_extrapolated():
+    law = fit_law(T, 1e-8 * T, 0.0, 1.0)
+    by_step = law.scale(Scaling("dt", 0.1, 1 / 16, 4))
+    assert by_step.extrapolate(10.0) == pytest.approx(1e-7 / 16, rel=1e-12)
+    assert not by_step.is_measured(10.0)
+    assert by_step.describe(10.0).startswith("measured over 10 s at dt = 0.1 s, carried here by order 4 (grew as t^1.0)")
+    by_tolerance = law.scale(Scaling("tol", 1e-6, 0.1, None))
+    assert by_tolerance.describe(10.0).startswith("measured over 10 s at tol = 1e-06, carried here in proportion to it (grew")
 
 
 def test_amplification_tells_exponential_growth_from_linear():

@@ -14,7 +14,7 @@ from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import step_ladder, studies
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
-from conservative.benchmarks.studies.study import Study, Truths
+from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
 from conservative.method import Grid, Role, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.exact.method import Exact
@@ -94,7 +94,7 @@ def test_paper_measures_every_method_at_three_steps():
 
 
 def test_paper_says_how_well_the_truths_agree():
-    row = table("paper")["truth", 0.02, "truth agreement"]
+    row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
 
 
@@ -231,7 +231,16 @@ def test_the_studies_of_a_report_share_their_truths():
     assert studies.cross_studies((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
 
 
-def test_preparation_is_timed_as_if_for_the_first_time():
+def test_truths_keep_a_bounded_number_of_motions():
+    asked = []
+    truths = Truths(lambda scene, grid: asked.append(grid))
+    grids = [Grid(0.01, n) for n in range(1, MOST_TRUTHS + 2)]
+    for grid in [*grids, grids[-1], grids[0]]:
+        truths(SCENE, grid)
+    assert asked == [*grids, grids[0]]  # the last is kept, the first had to go
+
+
+def test_preparation_converts_a_scene_that_other_studies_converted():
     converted = []
 
     @dataclass(frozen=True)
