@@ -29,10 +29,14 @@ class Measurement:
         what belongs to no one method.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
+    family, version, setting
+        The parts of what a method is called: `mujoco`, `4.0.0`, `RK4`; no version of ours. Empty for what is no method.
     role
         Which side the method is on.
     series
-        What one line of a picture is called: the method without its tolerance.
+        What one line of a picture is: the method without its tolerance.
+    series_setting
+        The setting without the tolerance.
     dt
         Step, s, or distance of samples of an adaptive method; nan for what belongs to no single step.
     quantity
@@ -49,8 +53,12 @@ class Measurement:
     scene: str
     method: str
     label: str
+    family: str = ""
+    version: str = ""
+    setting: str = ""
     role: Role
     series: str
+    series_setting: str = ""
     dt: float
     quantity: str = ""
     measure: Measure
@@ -60,12 +68,16 @@ class Measurement:
 
 
 COLUMNS = (
-    *("study", "scene", "method", "label", "role", "series", "dt", "quantity", "measure", "value", "unit"),
+    *("study", "scene", "method", "label", "family", "version", "setting", "role", "series", "series_setting"),
+    *("dt", "quantity", "measure", "value", "unit"),
     *("outcome", "reason", "step", "time", "residual", "detail"),
 )
 """Columns of the table, in order."""
 _NUMBERS = frozenset({"dt", "value", "step", "time", "residual"})
-_AS_THEY_ARE = ("study", "scene", "method", "label", "series", "dt", "quantity", "value", "detail")
+_AS_THEY_ARE = (
+    *("study", "scene", "method", "label", "family", "version", "setting", "series", "series_setting"),
+    *("dt", "quantity", "value", "detail"),
+)
 
 
 def flat(row: Measurement) -> dict[str, str | float]:

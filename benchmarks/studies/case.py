@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
@@ -16,7 +16,7 @@ from ..measures.measure import Value
 from ..measures.measurement import Measurement
 from ..measures.samples import Samples
 from ..measures.timing import Preparation, prepare_and_run
-from .selection import series
+from .method_names import names_of
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,8 @@ class Case:
         return Measurement(
             study=self.study,
             scene=self.scene.name,
-            method=self.method.name,
-            label=label_of(self.method),
+            **asdict(names_of(self.method)),
             role=Role(self.method.role),
-            series=series(self.method),
             dt=self.grid.dt,
             quantity=value.quantity,
             measure=value.measure,
@@ -50,8 +48,7 @@ class Case:
         return Samples(
             study=self.study,
             scene=self.scene.name,
-            method=self.method.name,
-            label=label_of(self.method),
+            **asdict(names_of(self.method)),
             role=Role(self.method.role),
             dt=self.grid.dt,
             quantity=quantity,
@@ -83,14 +80,6 @@ class Failure:
 def drop_step(row: Measurement) -> Measurement:
     """Return a row that belongs to no single step."""
     return replace(row, dt=float("nan"))
-
-
-def label_of(method: Method) -> str:
-    """Return the method's label; its name where the engine that knows the version is missing."""
-    try:
-        return method.label
-    except MissingEngine:
-        return method.name
 
 
 def fail_unsupported(reason: str) -> Failure:

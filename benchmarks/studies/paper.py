@@ -17,6 +17,8 @@ from .study import Progress, Study
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
+APPROXIMATE = "approximate"
+"""Detail of the row of an agreement where nothing below it is known."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -48,6 +50,7 @@ def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
         dt=dt,
         measure=Measure.AGREEMENT,
         value=truth.agreement_rad,
+        detail=APPROXIMATE if truth.approximate else "",
     )
 
 

@@ -84,12 +84,25 @@ class Point:
     @property
     def definition(self) -> str:
         """Hash of what is integrated, how, and over which steps: measures of two definitions cannot be compared."""
-        scene, body = self.scene, self.scene.body
-        energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
-        numbers = (body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, self.grid.dt, self.grid.n_steps], energies)
-        words = [scene.name, self.method.name, *(invariant.name for invariant in scene.invariants)]
-        text = json.dumps([words, [_digits(values) for values in numbers], yardstick.definition() if self.timed else ""])
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        words = [self.scene.name, self.method.name, *(invariant.name for invariant in self.scene.invariants)]
+        return _hash([words, motion_numbers(self.scene), yardstick.definition() if self.timed else ""])
+
+
+def define_scene(scene: Scene) -> str:
+    """Return a hash of what a scene is: its motion, steps and invariants, whatever its file is called."""
+    return _hash([[scene.name, *(invariant.name for invariant in scene.invariants)], motion_numbers(scene)])
+
+
+def motion_numbers(scene: Scene) -> list[list[float]]:
+    """Return what makes the motion of a scene over its own steps: body, start, steps, and energies of the field."""
+    grid = grid_for(scene, scene.dt)
+    energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
+    values = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
+    return [_digits(each) for each in values]
+
+
+def _hash(content: object) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def points() -> Iterator[Point]:

@@ -31,6 +31,7 @@ LINE = Samples(
     scene="brick_flip",
     method="reduced",
     label="conservative==1/reduced",
+    series="reduced",
     role=Role.OURS,
     dt=0.01,
     quantity="energy",

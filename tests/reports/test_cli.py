@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from conservative import integrate, registry
 from conservative.benchmarks.gate import results
 from conservative.benchmarks.gate.results import Row
+from conservative.entry_points import DEFAULT_METHOD
 from conservative.reports.cli.main import main
 
 
@@ -45,7 +47,12 @@ def test_run_equals_the_known_rates():
     assert error < 1e-8  # measured 3.8e-9, the digits printed there
     assert summary["counters"]["steps"] == 600
     assert summary["drift"]["energy"] < 1e-14  # measured 4.5e-16
-    assert summary["status"] == "ok"
+    assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
+
+
+def test_the_method_of_a_run_is_by_default_that_of_integrate():
+    trajectory = integrate(registry.scene("brick_flip"), 0.01, t_end=0.02)
+    assert trajectory.label == registry.method(DEFAULT_METHOD).label
 
 
 def test_run_as_text_has_the_same_figures():
