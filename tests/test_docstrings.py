@@ -1,4 +1,4 @@
-"""Public docstrings keep the rule of `docstring_rule`, modules with formulas name a source, and the rule finds what is absent."""
+"""Public docstrings keep the rule of `docstring_rule`, formulas name a source, and the rule finds what is absent."""
 
 from __future__ import annotations
 
