@@ -1,10 +1,7 @@
-"""A method is one file: what is written in it and in one entry point is found wherever methods are used, and nowhere else."""
+"""A method is one file: what is written in it and in one entry point is found wherever methods are used."""
 
-import ast
 import importlib
-import re
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -19,23 +16,6 @@ from conservative.reports.charts import style
 from conservative.reports.tables import claims, orders
 
 from .reports.rows import row
-
-ROOT = Path(__file__).parent.parent
-GENERIC = (
-    "conservative/declarations.py",
-    "conservative/methods/automatic.py",
-    "benchmarks/studies/hard_cases.py",
-    "benchmarks/studies/import_time.py",
-    "benchmarks/studies/selection.py",
-    "benchmarks/studies/sphere_curves.py",
-    "benchmarks/suite/points.py",
-    "benchmarks/suite/test_speed.py",
-    "reports/charts/spheres.py",
-    "reports/charts/style.py",
-    "reports/tables/claims.py",
-    "reports/tables/overview.py",
-)
-"""Files that have methods to do with, and know none."""
 
 SOURCE = '''
 from dataclasses import dataclass
@@ -216,40 +196,3 @@ def test_a_broken_entry_point_breaks_nothing(installed, what):
     assert registry.list_families() == families
     assert automatic.candidates(top) == chosen
     assert style.series_order(["mujoco 4.0.0 RK4", "reduced"]) == ["reduced", "mujoco 4.0.0 RK4"]
-
-
-def names_of_methods(source):
-    """Return the names of registered methods and of their classes that a source has in texts or imports; not in docstrings."""
-    families = registry.list_families()
-    classes = {family.__name__ for family in families.values()}
-    tree = ast.parse(source)
-    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
-            found |= families.keys() & {re.split(r"[:\s=]", node.value)[0]}
-        elif isinstance(node, ast.Name | ast.Attribute):
-            found |= classes & {node.id if isinstance(node, ast.Name) else node.attr}
-        elif isinstance(node, ast.ImportFrom | ast.Import):
-            found |= classes & {alias.name for alias in node.names}
-    return found
-
-
-@pytest.mark.parametrize("path", GENERIC)
-def test_no_method_is_known_by_name(path):
-    assert not names_of_methods((ROOT / path).read_text(encoding="utf-8"))
-
-
-BREACHES = {
-    "COLOURS = {'reduced': BLUE}": {"reduced"},
-    "rows = table['method'].str.startswith('mujoco')": {"mujoco"},
-    "GOALS = ('mujoco:RK4', 100)": {"mujoco"},
-    "from .gauss import Gauss": {"Gauss"},
-    "if isinstance(method, methods.Projected): pass": {"Projected"},
-    "'''reduced, in prose'''\nexact = reduced = 1": set(),
-}
-
-
-@pytest.mark.parametrize("source", BREACHES)
-def test_a_name_is_found(source):
-    assert names_of_methods(source) == BREACHES[source]

@@ -1,4 +1,4 @@
-"""The honesty of the automatic choice: what it promises against what an independent truth says, over random bodies and starts."""
+"""The automatic choice is honest: what it promises against what an independent truth says, over random bodies and starts."""
 
 import warnings
 

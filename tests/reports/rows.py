@@ -29,9 +29,10 @@ def row(study, method, measure, value, dt=0.1, **fields):
     )
 
 
-def point(line, role, error, time, dt=0.1, scene="made_up", label=None, method=None, outcome="ok"):
-    method = method or line
-    common = {"dt": dt, "scene": scene, "label": label or method, "role": role, "series": line, "outcome": outcome}
+def point(line, role, error, time, dt=0.1, scene="made_up", **fields):
+    """Error and time of a method, both at one step; by default the method, its label and its line have one name."""
+    method = fields.pop("method", line)
+    common = {"dt": dt, "scene": scene, "label": method, "role": role, "series": line, **fields}
     return [
         row("work_precision", method, Measure.ATTITUDE_MAX, error, **common),
         row("work_precision", method, Measure.TIME, time, **common),
