@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
 """Groups of entry points; `conservative.registry` says what stands in each."""
+DEFAULT_METHOD = "reduced"
+"""Name of the method where nobody names one: that of `Reduced()`, which is the default of `integrate`."""
 
 
 @lru_cache(maxsize=8)

@@ -58,12 +58,15 @@ class Truth:
         Who made the trajectory, and who checked it.
     checked_until
         End of the part checked, s.
+    approximate
+        Whether the trajectory is neither a closed form nor multi-precision: then it is known no better than the two agree.
     """
 
     trajectory: Trajectory
     agreement_rad: float
     names: tuple[str, str]
     checked_until: float
+    approximate: bool = False
 
 
 def reference(scene: Scene, grid: Grid) -> Truth:
@@ -91,7 +94,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     names = (first.label, second.label)
     if not agreement <= allowed:
         raise Disagreement(scene.name, names, agreement, allowed)
-    return Truth(trajectory, agreement, names, until)
+    return Truth(trajectory, agreement, names, until, not isinstance(first, Exact | Precise))
 
 
 def difference(a: Trajectory, b: Trajectory) -> float:

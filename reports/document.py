@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from .charts.figures import scene_charts
 from .page import markdown, page
 from .run import checkpoint
 from .run.measure import measure
@@ -32,15 +33,16 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     BadInput
         The folder cannot be written, or there is nothing that can be resumed; told before any work.
     """
-    progress = checkpoint.begin(plan, out, provenance(), resume)
-    spans = plan.spans(name for name in plan.names if name not in progress.pieces)
+    source = provenance()  # before any work: files, and the commit, can change while that goes on
+    progress = checkpoint.begin(plan, out, source, resume)
+    spans = plan.spans(name for name in plan.names if name not in progress.results)
     with atomic_files.report_folder(out) as folder:
         try:
             measurements = measure(plan, step, progress)
-            view = build(plan, measurements, replace(provenance(), resumed=progress.earlier))
+            view = build(plan, measurements, replace(source, resumed=progress.describe_earlier()))
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
         except BaseException as error:
-            error.add_note(progress.story)
+            error.add_note(progress.summary)
             raise
     progress.remove()
     return view
@@ -49,10 +51,11 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
 def render(view: View, folder: Path, png: bool, announce: Callable[[str], None]) -> None:
     """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
     announce("pictures")
-    text = markdown.render(view, lambda name, chart: draw(chart, folder / name, png))
+    charts = {scene.name: scene_charts(scene) for scene in view.scenes}
+    text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
     (folder / "report.md").write_text(text, encoding="utf-8")
     announce("page")
-    (folder / "index.html").write_text(page.render(view), encoding="utf-8")
+    (folder / "index.html").write_text(page.render(view, charts), encoding="utf-8")
     view.table.to_csv(folder / "measurements.csv", index=False)
     files = sorted({path.name for path in folder.iterdir()} | {atomic_files.MANIFEST})
     (folder / atomic_files.MANIFEST).write_text(manifest(view, files), encoding="utf-8")

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable
 
-_OURS = "conservative"
-_TOLERANCE = re.compile(r"\w*tol=")
-
-
-def family(name: str) -> str:
-    """Return the family of a method's registered name or of what it is called here: `mujoco` of both."""
-    return re.split("[: ]", name, maxsplit=1)[0]
+import pandas as pd
 
 
-def display_name(method: str, label: str) -> str:
+def display_name(family: str, version: str, setting: str) -> str:
     """Return what to call a method: `mujoco 4.0.0 RK4`; ours without the version, which the end of the report has."""
-    package, equals, rest = label.partition("==")
-    version, _, setting = rest.partition("/")
-    if not equals:
-        return method.replace(":", " ")  # its engine is missing, so there is no version to tell
-    if package == _OURS:
-        return setting.replace(":", " ")
-    return " ".join(filter(None, (family(method), version, setting)))
+    return " ".join(filter(None, (family, version, setting)))
 
 
-def without_tolerance(name: str) -> str:
-    """Return what to call a line of points that differ in tolerance alone."""
-    *words, settings = name.split(" ")
-    others = ",".join(part for part in settings.split(",") if not _TOLERANCE.match(part))
-    return " ".join(filter(None, (*words, others)))
+def with_names(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return measurements or samples with two more columns: `name` of the method, and `line`, the name of its series."""
+    return rows.assign(name=_names(rows, "setting"), line=_names(rows, "series_setting"))
+
+
+def _names(rows: pd.DataFrame, setting: str) -> pd.Series[str]:
+    parts: Iterable[tuple[str, ...]] = zip(*(rows[column] for column in ("family", "version", setting)), strict=True)
+    return pd.Series([display_name(*part) for part in parts], index=rows.index, dtype="string")

@@ -12,6 +12,7 @@ from conservative.benchmarks.studies import sphere_curves
 from conservative.method import Method
 from conservative.scene import Scene
 
+from .labels import with_names
 from .run.measure import Measurements
 from .run.plan import Plan
 from .run.provenance import Provenance
@@ -29,8 +30,15 @@ class SceneView:
         As the scene has them; times, s, as text.
     free
         Whether the body is free, so that its curve is a polhode.
-    points, drifts, errors, fits, curves
-        Data of its charts: see `work_precision.points`, `lines.drifts`, `orders.errors`, `orders.fits` and `lines.curves`.
+    points, drifts, errors, curves
+        Data of its charts: see `work_precision.points`, `lines.drifts`, `orders.errors`, named by `orders.with_slopes`, and
+        `lines.curves`.
+    front, line_count
+        What nothing beats among the points (see `work_precision.front`), and the number of their lines.
+    thin_drifts
+        Fewer samples of the drifts, for the page.
+    fit_ends
+        The ends of the lines that are fitted to the errors: see `orders.fit_ends`.
     without_curve
         Names of the methods whose curve should be drawn and could not.
     """
@@ -41,9 +49,12 @@ class SceneView:
     dt: str
     free: bool
     points: pd.DataFrame
+    front: pd.DataFrame
+    line_count: int
     drifts: pd.DataFrame
+    thin_drifts: pd.DataFrame
     errors: pd.DataFrame
-    fits: pd.DataFrame
+    fit_ends: pd.DataFrame
     curves: pd.DataFrame
     without_curve: tuple[str, ...]
     contests: Table
@@ -78,7 +89,7 @@ class View:
     table
         The measurements, a row each.
     headline
-        Sentences: where an engine beats us, and where it does not.
+        Where an engine beats us, and where it does not.
     failed
         What of ours failed at the steps of the paper, one line each.
     hard_cases, stability
@@ -88,7 +99,7 @@ class View:
     source: Provenance
     quick: bool
     table: pd.DataFrame
-    headline: tuple[str, ...]
+    headline: tuple[headline.Statement, ...]
     failed: tuple[str, ...]
     verdict: Table
     scenes: tuple[SceneView, ...]
@@ -104,13 +115,13 @@ class View:
 
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     """Return the view of measurements; every number that a report shows is computed here, and once."""
-    table, samples = measurements.table, measurements.samples
+    table, samples = with_names(measurements.table), with_names(measurements.samples)
     builder = _Builder.of(table, samples, plan.methods)
     return View(
         source=source,
         quick=plan.quick,
-        table=table,
-        headline=tuple(headline.lines(builder.contests)),
+        table=measurements.table,
+        headline=tuple(headline.statements(builder.contests)),
         failed=tuple(runs.failures_of_ours(table)),
         verdict=overview.verdict(table, builder.points),
         scenes=tuple(builder.scene(value) for value in plan.scenes),
@@ -161,12 +172,13 @@ class _Builder:
             orders.fits(errors),
             orders.fits(orders.errors(table, Measure.RATES_MAX)),
             lines.curves(samples),
-            tuple(sphere_curves.pick(methods)),
+            tuple(sphere_curves.select_methods(methods)),
         )
 
     def scene(self, value: Scene) -> SceneView:
         """Return the view of one scene."""
         name, table = value.name, self.table
+        points, drifts = _of(self.points, name), _of(self.drifts, name)
         fits, curves = _of(self.fits, name), _of(self.curves, name)
         return SceneView(
             name=name,
@@ -174,10 +186,13 @@ class _Builder:
             t_end=f"{value.t_end:g}",
             dt=f"{value.dt:g}",
             free=value.free,
-            points=_of(self.points, name),
-            drifts=_of(self.drifts, name),
-            errors=_of(self.errors, name),
-            fits=fits,
+            points=points,
+            front=work_precision.front(points),
+            line_count=points["name"].nunique(),
+            drifts=drifts,
+            thin_drifts=lines.thin(drifts),
+            errors=orders.with_slopes(_of(self.errors, name), fits),
+            fit_ends=orders.fit_ends(orders.with_slopes(fits, fits)),
             curves=curves,
             without_curve=tuple(method.name for method in self.pictures if method.name not in set(curves["method"])),
             contests=scene.contests(contest for contest in self.contests if contest.scene == name),

@@ -14,6 +14,7 @@ from .test_house import sources
 
 ALLOWED = {
     "conservative/__init__.py": ("Convected Gauss Lame MoserVeselov Projected Reduced Substepped", "the public names"),
+    "conservative/entry_points.py": ("reduced", "the default of every option that names a method"),
     "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
     "conservative/integration.py": ("Reduced", "the default of `integrate`"),
     "conservative/methods/moser_veselov.py": ("exact", "one of its orders"),
@@ -27,16 +28,11 @@ ALLOWED = {
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
-    "reports/charts/paper.py": ("convected reduced", "the paper's figures show the paper's map"),
-    "reports/cli/run.py": ("reduced", "default of an option"),
     "reports/documentation/readme_pictures.py": (
         "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy",
         "what the pages picture",
     ),
     "reports/run/provenance.py": ("heyoka mujoco scipy", "packages whose versions a report names"),
-    "reports/run/terms.py": ("Reduced", "a point of the suite needs a method to have a scene's definition"),
-    "reports/tables/scene.py": ("reduced", "the method that times are relative to in a table"),
-    "reports/tables/work_precision.py": ("scipy", "a second opinion on truths"),
 }
 """Names that a file has beside those of its own methods, no more and no fewer, and why."""
 PATHS = [path.relative_to(ROOT).as_posix() for path in sources(ROOT)]

@@ -122,7 +122,7 @@ def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
     assert style.colours(names)["borrowed parts=2"] == "#123456"
     assert style.series_order(names) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
     methods = selection.methods(["borrowed", "reduced:order=4"])
-    assert [method.name for method in sphere_curves.pick(methods)] == ["borrowed:parts=3", "reduced:order=4"]
+    assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
 
 @pytest.mark.parametrize(("drift", "order", "verdict"), [(1e-15, 2, claims.HOLDS), (1e-3, 1, claims.FAILS)])
@@ -156,7 +156,7 @@ def test_a_method_need_not_say_anything(installed):
     method = registry.method("borrowed")
     assert method in [point.method for point in points.points()]
     assert method in hard_cases.settings(selection.methods())
-    assert method in sphere_curves.pick(selection.methods())
+    assert method in sphere_curves.select_methods(selection.methods())
     assert style.colours(["borrowed"])["borrowed"] not in style.PALETTE.values()
     assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
 

@@ -51,7 +51,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-def wanted(config: pytest.Config) -> bool:
+def benchmarks_requested(config: pytest.Config) -> bool:
     """Return whether benchmarks were asked for."""
     return bool(config.getoption("conservative_benchmark"))
 
@@ -65,7 +65,7 @@ def pytest_configure(config: pytest.Config) -> None:
         pytest-benchmark, which times, is not installed or switched off; or the gate is asked for where it cannot judge.
     """
     config.args = [_linked(text, config.invocation_params.dir) for text in config.args]
-    if not wanted(config):
+    if not benchmarks_requested(config):
         if config.getoption("conservative_gate"):
             raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
         return
@@ -83,7 +83,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     """Run benchmarks without workers, which disturb each other's times, unless the command line has a number of them."""
-    return 0 if wanted(config) else None
+    return 0 if benchmarks_requested(config) else None
 
 
 def _linked(text: str, folder: Path) -> str:
@@ -112,7 +112,7 @@ def _gate(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Skip the suite unless benchmarks were asked for."""
-    if wanted(config):
+    if benchmarks_requested(config):
         return
     for item in items:
         if SUITE.resolve() in item.path.resolve().parents:
@@ -131,7 +131,7 @@ def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[st
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Show accuracy beside the times, after pytest-benchmark's own table; or say why nothing was timed."""
     config = terminalreporter.config
-    if not wanted(config):
+    if not benchmarks_requested(config):
         return
     if getattr(config.option, "dist", "no") != "no":
         terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")

@@ -17,7 +17,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import lru_cache
 from time import sleep
 from typing import Any
 
@@ -30,21 +30,18 @@ from ..measures.timing import wall_time, without_collector
 SAMPLE = 0.0004
 """Duration of a sample, s."""
 ROUNDS, MOST_ROUNDS = 30, 300
-"""Samples of each in one go, and in all."""
-SETTLED = 0.002
-"""Part by which a go may still lower a minimum that counts as settled; it takes `GOES` such goes."""
-GOES = 3
+"""Samples of each in one batch, and in all."""
+MINIMUM_TOLERANCE, STABLE_BATCHES = 0.002, 3
+"""Sampling stops when STABLE_BATCHES batches in a row lower no minimum by more than this fraction."""
 MOST_STEPS = 2**20
 """Steps of a sample at most, for what takes no time."""
-PLACES = 4
+PREPARATIONS = 4
 """Preparations of a method that are timed: where its arrays happen to lie in memory can cost a tenth."""
-
-
-AGAIN, PAUSE = 3, 0.5
+RETRIES, PAUSE = 3, 0.5
 """How often what looks too slow is measured again, each time in a new process, and the time, s, before each."""
 
 
-def turn(n_steps: int, h: float) -> float:
+def step_reference_body(n_steps: int, h: float) -> float:
     """Take n_steps steps of h s of a body with moments 1, 2, 3 kg m^2 and return a number that depends on every one of them."""
     x, y, z = 0.3, 1.1, -0.7
     a, b, c, d = 1.0, 0.0, 0.0, 0.0
@@ -68,7 +65,7 @@ def time_ratio_elsewhere(scene: str, method: str) -> float:
 
 def confirm(ratio: float, limit: float, measure: Callable[[], float]) -> float:
     """Return the least of a ratio and, as long as it is above a limit, of what repeated measurements find."""
-    for _ in range(AGAIN):
+    for _ in range(RETRIES):
         if ratio <= limit:
             break
         sleep(PAUSE)
@@ -76,29 +73,33 @@ def confirm(ratio: float, limit: float, measure: Callable[[], float]) -> float:
     return ratio
 
 
-@cache
-def compiled_turn() -> Any:
-    """Return `turn`, compiled: once a process."""
+@lru_cache(maxsize=1)
+def compile_reference() -> Any:
+    """Return `step_reference_body`, compiled once in a process."""
     from numba import njit
 
-    loop: Any = njit(cache=True, error_model="numpy")(turn)
+    loop: Any = njit(cache=True, error_model="numpy")(step_reference_body)
     loop(1, 1e-3)
     return loop
 
 
 def definition() -> str:
-    """Return the source of all that a ratio depends on beside the method."""
-    return inspect.getsource(turn) + f"{SAMPLE, ROUNDS, SETTLED, GOES, PLACES}"
+    """Return the source of all that a ratio depends on beside the method.
+
+    The rows of a baseline hold a hash of this text. In it the function is called `turn`, so that its name here is free.
+    """
+    source = inspect.getsource(step_reference_body).replace(step_reference_body.__name__, "turn", 1)
+    return source + f"{SAMPLE, ROUNDS, MINIMUM_TOLERANCE, STABLE_BATCHES, PREPARATIONS}"
 
 
 def time_ratio(method: Method, scene: Scene, dt: float) -> float:
     """Return the time of a step of the method, in steps of the yardstick."""
-    loop = compiled_turn()
+    loop = compile_reference()
     steps, run = _lasting(lambda n: method.prepare(scene, Grid(dt, n, n)))
-    turns, reference = _lasting(lambda n: lambda: loop(n, 1e-3))
-    again = [method.prepare(scene, Grid(dt, steps, steps)) for _ in range(PLACES - 1)]
-    theirs, *ours = settled_minimums(reference, run, *again)
-    return (min(ours) / steps) / (theirs / turns)
+    reference_steps, reference = _lasting(lambda n: lambda: loop(n, 1e-3))
+    again = [method.prepare(scene, Grid(dt, steps, steps)) for _ in range(PREPARATIONS - 1)]
+    theirs, *ours = measure_minimums(reference, run, *again)
+    return (min(ours) / steps) / (theirs / reference_steps)
 
 
 def _lasting(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
@@ -113,17 +114,17 @@ def _lasting(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable
         n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / max(spent, 1e-9))))
 
 
-def settled_minimums(*runs: Callable[[], Any]) -> tuple[float, ...]:
+def measure_minimums(*runs: Callable[[], Any]) -> tuple[float, ...]:
     """Return the shortest time, s, of each run, sampled in turn until none gets shorter."""
     shortest = [math.inf for _ in runs]
     taken, quiet = 0, 0
     with without_collector():
-        while quiet < GOES and taken < MOST_ROUNDS:
+        while quiet < STABLE_BATCHES and taken < MOST_ROUNDS:
             before = list(shortest)
             for _ in range(ROUNDS):
                 shortest = [min(best, wall_time(run)) for best, run in zip(shortest, runs, strict=True)]
             taken += ROUNDS
-            calm = all(best > (1 - SETTLED) * old for best, old in zip(shortest, before, strict=True))
+            calm = all(best > (1 - MINIMUM_TOLERANCE) * old for best, old in zip(shortest, before, strict=True))
             quiet = quiet + 1 if calm else 0
     return tuple(shortest)
 

@@ -46,7 +46,7 @@ class Measure(Enum):
         self.text, self.unit = text, unit
 
     @classmethod
-    def named(cls, text: str) -> Measure:
+    def from_text(cls, text: str) -> Measure:
         """Return the measure with this text; `KeyError` where there is none."""
         return _BY_TEXT[text]
 

@@ -28,10 +28,14 @@ class Measurement:
         Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
+    family, version, setting
+        The parts of what a method is called: `mujoco`, `4.0.0`, `RK4`; no version of ours. Empty for what is no method.
     role
         Which side the method is on.
     series
-        What one line of a picture is called: the method without its tolerance.
+        What one line of a picture is: the method without its tolerance.
+    series_setting
+        The setting without the tolerance.
     dt
         Step, s, or distance of samples of an adaptive method; nan for what belongs to no single step.
     quantity
@@ -48,8 +52,12 @@ class Measurement:
     scene: str
     method: str
     label: str
+    family: str = ""
+    version: str = ""
+    setting: str = ""
     role: Role
     series: str
+    series_setting: str = ""
     dt: float
     quantity: str = ""
     measure: Measure
@@ -59,12 +67,16 @@ class Measurement:
 
 
 COLUMNS = (
-    *("study", "scene", "method", "label", "role", "series", "dt", "quantity", "measure", "value", "unit"),
+    *("study", "scene", "method", "label", "family", "version", "setting", "role", "series", "series_setting"),
+    *("dt", "quantity", "measure", "value", "unit"),
     *("outcome", "reason", "step", "time", "residual", "detail"),
 )
 """Columns of the table, in order."""
 _NUMBERS = frozenset({"dt", "value", "step", "time", "residual"})
-_AS_THEY_ARE = ("study", "scene", "method", "label", "series", "dt", "quantity", "value", "detail")
+_AS_THEY_ARE = (
+    *("study", "scene", "method", "label", "family", "version", "setting", "series", "series_setting"),
+    *("dt", "quantity", "value", "detail"),
+)
 
 
 def flat(row: Measurement) -> dict[str, str | float]:
@@ -87,7 +99,7 @@ def from_flat(record: Mapping[str, Any]) -> Measurement:
     return Measurement(
         **{name: record[name] for name in _AS_THEY_ARE},
         role=Role(record["role"]),
-        measure=Measure.named(record["measure"]),
+        measure=Measure.from_text(record["measure"]),
         outcome=outcome_of(record),
     )
 

@@ -39,9 +39,8 @@ class Machine:
         processor = " ".join(filter(None, (self.processor, self.model)))
         return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
 
-    @property
-    def described(self) -> dict[str, str]:
-        """What a reader is told of it."""
+    def as_dict(self) -> dict[str, str]:
+        """Return what a reader is told of it."""
         names = ("processor", "architecture", "cores", "memory", "system")
         return {name: getattr(self, name) for name in names}
 

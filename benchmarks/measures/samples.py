@@ -14,7 +14,10 @@ from conservative.method import Role
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = ("study", "scene", "method", "label", "role", "dt", "quantity", "t", "value")
+COLUMNS = (
+    *("study", "scene", "method", "label", "family", "version", "setting", "role", "series", "series_setting"),
+    *("dt", "quantity", "t", "value"),
+)
 """Columns of the table, in order."""
 _NUMBERS = frozenset({"dt", "t", "value"})
 _WHO = COLUMNS[:-2]
@@ -26,7 +29,7 @@ class Samples:
 
     Attributes
     ----------
-    study, scene, method, label, role, dt
+    study, scene, method, label, family, version, setting, role, series, series_setting, dt
         As a `Measurement` has them.
     quantity
         What is sampled, such as `energy`; its unit is said where the study yields it.
@@ -38,7 +41,12 @@ class Samples:
     scene: str
     method: str
     label: str
+    family: str = ""
+    version: str = ""
+    setting: str = ""
     role: Role
+    series: str
+    series_setting: str = ""
     dt: float
     quantity: str
     t: Array

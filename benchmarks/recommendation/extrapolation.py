@@ -179,17 +179,17 @@ class Amplification:
         return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
 
     @property
-    def lost(self) -> bool:
+    def is_lost(self) -> bool:
         """Whether the two motions have nothing in common in the end."""
         return self._known < len(self.t)
 
     @property
-    def until(self) -> float:
+    def end(self) -> float:
         """End of what is known, s."""
         return float(self.t[self._known - 1])
 
     @property
-    def becomes(self) -> float:
+    def final_size(self) -> float:
         """Largest difference up to there, rad."""
         return float(self.factor[self._known - 1]) * self.disturbance
 
@@ -207,11 +207,11 @@ class Amplification:
         """Whether the disturbance grows far more than in proportion to time."""
         return self.steepness > FASTER_THAN_LINEAR
 
-    def excess(self, start: float, end: float) -> float:
+    def excess(self, start: float, stop: float) -> float:
         """Return how much more than in proportion to time a disturbance grows between two times; infinite where lost."""
-        if self.lost and self.unstable and self.until < end:
+        if self.is_lost and self.unstable and self.end < stop:
             return math.inf
-        known, last = slice(self._known), min(end, self.until)
+        known, last = slice(self._known), min(stop, self.end)
         if last <= start:
             return 1.0
         before, after = np.interp([start, last], self.t[known], self.factor[known]).tolist()

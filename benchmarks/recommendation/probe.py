@@ -18,7 +18,7 @@ from conservative.method import Grid, Method
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
-from ..studies.case import Case, Done, attempt
+from ..studies.case import Case, Success, attempt
 from ..studies.selection import tolerance_setting
 from .extrapolation import LOST, Amplification, Drift, ErrorLaw, extrapolate_drifts, fit_law
 
@@ -166,12 +166,12 @@ class Conditions:
         grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
         outcome = attempt(Case("recommendation", self.scene, method, grid))
         length = samples.dt * samples.n_steps
-        if not isinstance(outcome, Done):
+        if not isinstance(outcome, Success):
             why = outcome.outcome
             return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, why)
         return self._evaluate(method, grid, samples, outcome, before)
 
-    def _evaluate(self, method: Method, grid: Grid, samples: Grid, outcome: Done, before: Sequence[Probe]) -> Probe:
+    def _evaluate(self, method: Method, grid: Grid, samples: Grid, outcome: Success, before: Sequence[Probe]) -> Probe:
         trajectory = outcome.trajectory
         error = angle_between(self.truth(samples), trajectory.R_WB)
         found = extrapolate_drifts(trajectory, self.duration)
@@ -193,7 +193,7 @@ class Conditions:
         A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. None
         where the finer run is about as long itself.
         """
-        whole = [probe for probe in before if self.tells(probe)]
+        whole = [probe for probe in before if self.shows_growth(probe)]
         if not whole or ((name := tolerance_setting(method)) is None and method.order is None):
             return None
         base = max(whole, key=lambda probe: (probe.length, -probe.setting))
@@ -214,7 +214,7 @@ class Conditions:
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
 
-    def tells(self, probe: Probe) -> bool:
+    def shows_growth(self, probe: Probe) -> bool:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and not probe.error_law.scaled and probe.error < LOST

@@ -18,7 +18,7 @@ from conservative.references.truth import Truth
 
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Done, attempt
+from ..studies.case import Case, Success, attempt
 from .advice import Advice, advise
 from .motion import choose_ours, prepare_conditions
 from .probe import STEPS, Conditions
@@ -117,7 +117,7 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | st
         adaptive = selection.tolerance_setting(probe.method) is not None
         grid = Grid(length, 1) if adaptive else Grid(probe.dt, n, n)
         outcome = attempt(Case("recommendation", conditions.scene, probe.method, grid))
-        if isinstance(outcome, Done):
+        if isinstance(outcome, Success):
             runs[line], lengths[line] = outcome.run, grid.dt * grid.n_steps
     found = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
     return {line: timing.minimum / lengths[line] for line, timing in found.items()}

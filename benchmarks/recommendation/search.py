@@ -19,15 +19,15 @@ from .extrapolation import LOST
 from .probe import RUN_LIMIT, Conditions, Probe
 
 ATTEMPTS = 12
-BOLDEST, BLINDLY = 1 / 16, 1 / 8
+SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8
 """Largest cut of a step from one probe to the next, and the cut where a probe says nothing."""
 LONGER = 8
 """Ratio of two steps: that of a long run, which shows how errors grow later on, and the step in question."""
 TIGHTEST = -16
 """Smallest tolerance asked for, power of ten: a rounding unit."""
-BOLDEST_TOLERANCE = 4
+LARGEST_TOLERANCE_CUT = 4
 """Largest cut of a tolerance from one probe to the next, powers of ten."""
-COARSER = 1 / 16
+COARSEN_BELOW = 1 / 16
 """Share of the wanted error below which a longer step is tried, too."""
 Aim = Callable[[Probe], float]
 """The error, rad, that is compared with the wanted one."""
@@ -101,7 +101,7 @@ def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
         long = [ahead, conditions.probe(method, last.dt, last.cost, True, (ahead,))]
     first = long[-1]
     long = _refine_until(conditions, long, expect, long=True)
-    if method.order is not None and first.expected < COARSER * conditions.target:
+    if method.order is not None and first.expected < COARSEN_BELOW * conditions.target:
         # At most four times: the error must still shrink with its order where the step comes from.
         factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / method.order))
         longer = conditions.step_at_most(first.dt * factor)
@@ -129,11 +129,11 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
     """Return method, next step and its cost; None where the cost allows none."""
     last = probes[-1]
     per_step = min((probe.cost * probe.dt for probe in probes if probe.outcome.ok), default=math.nan)
-    factor = BLINDLY
+    factor = DEFAULT_CUT
     if expected < math.inf and last.method.order is not None:
-        factor = min(0.8, max(BOLDEST, (conditions.target / expected) ** (1 / last.method.order)))
-    telling = sum(conditions.tells(probe) for probe in probes)
-    if conditions.tells(last) and telling < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
+        factor = min(0.8, max(SMALLEST_CUT, (conditions.target / expected) ** (1 / last.method.order)))
+    telling = sum(conditions.shows_growth(probe) for probe in probes)
+    if conditions.shows_growth(last) and telling < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
         factor = max(factor, 1 / 2)  # so that there is an order to be seen
     dt = conditions.step_at_most(last.dt * factor)
     if dt < per_step / conditions.cost_limit:
@@ -149,7 +149,7 @@ def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: fl
     if name is None or last.cost > conditions.cost_limit:
         return None
     power = round(math.log10(last.setting))
-    for cut in range(max(-BOLDEST_TOLERANCE, min(-1, wanted)), 0):
+    for cut in range(max(-LARGEST_TOLERANCE_CUT, min(-1, wanted)), 0):
         if power + cut < TIGHTEST:
             continue
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
@@ -16,7 +16,7 @@ from ..measures.measure import Value
 from ..measures.measurement import Measurement
 from ..measures.samples import Samples
 from ..measures.timing import Preparation, prepare_and_run
-from .selection import series
+from .method_names import names_of
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,8 @@ class Case:
         return Measurement(
             study=self.study,
             scene=self.scene.name,
-            method=self.method.name,
-            label=label_of(self.method),
+            **asdict(names_of(self.method)),
             role=Role(self.method.role),
-            series=series(self.method),
             dt=self.grid.dt,
             quantity=value.quantity,
             measure=value.measure,
@@ -50,8 +48,7 @@ class Case:
         return Samples(
             study=self.study,
             scene=self.scene.name,
-            method=self.method.name,
-            label=label_of(self.method),
+            **asdict(names_of(self.method)),
             role=Role(self.method.role),
             dt=self.grid.dt,
             quantity=quantity,
@@ -65,7 +62,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Done:
+class Success:
     """A case that reached its end: the run, which can be called again, its first trajectory and what both cost."""
 
     run: Run
@@ -74,31 +71,23 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Failed:
+class Failure:
     """A case that did not: the outcome that its rows carry."""
 
     outcome: Outcome
 
 
-def at_no_step(row: Measurement) -> Measurement:
+def drop_step(row: Measurement) -> Measurement:
     """Return a row that belongs to no single step."""
     return replace(row, dt=float("nan"))
 
 
-def label_of(method: Method) -> str:
-    """Return the method's label; its name where the engine that knows the version is missing."""
-    try:
-        return method.label
-    except MissingEngine:
-        return method.name
-
-
-def unsupported(reason: str) -> Failed:
+def fail_unsupported(reason: str) -> Failure:
     """Return the failure of a case that the method cannot do."""
-    return Failed(Outcome(OutcomeKind.UNSUPPORTED, reason))
+    return Failure(Outcome(OutcomeKind.UNSUPPORTED, reason))
 
 
-def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
+def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
     """Prepare and run a case once.
 
     Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become an outcome.
@@ -112,18 +101,18 @@ def attempt(case: Case, skip_missing: bool = False) -> Done | Failed:
     try:
         reason = case.method.unsupported(case.scene)
         if reason:
-            return unsupported(reason)
-        done = Done(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
+            return fail_unsupported(reason)
+        done = Success(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return Failed(Outcome(OutcomeKind.MISSING, str(error)))
+        return Failure(Outcome(OutcomeKind.MISSING, str(error)))
     except BadInput as error:  # a step that the method does not have
-        return unsupported(str(error))
+        return fail_unsupported(str(error))
     except IntegrationFailed as failure:
-        return Failed(failure.outcome)
+        return Failure(failure.outcome)
     except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
         if case.method.role != Role.ENGINE:
             raise
-        return Failed(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
-    return done if done.trajectory.ok else Failed(done.trajectory.outcome)
+        return Failure(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
+    return done if done.trajectory.ok else Failure(done.trajectory.outcome)

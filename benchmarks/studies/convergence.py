@@ -14,7 +14,7 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import wall_time
 from . import step_ladder
-from .case import Case, Done, Failed, at_no_step, attempt, unsupported
+from .case import Case, Failure, Success, attempt, drop_step, fail_unsupported
 from .selection import Missing
 from .study import Progress, Study
 
@@ -39,19 +39,19 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield from without_order(case, failed) if failed else converge(study, scene, method)
 
 
-def no_order(case: Case, skip_missing: bool) -> Failed | None:
+def no_order(case: Case, skip_missing: bool) -> Failure | None:
     """Return why a method has no order on a scene; None where it may have one."""
     if isinstance(case.method, Missing):
         missing = attempt(case, skip_missing)
-        return missing if isinstance(missing, Failed) else None
+        return missing if isinstance(missing, Failure) else None
     reason = case.method.unsupported(case.scene) or ("its accuracy does not depend on dt" if case.method.order is None else "")
-    return unsupported(reason) if reason else None
+    return fail_unsupported(reason) if reason else None
 
 
-def without_order(case: Case, failed: Failed) -> list[Measurement]:
+def without_order(case: Case, failed: Failure) -> list[Measurement]:
     """Return the rows of a method that has no order."""
     measures = blanks(*(order for order, _ in ORDERS.values()))
-    return [at_no_step(row) for row in case.blanks(measures, failed.outcome)]
+    return [drop_step(row) for row in case.blanks(measures, failed.outcome)]
 
 
 def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
@@ -60,7 +60,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
     found: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
     for case, outcome in attempt_each(cases, study.longest_run, study.skip_missing):
-        if isinstance(outcome, Failed):
+        if isinstance(outcome, Failure):
             yield from case.blanks(blanks(*ERRORS), outcome.outcome)
             continue
         for value in errors.measure_errors(outcome.trajectory, truth):
@@ -71,17 +71,17 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         yield from fit(cases[0], measure, found[measure])
 
 
-def attempt_each(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Done | Failed]]:
+def attempt_each(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Success | Failure]]:
     """Yield the outcome of each case, coarse to fine; what would take more than `longest` s is skipped and says so."""
     per_step = 0.0
     for case in cases:
         expected = per_step * case.grid.n_steps
         if expected > longest:
             reason = f"would take about {expected:.2g} s, more than {longest:g} s"
-            yield case, Failed(Outcome(OutcomeKind.SKIPPED, reason))
+            yield case, Failure(Outcome(OutcomeKind.SKIPPED, reason))
             continue
         outcome = attempt(case, skip_missing)
-        if isinstance(outcome, Done):
+        if isinstance(outcome, Success):
             # The very first call may include compilation, so that only a short one is taken for the cost of a run.
             first = outcome.cost.first_call
             per_step = (first if per_step or first < longest / 4 else wall_time(outcome.run)) / case.grid.n_steps
@@ -94,4 +94,4 @@ def fit(case: Case, measure: Measure, errors_by_step: dict[float, float]) -> lis
     outcome = Outcome(OutcomeKind.NO_ORDER, order.reason) if order.reason else OK
     detail = "" if order.reason else str(order)
     values = zip(ORDERS[measure], (order.slope, order.stderr), strict=True)
-    return [at_no_step(case.row(Value(name, value), outcome, detail)) for name, value in values]
+    return [drop_step(case.row(Value(name, value), outcome, detail)) for name, value in values]

@@ -14,7 +14,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.errors import measure_drifts
 from ..measures.measure import Measure, Value
-from .case import Case, Failed, attempt
+from .case import Case, Failure, attempt
 from .study import Finding, Progress, Study
 
 DURATIONS = 10.0
@@ -49,7 +49,7 @@ def long_run(case: Case, skip_missing: bool) -> Iterator[Finding]:
         The engine is not installed, and `skip_missing` is False.
     """
     outcome = attempt(case, skip_missing)
-    if isinstance(outcome, Failed):
+    if isinstance(outcome, Failure):
         values = [Value(Measure.DRIFT_MAX, np.nan, invariant.name) for invariant in case.scene.invariants]
         yield from case.blanks(values, outcome.outcome)
         return

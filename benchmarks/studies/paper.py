@@ -12,13 +12,15 @@ from conservative.trajectory import Counters, Trajectory
 from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Done, Failed, attempt
+from .case import Case, Failure, Success, attempt
 from .study import Progress, Study
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
 TRUTH = "truth"
 """What stands for the method in rows about the truth itself."""
+APPROXIMATE = "approximate"
+"""Detail of such a row where nothing below the agreement is known."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -50,12 +52,13 @@ def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
         dt=dt,
         measure=Measure.AGREEMENT,
         value=truth.agreement_rad,
+        detail=APPROXIMATE if truth.approximate else "",
     )
 
 
-def accuracy(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:
+def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
     """Return a row for every measure, and for the work done; without values where the run did not reach its end."""
-    if isinstance(outcome, Failed):
+    if isinstance(outcome, Failure):
         return case.blanks(errors.blanks(case.scene), outcome.outcome)
     found = errors.measure_errors(outcome.trajectory, truth) + work(outcome.trajectory.counters)
     return [case.row(value) for value in found]

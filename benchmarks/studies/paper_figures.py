@@ -25,7 +25,7 @@ from .study import Finding, Progress, Study
 
 BRICK, TOP = "brick_flip", "lagrange_top"
 """Scenes of the figures; a study without one of them is one without its figure."""
-THEIRS, OURS, EXACT = "convected", "reduced", "exact"
+PAPER_MAP, REDUCED_MAP, EXACT = "convected", "reduced", "exact"
 """The paper's map, ours, and the analytical solution."""
 BRICK_STEP = 0.01
 TOP_STEPS = (0.01, 0.005, 0.0025)
@@ -36,7 +36,7 @@ X1, X2 = "x1", "x2"
 
 
 @dataclass(frozen=True)
-class Figure:
+class PaperFigure:
     """A figure of the paper: the name of its study, and its scene."""
 
     study: str
@@ -57,31 +57,31 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
 
     Scenes, methods and steps are the paper's, whatever the methods of the study.
     """
-    figures = {BRICK: brick, TOP: top}
+    figures = {BRICK: yield_brick, TOP: yield_top}
     names = [scene.name for scene in study.scenes if scene.name in figures]
     for k, name in enumerate(names):
         progress(k, len(names), f"{name}: the paper's figure")
-        yield from figures[name](Figure(study.name, registry.scene(name)))
+        yield from figures[name](PaperFigure(study.name, registry.scene(name)))
 
 
-def brick(figure: Figure) -> Iterator[Samples]:
+def yield_brick(figure: PaperFigure) -> Iterator[Samples]:
     """Yield figure 1: rates by the paper's map; errors of energy and |L|, relative and signed, by both maps."""
-    for name in (THEIRS, OURS):
+    for name in (PAPER_MAP, REDUCED_MAP):
         case, trajectory = figure.run(name, BRICK_STEP)
         length = np.linalg.norm(trajectory.momentum_W, axis=1)
-        rates = dict(zip(RATES, trajectory.w_WB_B.T, strict=True)) if name == THEIRS else {}
+        rates = dict(zip(RATES, trajectory.w_WB_B.T, strict=True)) if name == PAPER_MAP else {}
         relative = {ENERGY: trajectory.energy / trajectory.energy[0] - 1, MOMENTUM: length / length[0] - 1}
         yield from (case.samples(quantity, trajectory.t, values) for quantity, values in (rates | relative).items())
 
 
-def top(figure: Figure) -> Iterator[Finding]:
+def yield_top(figure: PaperFigure) -> Iterator[Finding]:
     """Yield figure 2, the paper's map at two steps and the exact motion, then the errors after one period of precession."""
-    for name, dt in (*((THEIRS, dt) for dt in TOP_STEPS[:2]), (EXACT, TOP_STEPS[1])):
+    for name, dt in (*((PAPER_MAP, dt) for dt in TOP_STEPS[:2]), (EXACT, TOP_STEPS[1])):
         case, trajectory = figure.run(name, dt)
         positions = com_W(figure.scene, trajectory.R_WB).T
         yield from (case.samples(quantity, trajectory.t, x) for quantity, x in zip((X1, X2), positions, strict=False))
     for dt in TOP_STEPS:
-        (case, ours), (_, exact) = figure.run(THEIRS, dt), figure.run(EXACT, dt)
+        (case, ours), (_, exact) = figure.run(PAPER_MAP, dt), figure.run(EXACT, dt)
         yield from (case.row(value) for value in position_errors(ours, exact, round(figure.scene.t_end / dt)))
 
 

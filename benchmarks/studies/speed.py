@@ -12,7 +12,7 @@ from conservative.outcome import OK
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved, wall_time
-from .case import Case, Done, attempt, unsupported
+from .case import Case, Success, attempt, fail_unsupported
 from .study import Progress, Study
 
 MEASURES = (
@@ -27,15 +27,15 @@ CALL = 0.004
 """Duration, s, that one timed call is stretched to, so that what a call costs beside its steps stays a few per cent."""
 LONGEST = 2**16
 """How many times as long a timed run is at most."""
-UNCOUNTED = unsupported("its engine does not count steps").outcome
+UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
 
 
-def end_only(grid: Grid, times: int = 1) -> Grid:
+def keep_end(grid: Grid, times: int = 1) -> Grid:
     """Return a grid of `times` as many steps that keeps the start and the end alone."""
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
-def lengthen(case: Case, done: Done) -> tuple[Case, Done]:
+def lengthen(case: Case, done: Success) -> tuple[Case, Success]:
     """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
 
     The number is found in several rounds, because a short call is mostly overhead and says little of its steps.
@@ -43,9 +43,9 @@ def lengthen(case: Case, done: Done) -> tuple[Case, Done]:
     bare, times = case, 1
     while times < LONGEST and (spent := wall_time(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
-        longer = replace(bare, grid=end_only(bare.grid, times))
+        longer = replace(bare, grid=keep_end(bare.grid, times))
         found = attempt(longer)
-        if not isinstance(found, Done):
+        if not isinstance(found, Success):
             break
         case, done = longer, found
     return case, done
@@ -56,8 +56,8 @@ class TimedRun:
     """A case to be timed: as it is timed, and as it was at the first call."""
 
     case: Case
-    done: Done
-    first: Done
+    done: Success
+    first: Success
 
     @property
     def simulated(self) -> float:
@@ -70,14 +70,14 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = study.competitors
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
-        grid = end_only(grid_for(scene, scene.dt))
+        grid = keep_end(grid_for(scene, scene.dt))
         ready: dict[str, TimedRun] = {}
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
             scene.forget()  # what other studies have paid for
             case = Case(study.name, scene, method, grid)
             outcome = attempt(case, study.skip_missing)
-            if isinstance(outcome, Done):
+            if isinstance(outcome, Success):
                 ready[method.name] = TimedRun(*lengthen(case, outcome), outcome)
             else:
                 yield from case.blanks(blanks(*MEASURES), outcome.outcome)

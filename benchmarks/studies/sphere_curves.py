@@ -17,7 +17,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.samples import Samples
-from .case import Case, Failed, attempt
+from .case import Case, Failure, attempt
 from .long_runs import case_for
 from .study import Progress, Study
 
@@ -32,16 +32,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 
     The first truth among the methods that can do the scene comes first.
     """
-    pairs = [(scene, method) for scene in study.scenes for method in [*truth(scene, study.methods), *pick(study.methods)]]
+    drawn = select_methods(study.methods)
+    pairs = [(scene, method) for scene in study.scenes for method in [*truth(scene, study.methods), *drawn]]
     for k, (scene, method) in enumerate(pairs):
         progress(k, len(pairs), f"{scene.name}: {method.name}")
         case = case_for(study.name, scene, method)
         outcome = attempt(case, study.skip_missing)
-        if not isinstance(outcome, Failed):
+        if not isinstance(outcome, Failure):
             yield from curve(case, outcome.trajectory)
 
 
-def pick(methods: Sequence[Method]) -> list[Method]:
+def select_methods(methods: Sequence[Method]) -> list[Method]:
     """Return the methods that are drawn: of each family its `picture_settings`, or the first where it has none of those."""
     competitors = [method for method in methods if method.role != Role.TRUTH]
     preferred = [method for method in competitors if method in method.picture_settings()]
@@ -57,11 +58,11 @@ def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
 def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
     """Yield the coordinates of the curve of one run, at evenly spaced times."""
     some = np.unique(np.linspace(0, len(trajectory) - 1, SAMPLES).round().astype(int))
-    for axis, values in zip(AXES, points(trajectory)[some].T, strict=True):
+    for axis, values in zip(AXES, project_on_sphere(trajectory)[some].T, strict=True):
         yield case.samples(axis, trajectory.t[some], values)
 
 
-def points(trajectory: Trajectory) -> Array:
+def project_on_sphere(trajectory: Trajectory) -> Array:
     """Return the points (n, 3) of a curve, in units of the sphere's radius at the start."""
     scene = trajectory.scene
     if scene.free:

@@ -32,7 +32,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Failed, at_no_step
+from .case import Case, Failure, drop_step
 from .selection import Missing
 from .study import Progress, Study
 from .time_limit import attempt_within
@@ -70,14 +70,14 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = [method for method in study.methods if method.order is not None or isinstance(method, Missing)]
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
-        motion = Motion.of(study, scene)
+        motion = TrueMotion.of(study, scene)
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             yield from longest_step(study, motion, method)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TrueMotion:
     """A scene, its rate |w| at the start (rad/s), and its true attitudes (n, 3, 3) at whole units of |w| t, for half a turn."""
 
     scene: Scene
@@ -85,7 +85,7 @@ class Motion:
     R_WB: Array
 
     @classmethod
-    def of(cls, study: Study, scene: Scene) -> Motion:
+    def of(cls, study: Study, scene: Scene) -> TrueMotion:
         """Return what is known of a scene. One at rest is measured in its own steps."""
         rate = float(np.linalg.norm(scene.w_WB_B0)) or UNIT / scene.dt
         truth = study.truth(scene, Grid(UNIT / rate, math.floor(math.pi / UNIT))).trajectory
@@ -97,7 +97,7 @@ class Motion:
         return Grid(UNIT * size / self.rate, STEPS)
 
 
-def longest_step(study: Study, motion: Motion, method: Method) -> list[Measurement]:
+def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measurement]:
     """Return the rows of one method on one scene."""
     works, limit, outcome = math.nan, FIRST_LIMIT, OK
     case = Case(study.name, motion.scene, method, motion.grid(STEP_SIZES[0]))
@@ -112,18 +112,18 @@ def longest_step(study: Study, motion: Motion, method: Method) -> list[Measureme
         case.row(Value(Measure.LONGEST_STEP, works), OK if works > 0 else outcome),
         case.row(Value(Measure.FAILING_STEP, fails), outcome, "every step works" if outcome.ok else ""),
     ]
-    return [at_no_step(row) for row in rows]
+    return [drop_step(row) for row in rows]
 
 
-def outcome_at(study: Study, case: Case, motion: Motion, size: int, limit: float) -> Outcome:
+def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
     """Return how a method does at a size of its steps, with `limit` s of time."""
     done = attempt_within(limit, case, study.skip_missing)
-    if isinstance(done, Failed):
+    if isinstance(done, Failure):
         return done.outcome
-    return divergence(done.trajectory) or jump(done.trajectory, motion, size) or OK
+    return detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
 
 
-def divergence(trajectory: Trajectory) -> Outcome | None:
+def detect_divergence(trajectory: Trajectory) -> Outcome | None:
     """Return the outcome of a run whose energy leaves its own scale; None where it stays."""
     energy = next(invariant for invariant in trajectory.scene.invariants if invariant.name == "energy")
     with np.errstate(over="ignore", invalid="ignore"):
@@ -131,7 +131,7 @@ def divergence(trajectory: Trajectory) -> Outcome | None:
     return Diverged(float(trajectory.t[int(np.argmax(off))]), "energy").outcome if off.any() else None
 
 
-def jump(trajectory: Trajectory, motion: Motion, size: int) -> Outcome | None:
+def detect_wrong_branch(trajectory: Trajectory, motion: TrueMotion, size: int) -> Outcome | None:
     """Return the outcome of a run whose first step ends further from the truth than where it began; None of any other."""
     if size >= len(motion.R_WB):
         return None

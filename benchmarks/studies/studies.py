@@ -1,6 +1,6 @@
 """The table of studies by name, and those that a report is made of.
 
-for study in studies.crossed(selection.scenes(), selection.methods()):
+for study in studies.cross_studies(selection.scenes(), selection.methods()):
     for finding in studies.findings(study): ...
 """
 
@@ -47,7 +47,7 @@ CROSSED = tuple(name for name in MAKERS if name not in HARD)
 """Studies of the scenes and methods that are chosen."""
 
 
-def crossed(
+def cross_studies(
     scenes: tuple[Scene, ...], methods: tuple[Method, ...], quick: bool = False, skip_missing: bool = False
 ) -> tuple[Study, ...]:
     """Return the studies of the same scenes and methods, in the order of `CROSSED`; they share their truths."""
@@ -55,7 +55,7 @@ def crossed(
     return tuple(Study(name, scenes, methods, quick, skip_missing, truths) for name in CROSSED)
 
 
-def hard(methods: tuple[Method, ...], skip_missing: bool = False) -> tuple[Study, ...]:
+def list_hard_studies(methods: tuple[Method, ...], skip_missing: bool = False) -> tuple[Study, ...]:
     """Return the studies of the hard cases: stability, and every registered scene with one or two settings of each family."""
     return (
         Study("stability", selection.scenes(stability.SCENES), methods, skip_missing=skip_missing),

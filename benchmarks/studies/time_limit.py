@@ -8,12 +8,12 @@ from typing import TypeVar
 
 from conservative.outcome import Outcome, OutcomeKind
 
-from .case import Case, Done, Failed, attempt
+from .case import Case, Failure, Success, attempt
 
 T = TypeVar("T")
 
 
-class TooLong(TimeoutError):
+class TimeLimitExceeded(TimeoutError):
     """A piece of work took longer than it was given. Attribute: `limit` (s)."""
 
     def __init__(self, limit: float) -> None:
@@ -21,7 +21,7 @@ class TooLong(TimeoutError):
         super().__init__(f"abandoned after {limit:g} s")
 
 
-def within(limit: float, work: Callable[[], T]) -> T:
+def run_within(limit: float, work: Callable[[], T]) -> T:
     """Return what `work` returns, or raise what it raises, if that takes no longer than `limit` s.
 
     It runs in a thread. Work that is abandoned goes on in the background, as Python cannot end a thread, and dies with the
@@ -29,7 +29,7 @@ def within(limit: float, work: Callable[[], T]) -> T:
 
     Raises
     ------
-    TooLong
+    TimeLimitExceeded
         It takes longer.
     """
     found: list[T] = []
@@ -45,15 +45,15 @@ def within(limit: float, work: Callable[[], T]) -> T:
     thread.start()
     thread.join(limit)
     if thread.is_alive():
-        raise TooLong(limit)
+        raise TimeLimitExceeded(limit)
     if raised:
         raise raised[0]
     return found[0]
 
 
-def attempt_within(limit: float, case: Case, skip_missing: bool) -> Done | Failed:
+def attempt_within(limit: float, case: Case, skip_missing: bool) -> Success | Failure:
     """Return the outcome of a case that is waited for `limit` s; see `attempt`."""
     try:
-        return within(limit, lambda: attempt(case, skip_missing))
-    except TooLong as late:
-        return Failed(Outcome(OutcomeKind.TIMEOUT, str(late)))
+        return run_within(limit, lambda: attempt(case, skip_missing))
+    except TimeLimitExceeded as late:
+        return Failure(Outcome(OutcomeKind.TIMEOUT, str(late)))

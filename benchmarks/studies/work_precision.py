@@ -14,10 +14,10 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved
 from . import step_ladder
-from .case import Case, Done, Failed, attempt
+from .case import Case, Failure, Success, attempt
 from .convergence import attempt_each
 from .selection import at_tolerance, series, tolerance_setting
-from .speed import CALL, TimedRun, end_only, lengthen
+from .speed import CALL, TimedRun, keep_end, lengthen
 from .study import Progress, Study
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
@@ -36,7 +36,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
             for case, outcome in attempt_each(points(study, scene, method), study.longest_run, study.skip_missing):
                 yield from error_rows(case, outcome, truth)
-                good += [case] * isinstance(outcome, Done)
+                good += [case] * isinstance(outcome, Success)
         progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} points")
         yield from time_rows(study, good)
 
@@ -62,9 +62,9 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in sorted(tolerances, reverse=True)]
 
 
-def error_rows(case: Case, outcome: Done | Failed, truth: Trajectory) -> list[Measurement]:
+def error_rows(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
     """Return the errors of one point; of one that failed the time as well, all without values."""
-    if isinstance(outcome, Failed):
+    if isinstance(outcome, Failure):
         return case.blanks(blanks(*ERRORS, Measure.TIME), outcome.outcome)
     found = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
     return [case.row(found[measure]) for measure in ERRORS]
@@ -74,9 +74,9 @@ def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, interleaved; the runs timed keep no sample but the last."""
     ready: dict[str, TimedRun] = {}
     for case in cases:
-        bare = replace(case, grid=end_only(case.grid))
+        bare = replace(case, grid=keep_end(case.grid))
         outcome = attempt(bare)
-        if isinstance(outcome, Done):
+        if isinstance(outcome, Success):
             ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome), outcome)
         else:
             yield from case.blanks(blanks(Measure.TIME), outcome.outcome)

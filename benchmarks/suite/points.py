@@ -20,7 +20,7 @@ from ..measures import errors
 from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Done, attempt
+from ..studies.case import Case, Success, attempt
 from ..studies.study import Truths
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
@@ -84,12 +84,25 @@ class Point:
     @property
     def definition(self) -> str:
         """Hash of what is integrated, how, and over which steps: measures of two definitions cannot be compared."""
-        scene, body = self.scene, self.scene.body
-        energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
-        numbers = (body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, self.grid.dt, self.grid.n_steps], energies)
-        words = [scene.name, self.method.name, *(invariant.name for invariant in scene.invariants)]
-        text = json.dumps([words, [_digits(values) for values in numbers], yardstick.definition() if self.timed else ""])
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        words = [self.scene.name, self.method.name, *(invariant.name for invariant in self.scene.invariants)]
+        return _hash([words, motion_numbers(self.scene), yardstick.definition() if self.timed else ""])
+
+
+def define_scene(scene: Scene) -> str:
+    """Return a hash of what a scene is: its motion, steps and invariants, whatever its file is called."""
+    return _hash([[scene.name, *(invariant.name for invariant in scene.invariants)], motion_numbers(scene)])
+
+
+def motion_numbers(scene: Scene) -> list[list[float]]:
+    """Return what makes the motion of a scene over its own steps: body, start, steps, and energies of the field."""
+    grid = grid_for(scene, scene.dt)
+    energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
+    values = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
+    return [_digits(each) for each in values]
+
+
+def _hash(content: object) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def points() -> Iterator[Point]:
@@ -130,7 +143,7 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
     exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
     grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
     found = [attempt(Case("order", scene, method, grid)) for grid in grids]
-    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Done) else np.nan for each in found]
+    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in found]
     order = observed_order([grid.dt for grid in grids], sizes)
     return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 

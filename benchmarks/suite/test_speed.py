@@ -9,8 +9,8 @@ import pytest
 from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import time_ratio, time_ratio_elsewhere
 from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
-from conservative.benchmarks.studies.case import Case, Done, attempt
-from conservative.benchmarks.studies.speed import end_only, lengthen
+from conservative.benchmarks.studies.case import Case, Success, attempt
+from conservative.benchmarks.studies.speed import keep_end, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.integration import integrate
@@ -34,7 +34,7 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
     if reason:
         pytest.skip(reason)
     benchmark.group = scene.name
-    run, last, cost = prepare_and_run(lambda: method.prepare(scene, end_only(point.grid)))
+    run, last, cost = prepare_and_run(lambda: method.prepare(scene, keep_end(point.grid)))
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
@@ -109,9 +109,9 @@ def kernel_alone(call: Callable[[], Any], method: Method, monkeypatch: pytest.Mo
     return partial(enter, *handed[0])
 
 
-def long_run(scene: Scene, method: Method) -> tuple[Case, Done]:
+def long_run(scene: Scene, method: Method) -> tuple[Case, Success]:
     """Return a run so long that what a call costs beside its steps does not count."""
-    case = Case("ratios", scene, method, end_only(grid_for(scene, scene.dt)))
+    case = Case("ratios", scene, method, keep_end(grid_for(scene, scene.dt)))
     done = attempt(case)
-    assert isinstance(done, Done), done
+    assert isinstance(done, Success), done
     return lengthen(case, done)

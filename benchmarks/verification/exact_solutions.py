@@ -127,10 +127,10 @@ def draw_top(rng: Random, pole: float | None = None) -> Trial:
     potential = UniformGravity(weight, R_BP @ [0, 0, k * J1 / weight])
     t = np.sort(rng.uniform(0, 8 * np.pi / np.sqrt(4 * k + w_1**2 + w_2**2), size=24))
     trial = Trial("top", body, potential, R_WP @ R_BP.T, R_BP @ w_P, t)
-    return trial if pole is None else at_the_pole(trial)
+    return trial if pole is None else extend_to_pole(trial)
 
 
-def at_the_pole(trial: Trial) -> Trial:
+def extend_to_pole(trial: Trial) -> Trial:
     """Return the trial with its passage as the last of its times."""
     assert trial.potential is not None
     start = top(Start(trial.body, trial.R_WB0, trial.w_WB_B0), trial.potential.moment_B, trial.potential.moment_B)

@@ -57,11 +57,11 @@ class Slower(Method):
 def measures() -> dict[str, Callable[[], float]]:
     """Return what measures the time ratio of every timed point of the suite, and of the slowed one, by name."""
     slowed = points.Point(scene(SLOWED[0]), Slower(named(SLOWED[1]), 1.2))
-    found = {point.id: point for point in timed()} | {SLOW: slowed}
+    found = {point.id: point for point in list_timed_points()} | {SLOW: slowed}
     return {name: partial(yardstick.time_ratio, point.method, point.scene, point.scene.dt) for name, point in found.items()}
 
 
-def timed() -> list[points.Point]:
+def list_timed_points() -> list[points.Point]:
     """Return the points whose time is gated."""
     return [point for point in points.points() if point.timed and not point.method.unsupported(point.scene)]
 
@@ -85,7 +85,7 @@ def summary(runs: Sequence[Mapping[str, float]], limits: Mapping[str, float]) ->
     }
 
 
-def one_run(limits: Mapping[str, float]) -> dict[str, float]:
+def run_gate_once(limits: Mapping[str, float]) -> dict[str, float]:
     """Return the ratios of one run of the gate: all in one process, and those above their limits again in others."""
     first = _process(list(measures()))
     return {name: yardstick.confirm(first[name], limits.get(name, math.inf), partial(_alone, name)) for name in first}
@@ -114,10 +114,10 @@ def main() -> None:
         known = measures()
         print(json.dumps({name: known[name]() for name in options.once}))
         return
-    limits = limits_from([one_run({}) for _ in range(options.learning)])
+    limits = limits_from([run_gate_once({}) for _ in range(options.learning)])
     runs = []
     for _ in range(options.runs):
-        runs.append(one_run(limits))
+        runs.append(run_gate_once(limits))
         print(json.dumps(runs[-1]), flush=True)
     print(json.dumps({"limits": limits, **summary(runs, limits)}, indent=1))
 

@@ -7,21 +7,23 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
+from conservative.benchmarks.studies.paper_figures import ENERGY, MOMENTUM, PAPER_MAP, RATES, REDUCED_MAP, X1, X2
+
 from ..tables.lines import ANALYTICAL
-from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, styled
+from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, apply_style
 
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
 
 
 def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
     """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
-    b = _error_panel(errors, "energy", "(b) Energy", "relative error of energy")
-    c = _error_panel(errors, "momentum", "(c) Length of the angular momentum", "relative error of |L|")
-    return styled(alt.hconcat(_rates_panel(rates), alt.vconcat(b, c)).resolve_scale(color="independent"))
+    b = _error_panel(errors, ENERGY, "(b) Energy", "relative error of energy")
+    c = _error_panel(errors, MOMENTUM, "(c) Length of the angular momentum", "relative error of |L|")
+    return apply_style(alt.hconcat(_rates_panel(rates), alt.vconcat(b, c)).resolve_scale(color="independent"))
 
 
 def _rates_panel(rates: pd.DataFrame) -> Any:
-    names = ["ω1", "ω2", "ω3"]
+    names = list(RATES)
     colour = alt.Color("component:N", scale=alt.Scale(domain=names, range=[VERMILION, SKY, BLACK]), legend=None)
     base = alt.Chart(rates, width=WIDTH, height=2 * HEIGHT - 80, title="(a) Body rates of the brick, Δt = 0.01 s, ε = 1e-8")
     lines = base.mark_line(strokeWidth=1.8).encode(x=_TIME, y=alt.Y("rate:Q", title="rate, rad/s, body axes"), color=colour)
@@ -31,7 +33,7 @@ def _rates_panel(rates: pd.DataFrame) -> Any:
 
 
 def _error_panel(errors: pd.DataFrame, column: str, title: str, axis: str) -> Any:
-    names = ["convected", "reduced"]
+    names = [PAPER_MAP, REDUCED_MAP]
     legend = alt.Legend(title=None, orient="bottom", symbolSize=300)
     colour = alt.Color("method:N", scale=alt.Scale(domain=names, range=[SKY, BLUE]), legend=legend)
     y = alt.Y(f"{column}:Q", title=axis, axis=alt.Axis(format=".1e", tickCount=5, minExtent=55))
@@ -41,8 +43,8 @@ def _error_panel(errors: pd.DataFrame, column: str, title: str, axis: str) -> An
 
 def figure_2(positions: pd.DataFrame) -> Any:
     """Return figure 2: (b), (c), the coordinates x1 and x2 of the top's centre of mass for two steps, and exact."""
-    panels = [_position_panel(positions, "x1", "(b)"), _position_panel(positions, "x2", "(c)")]
-    return styled(alt.hconcat(*panels))
+    panels = [_position_panel(positions, X1, "(b)"), _position_panel(positions, X2, "(c)")]
+    return apply_style(alt.hconcat(*panels))
 
 
 def _position_panel(positions: pd.DataFrame, coordinate: str, letter: str) -> Any:

@@ -14,16 +14,17 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..tables.recommendation import method_text, setting_text
 from .figures import log_channel
-from .style import BLACK, HEIGHT, WIDTH, colour_scale, series_order, shape_scale, styled
+from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
 
 def points(recommendation: Recommendation) -> pd.DataFrame:
-    """Return a row for each probe: method, kind and value of the setting, error to expect, rad, number."""
+    """Return a row for each probe: name and family of its method, kind and value of its setting, error to expect, rad, number."""
     rows = [
         {
-            "method": method_text(advice),
+            "name": method_text(advice),
+            "family": probe.method.family,
             "kind": STEP if tolerance_setting(probe.method) is None else TOLERANCE,
             "setting": probe.setting,
             "expected": min(probe.expected, math.pi),
@@ -37,23 +38,23 @@ def points(recommendation: Recommendation) -> pd.DataFrame:
 
 
 def costs(recommendation: Recommendation) -> pd.DataFrame:
-    """Return a row for each method that reaches the error: method, setting, cost in µs per simulated second."""
+    """Return a row for each method that reaches the error: name, setting, cost in µs per simulated second."""
     reaching = [advice for advice in recommendation.advice if advice.reached and advice.best and not math.isnan(advice.cost)]
-    rows = [{"method": method_text(a), "setting": setting_text(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
-    return pd.DataFrame(rows, columns=["method", "setting", "cost"])
+    rows = [{"name": method_text(a), "setting": setting_text(a.best), "cost": a.cost * 1e6} for a in reaching if a.best]
+    return pd.DataFrame(rows, columns=["name", "setting", "cost"])
 
 
 def picture(recommendation: Recommendation) -> Any:
     """Return the chart."""
     data, prices, asked = points(recommendation), costs(recommendation), recommendation.conditions
-    names = series_order(data["method"])
-    panels = [_probes(part, str(kind), names, asked.error) for kind, part in data.groupby("kind", sort=True)]
+    families = families_of(data)
+    panels = [_probes(part, str(kind), families, asked.error) for kind, part in data.groupby("kind", sort=True)]
     rows: list[Any] = [alt.hconcat(*panels)]
     if len(prices):
-        rows.append(_costs(prices, names))
+        rows.append(_costs(prices, families))
     title = f"{asked.scene.name}: {asked.error:g} rad over {asked.duration:g} s"
     subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
-    return styled(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
+    return apply_style(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 
 
 def svg(recommendation: Recommendation) -> str:
@@ -61,29 +62,31 @@ def svg(recommendation: Recommendation) -> str:
     return str(vl_convert.vegalite_to_svg(picture(recommendation).to_dict()))
 
 
-def _probes(data: pd.DataFrame, kind: str, names: list[str], error: float) -> Any:
+def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> Any:
     reach = pd.concat([data["expected"], pd.Series([error])])
     x, y = (
         alt.X(**log_channel("setting", kind, data["setting"])),
         alt.Y(**log_channel("expected", "error to expect, rad", reach)),
     )
     look = {
-        "color": alt.Color("method:N", scale=colour_scale(names), sort=names, legend=alt.Legend(title="method", columns=1)),
-        "shape": alt.Shape("method:N", scale=shape_scale(names), sort=names),
+        "color": alt.Color(
+            "name:N", scale=colour_scale(families), sort=list(families), legend=alt.Legend(title="method", columns=1)
+        ),
+        "shape": alt.Shape("name:N", scale=shape_scale(families), sort=list(families)),
     }
     base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x, y=y)
-    lines = base.mark_line(strokeWidth=1.2).encode(color=look["color"], detail="method:N", order="run:Q")
+    lines = base.mark_line(strokeWidth=1.2).encode(color=look["color"], detail="name:N", order="run:Q")
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
     rings = base.transform_filter("datum.recommended").mark_point(size=200, color=BLACK, strokeWidth=1.5)
     wanted = alt.Chart(pd.DataFrame({"expected": [error]})).mark_rule(strokeDash=[6, 3], color=BLACK).encode(y=y)
     return wanted + lines + marks + rings
 
 
-def _costs(data: pd.DataFrame, names: list[str]) -> Any:
+def _costs(data: pd.DataFrame, families: Families) -> Any:
     x = alt.X(**log_channel("cost", "wall time per simulated second, µs", data["cost"]))
-    y = alt.Y("method:N", sort=alt.EncodingSortField("cost"), title=None, axis=alt.Axis(labelLimit=320))
+    y = alt.Y("name:N", sort=alt.EncodingSortField("cost"), title=None, axis=alt.Axis(labelLimit=320))
     base = alt.Chart(data, width=WIDTH, height=alt.Step(22), title="cost of what reaches it").encode(x=x, y=y)
-    colour = alt.Color("method:N", scale=colour_scale(names), sort=names)
+    colour = alt.Color("name:N", scale=colour_scale(families), sort=list(families))
     return base.mark_point(filled=True, size=90, opacity=1).encode(color=colour) + base.mark_text(
         align="left", dx=9, fontSize=11
     ).encode(text="setting:N")

@@ -12,17 +12,17 @@ TURN, TILT = 35, 25
 """Where the spheres are looked at from at first, degrees."""
 
 
-def chart(curves: pd.DataFrame, scene: str, series: str) -> Spec:
-    """Return one sphere, from `lines.curves`, as a Vega-Lite specification with parameters `turn` and `tilt`, degrees.
+def chart(curve: pd.DataFrame) -> Spec:
+    """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    The far side is faint.
+    It has parameters `turn` and `tilt`, degrees.
     """
-    rows = curves[(curves["scene"] == scene) & (curves["series"] == series)]
+    name, family = curve[["name", "family"]].iloc[0]
     points = [
-        {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(rows[["x", "y", "z"]].round(4).to_numpy().tolist())
+        {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(curve[["x", "y", "z"]].round(4).to_numpy().tolist())
     ]
     return {
-        "usermeta": {"name": series},
+        "usermeta": {"name": name},
         "width": 190,
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
@@ -31,7 +31,7 @@ def chart(curves: pd.DataFrame, scene: str, series: str) -> Spec:
             {
                 "data": as_csv(points, ("k", "x", "y", "z")),
                 "transform": [*_project(), *_sides()],
-                "mark": _line(colours([series])[series], 1.3, 1.0),
+                "mark": _line(colours({name: family})[name], 1.3, 1.0),
                 "encoding": _encoding("stretch") | {"opacity": _fade()},
             },
         ],

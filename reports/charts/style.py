@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any
 
 import altair as alt
+import pandas as pd
 
 from conservative import registry
 from conservative.method import Method, Role
 
-from ..labels import family
+Families = Mapping[str, str]
+"""The family of each line of a picture by its name, in the order of legends."""
 
 BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, TEAL = (
     "#0072B2",
@@ -68,11 +70,16 @@ def _place(family: type[Method]) -> tuple[int, int]:
     return list(Role).index(family.role), places.index(family.colour) if family.colour in places else len(places)
 
 
-def series_order(names: Iterable[str]) -> list[str]:
-    """Return different names in the order of legends: families in the order of their colours, numbers by value."""
-    families = list(family_colours())
-    rank = {name: families.index(family(name)) if family(name) in families else len(families) for name in names}
-    return sorted(rank, key=lambda name: (rank[name], _by_value(name)))
+def order_lines(families: Mapping[str, str]) -> Families:
+    """Return lines in the order of legends: families in the order of their colours, numbers by value."""
+    known = list(family_colours())
+    rank = {name: known.index(family) if family in known else len(known) for name, family in families.items()}
+    return {name: families[name] for name in sorted(rank, key=lambda name: (rank[name], _by_value(name)))}
+
+
+def families_of(rows: pd.DataFrame) -> Families:
+    """Return the lines of data with columns name and family, in the order of legends."""
+    return order_lines(dict(zip(rows["name"], rows["family"], strict=True)))
 
 
 def _by_value(name: str) -> list[tuple[float, str]]:
@@ -81,37 +88,39 @@ def _by_value(name: str) -> list[tuple[float, str]]:
     return [(float(part), "") if part[0].isdigit() else (math.inf, part) for part in parts]
 
 
-def colours(series: list[str]) -> dict[str, str]:
-    """Return a colour for each name of a series: that of its family, the same in every picture."""
+def colours(families: Families) -> dict[str, str]:
+    """Return a colour for each line: that of its family, the same in every picture."""
     named = family_colours()
-    strangers = sorted({family(name) for name in series} - named.keys())
-    known = named | {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(strangers)}
-    return {name: known[family(name)] for name in series}
+    strangers = sorted(set(families.values()) - named.keys())
+    known = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
+    return {name: known[family] for name, family in families.items()}
 
 
-def within_family(series: list[str]) -> dict[str, int]:
-    """Return the number of each name among those of its family, from 0."""
+def number_in_family(families: Families) -> dict[str, int]:
+    """Return the number of each line among those of its family, from 0."""
     counts: dict[str, int] = {}
     numbers = {}
-    for name in series:
-        numbers[name] = counts.get(family(name), 0)
-        counts[family(name)] = numbers[name] + 1
+    for name, family in families.items():
+        numbers[name] = counts.get(family, 0)
+        counts[family] = numbers[name] + 1
     return numbers
 
 
-def colour_scale(series: list[str]) -> alt.Scale:
-    """Return the scale that gives each name its colour."""
-    return alt.Scale(domain=series, range=list(colours(series).values()))
+def colour_scale(families: Families) -> alt.Scale:
+    """Return the scale that gives each line its colour."""
+    return alt.Scale(domain=list(families), range=list(colours(families).values()))
 
 
-def shape_scale(series: list[str]) -> alt.Scale:
+def shape_scale(families: Families) -> alt.Scale:
     """Return the scale that gives each setting of a family its own mark."""
-    return alt.Scale(domain=series, range=[SHAPES[number % len(SHAPES)] for number in within_family(series).values()])
+    marks = [SHAPES[number % len(SHAPES)] for number in number_in_family(families).values()]
+    return alt.Scale(domain=list(families), range=marks)
 
 
-def dash_scale(series: list[str]) -> alt.Scale:
+def dash_scale(families: Families) -> alt.Scale:
     """Return the scale that gives each setting of a family its own dash."""
-    return alt.Scale(domain=series, range=[DASHES[number % len(DASHES)] for number in within_family(series).values()])
+    dashes = [DASHES[number % len(DASHES)] for number in number_in_family(families).values()]
+    return alt.Scale(domain=list(families), range=dashes)
 
 
 def power_axis(title: str, low: float, high: float) -> alt.Axis:
@@ -122,7 +131,7 @@ def power_axis(title: str, low: float, high: float) -> alt.Axis:
     return alt.Axis(title=title, format="~e", values=powers if len(powers) > 1 else alt.Undefined)
 
 
-def styled(chart: Any) -> Any:
+def apply_style(chart: Any) -> Any:
     """Return a whole picture with the common fonts, on white, so that it reads the same on any page."""
     return (
         chart.configure(background="white", padding=12, font="sans-serif")

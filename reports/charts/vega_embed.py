@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .style import DASHES, SHAPES, colours, series_order, within_family
+from .style import DASHES, SHAPES, Families, colours, number_in_family
 
 HIDDEN = "hidden"
 """Name of the parameter that lists the lines not to draw."""
@@ -46,7 +46,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Figure:
+class PageFigure:
     """One or more charts with one legend; `summary` says in words what they show."""
 
     name: str
@@ -58,10 +58,9 @@ class Figure:
     """ "sphere" where the charts have the parameters `turn` and `tilt`."""
 
 
-def legend(names: Iterable[str], marks: bool) -> tuple[Entry, ...]:
-    """Return the buttons for lines by name: with the marks of the pictures, or else with their dashes."""
-    ordered = series_order(names)
-    colour, number = colours(ordered), within_family(ordered)
+def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
+    """Return the buttons for lines: with the marks of the pictures, or else with their dashes."""
+    colour, number = colours(families), number_in_family(families)
     return tuple(
         Entry(
             name,
@@ -69,15 +68,8 @@ def legend(names: Iterable[str], marks: bool) -> tuple[Entry, ...]:
             PATHS[SHAPES[number[name] % len(SHAPES)]] if marks else "",
             " ".join(map(str, DASHES[number[name] % len(DASHES)])),
         )
-        for name in ordered
+        for name in families
     )
-
-
-def lines(charts: Iterable[Spec]) -> list[str]:
-    """Return the names of the lines of charts: what their colours are for."""
-    units = [unit for chart in charts for unit in (chart, *chart.get("layer", ()))]
-    scales = [unit["encoding"]["color"]["scale"] for unit in units if "scale" in unit.get("encoding", {}).get("color", {})]
-    return list(dict.fromkeys(name for scale in scales for name in scale["domain"]))
 
 
 def embed(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
@@ -113,8 +105,8 @@ def _prepare(unit: Spec, tooltip: Tooltip) -> None:
     for channel in ("color", "shape", "strokeDash"):
         if channel in encoding:
             encoding[channel] = encoding[channel] | {"legend": None}
-    if encoding.get("color", {}).get("field") == "series":
-        unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum.series) < 0"}, *unit.get("transform", ())]
+    if encoding.get("color", {}).get("field") == "name":
+        unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum.name) < 0"}, *unit.get("transform", ())]
         unit["mark"] = unit["mark"] | {"tooltip": True}
         encoding["tooltip"] = [_channel(*part) for part in tooltip]
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from conservative.entry_points import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion
@@ -22,7 +23,7 @@ from .options import epilog
 )
 @click.argument("scene", shell_complete=completion.scenes)
 @click.option(
-    "--method", "-m", default="reduced", show_default=True, shell_complete=completion.methods, help="Name, with settings."
+    "--method", "-m", default=DEFAULT_METHOD, show_default=True, shell_complete=completion.methods, help="Name, with settings."
 )
 @click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
@@ -36,10 +37,10 @@ def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json:
     """
     require_extra("conservative run", "report", "rich")
     from ..run.single_run import json_text, run_once, summary_text
-    from ..terminal.progress import waiting
+    from ..terminal.progress import show_waiting
 
-    with waiting(f"{scene}: {method}") as expect:
+    with show_waiting(f"{scene}: {method}") as expect:
         summary = run_once(scene, method, dt, t_end, csv, expect)
     click.echo(json_text(summary) if as_json else summary_text(summary))
-    if summary["status"] != "ok":
-        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['status']}")
+    if not summary["outcome"].ok:
+        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['outcome']}")

@@ -1,1 +1,1 @@
-"""What the documentation is made with: API pages and the README's pictures."""
+"""What the documentation is made with: API pages, the pictures of the READMEs and the README's table of costs."""

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import conservative
-from conservative.errors import MissingEngine
+from conservative.errors import require_extra
 from conservative.version import VERSION
 
 MODULES = (
@@ -39,13 +39,12 @@ def write(folder: Path) -> Path:
 
     Raises
     ------
-    MissingEngine
+    MissingExtra
         pdoc is not installed.
     """
-    try:
-        import pdoc
-    except ImportError as error:
-        raise MissingEngine("pdoc", "pdoc") from error
+    require_extra("the API pages", "dev", "pdoc")
+    import pdoc
+
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
     tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows what is imported, and these come on demand
     _name_aliases()

@@ -1,4 +1,4 @@
-"""The README's three pictures, drawn anew into reports/pictures/.
+"""The pictures of the READMEs, drawn anew into reports/pictures/.
 
     python -m conservative.reports.documentation.readme_pictures
 
@@ -26,7 +26,8 @@ from conservative.scene import Scene
 
 from .. import document
 from ..charts import figures, spheres
-from ..charts.style import styled
+from ..charts.style import apply_style
+from ..labels import with_names
 from ..tables import lines, work_precision
 from ..terminal.progress import Step, progress
 
@@ -68,14 +69,14 @@ def _methods(names: Sequence[str]) -> tuple[Method, ...]:
 
 def _samples(study: str, scene: Scene, methods: tuple[Method, ...]) -> pd.DataFrame:
     findings = studies.findings(Study(study, (scene,), methods))
-    return samples.frame(finding for finding in findings if isinstance(finding, Samples))
+    return with_names(samples.frame(finding for finding in findings if isinstance(finding, Samples)))
 
 
 def time_against_error(scene: Scene, methods: tuple[Method, ...], quick: bool) -> Any:
     """Return the report's chart of time against error."""
     study = Study("work_precision", (scene,), methods, quick)
-    table = measurement.frame(list(studies.rows(study)))
-    return figures.work_precision(work_precision.points(table), scene.name)
+    points = work_precision.points(with_names(measurement.frame(list(studies.rows(study)))))
+    return figures.work_precision(points, work_precision.front(points), scene.name)
 
 
 def drift_of_energy(scene: Scene, methods: tuple[Method, ...]) -> Any:
@@ -87,16 +88,15 @@ def drift_of_energy(scene: Scene, methods: tuple[Method, ...]) -> Any:
 def polhodes(scene: Scene, methods: tuple[Method, ...]) -> Any:
     """Return the page's spheres side by side, each under the name of its method."""
     curves = lines.curves(_samples("sphere_curves", scene, methods))
-    names = list(dict.fromkeys(curves["series"]))
-    charts = [spheres.chart(curves, scene.name, name) for name in names]
-    panels = [{key: chart[key] for key in ("width", "height", "layer")} for chart in charts]
-    titles = [panel | {"title": name} for panel, name in zip(panels, names, strict=True)]
+    charts = {str(name): spheres.chart(curve) for name, curve in curves.groupby("name", sort=False)}
+    titles = [{key: chart[key] for key in ("width", "height", "layer")} | {"title": name} for name, chart in charts.items()]
+    parameters = next(iter(charts.values()))["params"]
     end = scene.t_end * long_runs.DURATIONS
     title = {
         "text": f"{scene.name}: angular momentum in body axes, on its sphere",
         "subtitle": f"over {end:g} s in steps of {scene.dt:g} s; what loses momentum leaves the curve",
     }
-    return styled(alt.HConcatChart.from_dict({"title": title, "params": charts[0]["params"], "hconcat": titles}))
+    return apply_style(alt.HConcatChart.from_dict({"title": title, "params": parameters, "hconcat": titles}))
 
 
 def write(folder: Path, quick: bool, step: Step) -> list[Path]:

@@ -16,6 +16,7 @@ import pandas as pd
 from conservative import registry
 from conservative.method import Role
 
+from ..labels import with_names
 from ..tables.work_precision import cost, points
 
 ERRORS = (1e-3, 1e-6, 1e-9)
@@ -28,8 +29,8 @@ def groups(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     ours = found[found["role"] == Role.OURS.value]
     exact = ours["method"].map(lambda name: registry.method(name).order is None).astype(bool)
     engines = found[found["role"] == Role.ENGINE.value]
-    names = engines["series"].str.split(" ").str[:2].str.join(" ")
-    return {OURS: ours[~exact], EXACT: ours[exact], **{str(name): rows for name, rows in engines.groupby(names, sort=False)}}
+    members = {" ".join(map(str, key)): rows for key, rows in engines.groupby(["family", "version"], sort=False)}
+    return {OURS: ours[~exact], EXACT: ours[exact], **members}
 
 
 def rows(found: pd.DataFrame) -> Iterator[list[str]]:
@@ -43,15 +44,20 @@ def rows(found: pd.DataFrame) -> Iterator[list[str]]:
 
 
 def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
-    """Return the time, s per simulated second, and the name of the cheapest line at an error, rad; else inf."""
-    found = [(cost(line, error), str(name)) for name, line in lines.groupby("series", sort=False)]
+    """Return the time, s per simulated second, and the setting of the cheapest line at an error, rad; else inf."""
+    found = [(cost(line, error), _setting(line.iloc[0])) for _, line in lines.groupby("name", sort=False)]
     return min((entry for entry in found if not math.isnan(entry[0])), default=(math.inf, ""))
 
 
+def _setting(point: pd.Series[str]) -> str:
+    """Return what to call the line of a point: an engine's name heads the column."""
+    return point["setting"] if point["role"] == Role.ENGINE.value else point["name"]
+
+
 def cells(costs: Mapping[str, tuple[float, str]]) -> list[str]:
-    """Return the costs of a row as text: µs to three digits, and the setting without the name that heads the column."""
+    """Return the costs of a row as text: µs to three digits, and the setting."""
     least = min(time for time, _ in costs.values())
-    return [cell(time, series.removeprefix(name).strip(), time == least) for name, (time, series) in costs.items()]
+    return [cell(time, setting, time == least) for time, setting in costs.values()]
 
 
 def cell(time: float, setting: str, bold: bool) -> str:
@@ -62,12 +68,17 @@ def cell(time: float, setting: str, bold: bool) -> str:
     return f"**{digits}** {setting}" if bold else f"{digits} {setting}"
 
 
+def read(path: Path) -> pd.DataFrame:
+    """Return the measurements of a report; an empty text is one, not a number that is missing."""
+    texts = ("family", "version", "setting", "series_setting")
+    return pd.read_csv(path, dtype=dict.fromkeys(texts, "string")).fillna(dict.fromkeys(texts, ""))
+
+
 def main() -> None:
     """Print the table as Markdown."""
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.readme_table", description=__doc__)
     parser.add_argument("report", nargs="?", type=Path, default=Path("report"), help="a report's folder [default: report]")
-    table = pd.read_csv(parser.parse_args().report / "measurements.csv")
-    header, *body = rows(points(table))
+    header, *body = rows(points(with_names(read(parser.parse_args().report / "measurements.csv"))))
     for row in (header, ["---"] * len(header), *body):
         print("|", " | ".join(row), "|")
 

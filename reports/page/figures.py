@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from conservative.benchmarks.studies import long_runs
 
 from ..charts import figures, spheres, vega_embed
-from ..charts.vega_embed import Figure, Spec
-from ..tables.work_precision import front
+from ..charts.figures import SceneCharts
+from ..charts.style import families_of
+from ..charts.vega_embed import PageFigure
 from ..view import SceneView
 
-DRIFT_SAMPLES = 40
-"""Samples of a line of drift: it only ever grows, so few are enough."""
 NUMBERS = {
     "error": ("error", "Q", "attitude error, rad"),
     "microseconds": ("microseconds", "Q", "µs per simulated second"),
@@ -21,7 +20,7 @@ NUMBERS = {
     "method": ("method", "N", "setting"),
     "t": ("t", "Q", "t, s"),
     "drift": ("drift", "Q", "largest drift so far"),
-    "series": ("series", "N", "method"),
+    "name": ("name", "N", "method"),
 }
 """What hovering can show: field, kind, title."""
 
@@ -29,53 +28,48 @@ NUMBERS = {
 class SceneFigures(NamedTuple):
     """The figures of one scene."""
 
-    work_precision: Figure
-    drift: Figure
-    convergence: Figure
-    sphere: Figure
+    work_precision: PageFigure
+    drift: PageFigure
+    convergence: PageFigure
+    sphere: PageFigure
 
 
-def scene_figures(scene: SceneView) -> SceneFigures:
-    """Return the figures of a scene."""
-    return SceneFigures(work_precision(scene), drift(scene), convergence(scene), sphere(scene))
+def scene_figures(scene: SceneView, charts: SceneCharts) -> SceneFigures:
+    """Return the figures of a scene out of its charts."""
+    return SceneFigures(
+        work_precision(scene, charts.work_precision), drift(scene), convergence(scene, charts.convergence), sphere(scene)
+    )
 
 
 def hover(*names: str) -> list[tuple[str, str, str]]:
     """Return what hovering shows beside the name of the line."""
-    return [NUMBERS[name] for name in ("series", *names)]
+    return [NUMBERS[name] for name in ("name", *names)]
 
 
-def work_precision(scene: SceneView) -> Figure:
+def work_precision(scene: SceneView, chart: Any) -> PageFigure:
     """Return error against time, with the Pareto front in words."""
-    points = scene.points
-    names = ", ".join(dict.fromkeys(front(points)["series"])) or "nobody"
-    lines = points["series"].nunique()
-    summary = f"{len(points)} measured points of {lines} lines. On the Pareto front, cheap to dear: {names}."
-    chart = figures.work_precision(points, scene.name)
-    charts = vega_embed.embed(chart, hover("method", "error", "microseconds", "dt"), 520)
+    names = ", ".join(dict.fromkeys(scene.front["name"])) or "nobody"
+    summary = f"{len(scene.points)} measured points of {scene.line_count} lines. On the Pareto front, cheap to dear: {names}."
     title = f"{scene.name}: wall time against attitude error, both logarithmic"
-    return _figure(f"work_precision_{scene.name}", title, summary, charts, marks=True)
+    charts = tuple(vega_embed.embed(chart, hover("method", "error", "microseconds", "dt"), 520))
+    legend = vega_embed.legend(families_of(scene.points), marks=True)
+    return PageFigure(f"work_precision_{scene.name}", title, summary, charts, legend)
 
 
-def drift(scene: SceneView) -> Figure:
-    """Return the drift over time, of fewer samples than were measured."""
-    every = max(1, long_runs.SAMPLES // DRIFT_SAMPLES)
-    rows = scene.drifts
-    thin = rows[rows.groupby(["series", "quantity"], sort=False).cumcount(ascending=False) % every == 0]
+def drift(scene: SceneView) -> PageFigure:
+    """Return the drift over time, of fewer samples than the picture beside report.md has."""
     summary = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
-    charts = vega_embed.embed(figures.drift(thin, scene.name), hover("t", "drift"), 220)
-    return _figure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, marks=False)
+    charts = tuple(vega_embed.embed(figures.drift(scene.thin_drifts, scene.name), hover("t", "drift"), 220))
+    legend = vega_embed.legend(families_of(scene.drifts), marks=False)
+    return PageFigure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, legend)
 
 
-def convergence(scene: SceneView) -> Figure:
+def convergence(scene: SceneView, chart: Any) -> PageFigure:
     """Return error against step, with the fitted orders."""
-    charts = vega_embed.embed(figures.convergence(scene.errors, scene.fits, scene.name), hover("dt", "error"), 520)
     summary = "In brackets the fitted slope with its standard error; the bold stretch is what it is fitted to."
-    return _figure(f"convergence_{scene.name}", f"{scene.name}: attitude error against step", summary, charts, marks=True)
-
-
-def _figure(name: str, title: str, summary: str, charts: list[Spec], marks: bool) -> Figure:
-    return Figure(name, title, summary, tuple(charts), vega_embed.legend(vega_embed.lines(charts), marks))
+    charts = tuple(vega_embed.embed(chart, hover("dt", "error"), 520))
+    legend = vega_embed.legend(families_of(scene.errors), marks=True)
+    return PageFigure(f"convergence_{scene.name}", f"{scene.name}: attitude error against step", summary, charts, legend)
 
 
 _POLHODE = (
@@ -88,12 +82,12 @@ _TRACE = (
 )
 
 
-def sphere(scene: SceneView) -> Figure:
+def sphere(scene: SceneView) -> PageFigure:
     """Return the curves of a scene, a sphere each, and the names of the methods that have none."""
     kind, words = _POLHODE if scene.free else _TRACE
     run = f"At the scene's own step, over {long_runs.DURATIONS:g} durations."
     names = ", ".join(scene.without_curve)
     absent = f" Not drawn, as they fail or cannot do the scene: {names}." if names else ""
-    charts = tuple(spheres.chart(scene.curves, scene.name, str(name)) for name in scene.curves["series"].unique())
+    charts = tuple(spheres.chart(curve) for _, curve in scene.curves.groupby("name", sort=False))
     title = f"{scene.name}: {kind}"
-    return replace(Figure(f"sphere_{scene.name}", title, f"{run} {words}{absent}", charts, ()), view="sphere")
+    return replace(PageFigure(f"sphere_{scene.name}", title, f"{run} {words}{absent}", charts, ()), view="sphere")

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from conservative.benchmarks.studies import long_runs
+from conservative.entry_points import DEFAULT_METHOD
 
-from ..charts import figures, paper
+from ..charts import paper
+from ..charts.figures import SceneCharts
 from ..tables.cells import Table, markdown
-from ..view import PaperView, SceneView, View
+from ..view import PaperView, View
 
 Draw = Callable[[str, Any], str]
 """Draws a chart under a name, and returns the name of its file."""
 NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
 
 
-def render(view: View, draw: Draw) -> str:
-    """Return report.md; `draw(name, chart)` makes a picture and returns the name of its file."""
+def render(view: View, charts: Mapping[str, SceneCharts], draw: Draw) -> str:
+    """Return report.md; `charts` are those of each scene by its name, `draw(name, chart)` returns the name of its file."""
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
     )
     environment.filters["table"] = _table
     return environment.get_template("report.md.j2").render(
         view=view,
-        pictures={scene.name: _pictures(scene, draw) for scene in view.scenes},
+        pictures={name: _pictures(name, of_scene, draw) for name, of_scene in charts.items()},
+        default_method=DEFAULT_METHOD,
         durations=f"{long_runs.DURATIONS:g}",
         paper=list(_paper(view.paper, draw)),
     )
@@ -36,13 +39,8 @@ def _table(table: Table | None) -> str:
     return NO_STUDY if table is None else markdown(table)
 
 
-def _pictures(scene: SceneView, draw: Draw) -> dict[str, str]:
-    name = scene.name
-    return {
-        "work_precision": draw(f"work_precision_{name}", figures.work_precision(scene.points, name)),
-        "drift": draw(f"drift_{name}", figures.drift(scene.drifts, name)),
-        "convergence": draw(f"convergence_{name}", figures.convergence(scene.errors, scene.fits, name)),
-    }
+def _pictures(scene: str, charts: SceneCharts, draw: Draw) -> dict[str, str]:
+    return {kind: draw(f"{kind}_{scene}", chart) for kind, chart in charts._asdict().items()}
 
 
 def _paper(view: PaperView, draw: Draw) -> Iterator[str]:

@@ -6,16 +6,18 @@ It opens from disk without a network: style, scripts, the Vega libraries and all
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from conservative.benchmarks.studies import long_runs
 
+from ..charts import spheres
+from ..charts.figures import SceneCharts
 from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
-from ..charts.vega_embed import Figure
+from ..charts.vega_embed import PageFigure
 from ..tables import overview
 from ..tables.cells import CONSERVED, SMALL
 from ..view import View
@@ -25,9 +27,9 @@ DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", O
 """Colours that are too dark on a dark page, and what stands for them there."""
 
 
-def render(view: View) -> str:
-    """Return the page."""
-    figures = {scene.name: scene_figures(scene) for scene in view.scenes}
+def render(view: View, charts: Mapping[str, SceneCharts]) -> str:
+    """Return the page; `charts` are those of each scene by its name."""
+    figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
     return _template().render(
         view=view,
         figures=figures,
@@ -37,6 +39,8 @@ def render(view: View) -> str:
         durations=f"{long_runs.DURATIONS:g}",
         charts=_in_script(_charts(figures.values())),
         vega=_vega(),
+        turn=spheres.TURN,
+        tilt=spheres.TILT,
     )
 
 
@@ -46,7 +50,7 @@ def _template() -> Template:
     return environment.get_template("page.html.j2")
 
 
-@cache
+@lru_cache(maxsize=1)
 def _vega() -> str:
     """Return Vega, Vega-Lite and Vega-Embed as one script."""
     import vl_convert
@@ -61,5 +65,5 @@ def _in_script(content: Any) -> str:
 
 def _charts(scenes: Iterable[SceneFigures]) -> dict[str, Any]:
     """Return what the page's script draws, and the colours of a dark page."""
-    figures: list[Figure] = [figure for scene in scenes for figure in scene]
+    figures: list[PageFigure] = [figure for scene in scenes for figure in scene]
     return {"figures": {figure.name: figure.charts for figure in figures}, "dark": DARK}

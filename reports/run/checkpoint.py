@@ -31,8 +31,8 @@ _MOST_DIFFERENCES = 3
 
 
 @dataclass(frozen=True)
-class Process:
-    """What measured a piece: the command, when it began, and the commit (see `Provenance`)."""
+class Origin:
+    """What measured a study: the command, when it began, and the commit (see `Provenance`)."""
 
     command: str
     start: str
@@ -40,33 +40,33 @@ class Process:
 
 
 @dataclass(frozen=True)
-class Piece:
+class StudyResult:
     """All that one study measured: its rows, lines of its pictures, and the process that measured it."""
 
     rows: tuple[Measurement, ...]
     samples: tuple[Samples, ...]
-    by: Process
+    by: Origin
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The pieces of a report that are done, by name, and the file that has them too, except before the first.
+    """The studies of a report that are done, by name, and the file that has them too, except before the first.
 
-    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the `process` that goes on, and `pieces`.
+    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the `process` that goes on, and `results`.
     """
 
     path: Path
     names: tuple[str, ...]
     terms: Mapping[str, Any]
-    process: Process
-    pieces: dict[str, Piece] = field(default_factory=dict)
+    process: Origin
+    results: dict[str, StudyResult] = field(default_factory=dict)
 
     def keep(self, name: str, findings: Iterable[Finding]) -> None:
         """Keep what a study finds, in the file as well; what an earlier report left there goes."""
         every = list(findings)
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
-        self.pieces[name] = Piece(rows, lines, self.process)
+        self.results[name] = StudyResult(rows, lines, self.process)
         with text_file(self.path, "out") as stream:
             stream.write(_content(self))
 
@@ -75,22 +75,21 @@ class Checkpoint:
         self.path.unlink(missing_ok=True)
 
     @property
-    def story(self) -> str:
+    def summary(self) -> str:
         """What is done, where it is and how to go on, in words."""
-        if not self.pieces:
+        if not self.results:
             return "nothing was finished, nothing is kept"
         command = self.process.command
         again = command if "--resume" in shlex.split(command) else f"{command} --resume"
-        done = f"{len(self.pieces)} of {len(self.names)} studies are finished ({', '.join(self.pieces)})"
+        done = f"{len(self.results)} of {len(self.names)} studies are finished ({', '.join(self.results)})"
         return f"{done} and kept in {str(self.path)!r}; go on with: {again}"
 
-    @property
-    def earlier(self) -> tuple[str, ...]:
-        """What other processes measured, one sentence each; empty where one process measured everything."""
+    def describe_earlier(self) -> tuple[str, ...]:
+        """Return what other processes measured, one sentence each; empty where one process measured everything."""
         return tuple(
             f"{', '.join(name for name, _ in items)}: measured by an earlier process, which was interrupted; "
             f"begun {by.start} at commit {by.commit} with `{by.command}`"
-            for by, items in groupby(self.pieces.items(), key=lambda item: item[1].by)
+            for by, items in groupby(self.results.items(), key=lambda item: item[1].by)
             if by != self.process
         )
 
@@ -111,16 +110,16 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
         There is nothing to resume, or it was measured on other terms; or the file is none of ours, so that it must stay.
     """
     path = path_for(out)
-    process = Process(source.command, source.date, source.commit)
+    process = Origin(source.command, source.date, source.commit)
     fresh = Checkpoint(path, plan.names, terms(plan, source), process)
     if not path.exists():
         if resume:
             raise BadInput("resume", f"no {str(path)!r}", "the folder --out of a report that was interrupted")
         return fresh
-    before, pieces = read(path)
+    before, results = read(path)
     if resume:
         _require_same_terms(path, before, fresh.terms)
-        fresh.pieces.update(pieces)
+        fresh.results.update(results)
     return fresh
 
 
@@ -138,29 +137,29 @@ def _require_same_terms(path: Path, before: Mapping[str, Any], now: Mapping[str,
 
 def _content(checkpoint: Checkpoint) -> str:
     """Return the file: floats come back as they are, nan as nan."""
-    pieces = {name: _record(piece) for name, piece in checkpoint.pieces.items()}
-    content = {"format": FORMAT, "command": checkpoint.process.command, "terms": checkpoint.terms, "pieces": pieces}
+    results = {name: _record(result) for name, result in checkpoint.results.items()}
+    content = {"format": FORMAT, "command": checkpoint.process.command, "terms": checkpoint.terms, "pieces": results}
     return json.dumps(content, ensure_ascii=False)
 
 
-def _record(piece: Piece) -> dict[str, Any]:
+def _record(result: StudyResult) -> dict[str, Any]:
     return {
-        "by": vars(piece.by),
-        "rows": list(map(measurement.flat, piece.rows)),
-        "samples": list(map(samples.flat, piece.samples)),
+        "by": vars(result.by),
+        "rows": list(map(measurement.flat, result.rows)),
+        "samples": list(map(samples.flat, result.samples)),
     }
 
 
-def _piece(record: Mapping[str, Any]) -> Piece:
-    return Piece(
+def _result(record: Mapping[str, Any]) -> StudyResult:
+    return StudyResult(
         tuple(map(measurement.from_flat, record["rows"])),
         tuple(map(samples.from_flat, record["samples"])),
-        Process(**record["by"]),
+        Origin(**record["by"]),
     )
 
 
-def read(path: Path) -> tuple[dict[str, Any], dict[str, Piece]]:
-    """Return the command and terms of a file of unfinished work, and its pieces.
+def read(path: Path) -> tuple[dict[str, Any], dict[str, StudyResult]]:
+    """Return the command and terms of a file of unfinished work, and its results.
 
     Raises
     ------
@@ -171,8 +170,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Piece]]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']}")
-        pieces = {name: _piece(record) for name, record in content["pieces"].items()}
-        return {"command": str(content["command"]), "terms": dict(content["terms"])}, pieces
+        results = {name: _result(record) for name, record in content["pieces"].items()}
+        return {"command": str(content["command"]), "terms": dict(content["terms"])}, results
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         allowed = "unfinished work that an interrupted report left, or no such file: remove it"
         raise BadInput("out", f"{str(path)!r} ({type(error).__name__}: {error})", allowed) from None

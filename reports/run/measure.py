@@ -28,14 +28,14 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
 
     What the checkpoint has is not measured again; what is measured is kept there.
     """
-    left = [study for study in plan.studies if study.name not in checkpoint.pieces]
+    left = [study for study in plan.studies if study.name not in checkpoint.results]
     spans = plan.spans(study.name for study in left)
     for study in left:
         checkpoint.keep(study.name, studies.findings(study, _progress(step, study.name, spans[study.name])))
-    pieces = [checkpoint.pieces[name] for name in plan.names]
+    results = [checkpoint.results[name] for name in plan.names]
     return Measurements(
-        measurement.frame(row for piece in pieces for row in piece.rows),
-        samples.frame(line for piece in pieces for line in piece.samples),
+        measurement.frame(row for result in results for row in result.rows),
+        samples.frame(line for result in results for line in result.samples),
     )
 
 

@@ -47,7 +47,7 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
     words = sys.argv[1:] if arguments is None else arguments
     return Provenance(
         shlex.join(["conservative", *words]),
-        machine().described,
+        machine().as_dict(),
         f"{platform.python_implementation()} {platform.python_version()}",
         packages(),
         commit(),

@@ -24,6 +24,7 @@ from conservative.presentation import samples as samples_of
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
+from ..tables.cells import outcome_record
 from ..terminal.atomic_files import text_file
 from ..terminal.progress import Expect
 
@@ -97,7 +98,7 @@ def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, An
         "label": trajectory.label,
         "dt": dt,
         "t_end": float(trajectory.t[-1]) if len(trajectory) else 0.0,
-        "status": str(trajectory.outcome),
+        "outcome": trajectory.outcome,
         "counters": asdict(trajectory.counters),
         "drift": {invariant.name: _drift(trajectory, invariant) for invariant in scene.invariants},
         "orthonormality": float(orthonormality(trajectory.R_WB).max(initial=0.0)),
@@ -131,7 +132,8 @@ def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
 
 def json_text(summary: dict[str, Any]) -> str:
     """Return the summary as JSON."""
-    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
+    content = summary | {"outcome": outcome_record(summary["outcome"])}
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def summary_text(summary: dict[str, Any]) -> str:
@@ -140,7 +142,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     lines = [
         ("scene", summary["scene"]),
         ("method", summary["label"]),
-        ("status", summary["status"]),
+        ("status", str(summary["outcome"])),
         ("run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"),
         ("work", counters),
         *((f"drift of {name}", f"{value:.2e} (relative)") for name, value in summary["drift"].items()),

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from conservative.benchmarks.suite.points import Point
-from conservative.methods.reduced import Reduced
+from conservative.benchmarks.suite.points import define_scene
 
 from .plan import Plan
 from .provenance import Provenance
@@ -21,8 +20,7 @@ def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
     """Return what has to be the same for measurements to be put together, as what JSON knows."""
     return {
         "studies": list(plan.names),
-        # What a scene is, whatever its file is called; that it is hashed as a point of `Reduced` is the same for all.
-        "scenes": {scene.name: Point(scene, Reduced()).definition for scene in plan.scenes},
+        "scenes": {scene.name: define_scene(scene) for scene in plan.scenes},
         "methods": {method.name: method.label for method in plan.methods},
         "--quick": plan.quick,
         "--skip-missing": plan.skip_missing,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
+from typing import Any
 
 from conservative.outcome import Outcome, OutcomeKind
 
@@ -61,6 +62,17 @@ def grade_drift(value: float) -> Cell:
 def outcome_text(outcome: Outcome) -> str:
     """Return an outcome as a table shows it: when and why for what happens during a run, otherwise the kind alone."""
     return str(outcome) if outcome.kind in _DURING_A_RUN else outcome.kind.value
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return the value, None where JSON has no number for it."""
+    return value if math.isfinite(value) else None
+
+
+def outcome_record(outcome: Outcome) -> dict[str, Any]:
+    """Return the fields of an outcome as JSON has them."""
+    residual = None if outcome.residual is None else finite_or_none(outcome.residual)
+    return asdict(outcome) | {"kind": outcome.kind.value, "residual": residual}
 
 
 def outcome_cell(outcome: Outcome) -> Cell:

@@ -22,7 +22,7 @@ from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 
 from .cells import Cell, Grade, Table, number
-from .rows import keyed
+from .rows import prefix_quantity
 
 HOLDS, FAILS, OPEN = (
     Cell("✓ holds", Grade.GOOD),
@@ -94,7 +94,7 @@ def _paper_rows(table: pd.DataFrame, method: str) -> pd.DataFrame:
 
 
 def _measured(table: pd.DataFrame, method: str, measure: str) -> pd.DataFrame:
-    rows = keyed(_paper_rows(table, method))
+    rows = prefix_quantity(_paper_rows(table, method))
     return rows[rows["measure"] == measure]
 
 

@@ -11,7 +11,6 @@ from conservative.benchmarks.measures.measure import Measure, key
 from conservative.method import Role
 from conservative.outcome import Outcome
 
-from ..labels import display_name
 from .cells import DASH, Cell, Grade, Row, Table, grade_drift, number, outcome_cell
 from .rows import of_measure, of_study, outcomes
 
@@ -37,8 +36,7 @@ def _matrix(rows: pd.DataFrame, cell: Callable[[pd.DataFrame], Cell]) -> Table |
 
 
 def _line(members: pd.DataFrame, cases: list[str], cell: Callable[[pd.DataFrame], Cell]) -> Row:
-    first = members.iloc[0]
-    return [display_name(first["method"], first["label"]), *(cell(members[members["scene"] == case]) for case in cases)]
+    return [members["name"].iloc[0], *(cell(members[members["scene"] == case]) for case in cases)]
 
 
 def _longest(rows: pd.DataFrame) -> Cell:
@@ -66,4 +64,4 @@ def _case(rows: pd.DataFrame) -> Cell:
 
 def _first(rows: pd.DataFrame) -> str:
     row = rows.iloc[0]
-    return f"{key(Measure.named(row['measure']), row['quantity'])} {number(float(row['value']))}"
+    return f"{key(Measure.from_text(row['measure']), row['quantity'])} {number(float(row['value']))}"

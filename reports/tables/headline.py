@@ -3,39 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 from .work_precision import Contest
 
 
-def lines(contests: Sequence[Contest]) -> list[str]:
+@dataclass(frozen=True)
+class Statement:
+    """What is found on a scene, in words; the scene is empty where that is about the whole report."""
+
+    scene: str
+    text: str
+
+
+def statements(contests: Sequence[Contest]) -> list[Statement]:
     """Return, for each scene, where an engine is faster than anything of ours, or alone, and where ours is."""
-    out = [line for scene, members in groupby(contests, key=lambda c: c.scene) for line in _scene(scene, list(members))]
-    return out or ["No engine and no method of ours was measured on error against time."]
+    by_scene = groupby(contests, key=lambda c: c.scene)
+    found = [Statement(scene, text) for scene, members in by_scene for text in _texts(list(members))]
+    return found or [Statement("", "No engine and no method of ours was measured on error against time.")]
 
 
-def _scene(scene: str, contests: list[Contest]) -> Iterator[str]:
+def _texts(contests: list[Contest]) -> Iterator[str]:
     lost = [c for c in contests if c.lost]
     if not any(c.theirs for c in contests):
-        yield f"**{scene}**: no engine was measured."
+        yield "no engine was measured."
     elif lost:
-        yield from (_lost(scene, engine, members) for engine, members in _by_engine(lost))
+        yield from (_lost(engine, members) for engine, members in _by_engine(lost))
     else:
-        yield f"**{scene}**: no engine beats us at any error that it reaches."
+        yield "no engine beats us at any error that it reaches."
     won = [c for c in contests if not c.lost and c.theirs]
     if won:
-        yield f"**{scene}**: ours is faster at {_errors(won)}, by {_range([c.ratio for c in won])}."
+        yield f"ours is faster at {_errors(won)}, by {_range([c.ratio for c in won])}."
     alone = [c for c in contests if c.theirs is None]
     if alone and any(c.theirs for c in contests):
-        yield f"**{scene}**: only ours reaches {_errors(alone)}."
+        yield f"only ours reaches {_errors(alone)}."
 
 
 def _by_engine(lost: list[Contest]) -> Iterator[tuple[str, list[Contest]]]:
-    engines = dict.fromkeys(c.theirs.series for c in lost if c.theirs)
-    return ((engine, [c for c in lost if c.theirs and c.theirs.series == engine]) for engine in engines)
+    engines = dict.fromkeys(c.theirs.name for c in lost if c.theirs)
+    return ((engine, [c for c in lost if c.theirs and c.theirs.name == engine]) for engine in engines)
 
 
-def _lost(scene: str, engine: str, members: list[Contest]) -> str:
+def _lost(engine: str, members: list[Contest]) -> str:
     parts = []
     slower = [c for c in members if c.ours]
     if slower:
@@ -43,7 +53,7 @@ def _lost(scene: str, engine: str, members: list[Contest]) -> str:
     alone = [c for c in members if not c.ours]
     if alone:
         parts.append(f"reaches {_errors(alone)}, which nothing of ours was measured to reach")
-    return f"**{scene}**: {engine} beats us: it {', and '.join(parts)}."
+    return f"{engine} beats us: it {', and '.join(parts)}."
 
 
 def _errors(contests: list[Contest]) -> str:

@@ -4,31 +4,45 @@ from __future__ import annotations
 
 import pandas as pd
 
-from conservative.benchmarks.studies import sphere_curves
+from conservative.benchmarks.studies import long_runs, sphere_curves
 from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
-
-from ..labels import display_name
 
 ANALYTICAL = "analytical"
 """What the exact motion is called in the paper's figure 2."""
+THIN = 40
+"""Samples of a line of drift on the page: it only ever grows, so few are enough."""
 
 
 def _of_study(samples: pd.DataFrame, study: str) -> pd.DataFrame:
-    """Return the samples of a study with another column `series`: what to call the method."""
-    rows = samples[samples["study"] == study]
-    names = [display_name(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
-    return rows.assign(series=pd.Series(names, index=rows.index, dtype="string"))
+    return samples[samples["study"] == study]
 
 
 def drifts(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the drifts over time: columns scene, series, t (s), quantity, drift (relative, the largest so far)."""
-    rows = _of_study(samples, "long_runs").rename(columns={"value": "drift"})
-    return rows[["scene", "series", "t", "quantity", "drift"]].reset_index(drop=True)
+    """Return the drifts over time: columns scene, family, name, t (s), quantity, drift (relative, the largest so far).
+
+    Of methods that differ in tolerance alone those with the loosest and the tightest are there.
+    """
+    rows = _extremes(_of_study(samples, "long_runs")).rename(columns={"value": "drift"})
+    return rows[["scene", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
+
+
+def _extremes(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return samples without those between the loosest and the tightest of several tolerances."""
+    names = rows.groupby(["scene", "line"])["name"]
+    return rows[(rows["name"] == names.transform("first")) | (rows["name"] == names.transform("last"))]
+
+
+def thin(drifts: pd.DataFrame) -> pd.DataFrame:
+    """Return drifts with every so many samples of a line, up to its last, so that about `THIN` are left."""
+    every = max(1, long_runs.SAMPLES // THIN)
+    left = drifts.groupby(["scene", "name", "quantity"], sort=False).cumcount(ascending=False)
+    return drifts[left % every == 0].reset_index(drop=True)
 
 
 def curves(samples: pd.DataFrame) -> pd.DataFrame:
-    """Return the curves on spheres: columns scene, method, series, t (s), and the point x, y, z in units of the radius."""
-    return _points(_of_study(samples, "sphere_curves"), ["scene", "method", "series", "t"], sphere_curves.AXES)
+    """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
+    keys = ["scene", "method", "family", "name", "t"]
+    return _points(_of_study(samples, "sphere_curves"), keys, sphere_curves.AXES)
 
 
 def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) -> pd.DataFrame:

@@ -12,29 +12,41 @@ from conservative.benchmarks.measures.convergence_order import Order, observed_o
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import OutcomeKind
 
-from .rows import of_measure, of_study, with_names, with_outcome
+from .rows import of_measure, of_study, with_outcome
 
-COLUMNS = ("scene", "method", "series", "dt", "error")
+COLUMNS = ("scene", "method", "family", "name", "dt", "error")
 
 
 def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     """Return the errors of the convergence study by a measure, coarse to fine; runs that failed are not among them.
 
-    Columns scene, method, series (what to call it), dt (s), error (unit of the measure).
+    Columns scene, method, family, name (what to call it), dt (s), error (unit of the measure).
     """
-    rows = with_names(with_outcome(of_measure(of_study(table, "convergence"), measure), OutcomeKind.OK))
-    return rows.assign(series=rows["name"]).rename(columns={"value": "error"})[list(COLUMNS)].reset_index(drop=True)
+    rows = with_outcome(of_measure(of_study(table, "convergence"), measure), OutcomeKind.OK)
+    return rows.rename(columns={"value": "error"})[list(COLUMNS)].reset_index(drop=True)
 
 
 def fits(errors: pd.DataFrame) -> pd.DataFrame:
     """Return the order of each line of `errors`.
 
-    Columns scene, method, series, slope, stderr, floor, points, coarse and fine (the window, s), error_coarse and error_fine
-    (of the fit at its ends), text (slope and its standard error), reason (why there is none); nan where there is no fit.
+    Columns scene, method, family, name, slope, stderr, floor, points, coarse and fine (the window, s), error_coarse and
+    error_fine (of the fit at its ends), text (slope and its standard error), reason (why there is none); nan without a fit.
     """
-    keys = list(COLUMNS[:3])
+    keys = list(COLUMNS[:4])
     groups = errors.groupby(keys, sort=False)
     return pd.DataFrame([dict(zip(keys, key, strict=True)) | _fit(line) for key, line in groups], columns=[*keys, *_FIT])
+
+
+def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
+    """Return errors or fits of one scene with the slope in each name: `reduced (2.00 ± 0.01)`."""
+    slopes = dict(zip(fits["name"], fits["text"], strict=True))
+    return rows.assign(name=[f"{name} ({slopes[name]})" for name in rows["name"]])
+
+
+def fit_ends(fits: pd.DataFrame) -> pd.DataFrame:
+    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad)."""
+    ends = [fits.rename(columns={end: "dt", f"error_{end}": "error"})[["name", "dt", "error"]] for end in ("coarse", "fine")]
+    return pd.concat(ends, ignore_index=True).dropna()
 
 
 _FIT = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")

@@ -9,10 +9,9 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import OutcomeKind
 
-from ..labels import display_name
 from .cells import Row, Table, grade_drift, number, outcome_cell
 from .rows import of_study, outcomes, with_outcome, without_outcome
-from .work_precision import Contest, Cost, contests
+from .work_precision import CheapestLine, Contest, contests
 
 ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad, that the verdict is given for."""
@@ -29,11 +28,11 @@ def verdict(table: pd.DataFrame, points: pd.DataFrame) -> Table:
 
 def _verdict(contest: Contest, points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame) -> Row:
     best = min((cost for cost in (contest.ours, contest.theirs) if cost), key=lambda cost: cost.time)
-    methods = set(points[(points["scene"] == contest.scene) & (points["series"] == best.series)]["method"])
+    methods = set(points[(points["scene"] == contest.scene) & (points["name"] == best.name)]["method"])
     return [
         contest.scene,
         f"{contest.error:.0e}",
-        best.series,
+        best.name,
         number(best.time * 1e6, 3),
         _cost(contest.ours),
         _cost(contest.theirs),
@@ -42,8 +41,8 @@ def _verdict(contest: Contest, points: pd.DataFrame, drifts: pd.DataFrame, troub
     ]
 
 
-def _cost(cost: Cost | None) -> str:
-    return f"{cost.series}: {number(cost.time * 1e6, 3)} µs" if cost else "none gets there"
+def _cost(cost: CheapestLine | None) -> str:
+    return f"{cost.name}: {number(cost.time * 1e6, 3)} µs" if cost else "none gets there"
 
 
 def long_run_drifts(table: pd.DataFrame) -> pd.DataFrame:
@@ -98,4 +97,4 @@ def conservation(table: pd.DataFrame, scene: str) -> Table:
 def _conservation(rows: pd.DataFrame, quantities: list[str]) -> Row:
     first, values = rows.iloc[0], rows.set_index("quantity")["value"]
     cells = [grade_drift(float(values.get(quantity, math.nan))) for quantity in quantities]
-    return [display_name(first["method"], first["label"]), *cells, outcome_cell(outcomes(rows)[0])]
+    return [first["name"], *cells, outcome_cell(outcomes(rows)[0])]

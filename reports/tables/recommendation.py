@@ -11,10 +11,12 @@ from conservative.benchmarks.recommendation.advice import Advice
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Recommendation
+from conservative.benchmarks.studies.method_names import names_of
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..labels import display_name
 from ..terminal.tables import TerminalTable
+from .cells import finite_or_none, outcome_record
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
 FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
@@ -32,18 +34,9 @@ def setting_text(probe: Probe) -> str:
 def method_text(advice: Advice) -> str:
     """Return what to call the method of an advice, with its engine's version, without the setting looked for."""
     if advice.best is None:
-        return display_name(advice.line, "")
-    method = advice.best.method
-    name = display_name(method.name, method.label)
-    tolerance = tolerance_setting(method)
-    return (
-        name if tolerance is None else name.replace(f"{tolerance}={advice.best.setting:g}", "").replace(" ,", " ").strip(" ,")
-    )
-
-
-def finite_or_none(value: float) -> float | None:
-    """Return the value, None where JSON has no number for it."""
-    return value if math.isfinite(value) else None
+        return advice.line.replace(":", " ")
+    names = names_of(advice.best.method)
+    return display_name(names.family, names.version, names.series_setting)
 
 
 def json_text(recommendation: Recommendation) -> str:
@@ -84,9 +77,9 @@ def _motion(recommendation: Recommendation) -> dict[str, Any]:
     return {
         "unstable": amplified.unstable,
         "disturbance": amplified.disturbance,
-        "becomes": amplified.becomes,
-        "lost": amplified.lost,
-        "measured_until": amplified.until,
+        "becomes": amplified.final_size,
+        "lost": amplified.is_lost,
+        "measured_until": amplified.end,
         "by": amplified.label,
     }
 
@@ -117,7 +110,7 @@ def _probe(probe: Probe) -> dict[str, Any]:
         "law": probe.law,
         "holds": finite_or_none(probe.holds),
         "drift": {d.name: {"measured": d.measured, "expected": d.expected, "secular": d.secular} for d in probe.drifts},
-        "status": str(probe.outcome),
+        "outcome": outcome_record(probe.outcome),
     }
 
 
@@ -164,10 +157,10 @@ def _truth_text(recommendation: Recommendation) -> str:
 def _stability_text(recommendation: Recommendation) -> str:
     amplified = recommendation.conditions.amplification
     stable = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
-    after = ", and by anything after that" if amplified.lost else ""
+    after = ", and by anything after that" if amplified.is_lost else ""
     return (
-        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.becomes:.2g} rad within "
-        f"{amplified.until:.4g} s{after} ({amplified.label}): {stable}."
+        f"A start with rates off by {amplified.disturbance:g} of their size is off by up to {amplified.final_size:.2g} rad "
+        f"within {amplified.end:.4g} s{after} ({amplified.label}): {stable}."
     )
 
 

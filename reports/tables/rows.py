@@ -1,4 +1,4 @@
-"""Rows of the measurements, as tables and pictures pick them."""
+"""Rows of the measurements, with their names (see `labels.with_names`), as tables and pictures pick them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import outcome_of
 from conservative.outcome import Outcome, OutcomeKind
-
-from ..labels import display_name
 
 
 def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.DataFrame:
@@ -22,15 +20,9 @@ def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.D
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
 
 
-def keyed(rows: pd.DataFrame) -> pd.DataFrame:
+def prefix_quantity(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows with the quantity in front of the measure: `energy drift max`."""
     return rows.assign(measure=(rows["quantity"] + " " + rows["measure"]).str.lstrip())
-
-
-def with_names(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows with another column `name`: what to call the method."""
-    names = [display_name(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
-    return rows.assign(name=pd.Series(names, index=rows.index, dtype="string"))
 
 
 def outcomes(rows: pd.DataFrame) -> list[Outcome]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
@@ -12,7 +10,7 @@ from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 from .cells import Table, number, outcome_text
-from .rows import of_study, outcomes, with_names, with_outcome, without_outcome
+from .rows import of_study, outcomes, with_outcome, without_outcome
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 _ELSEWHERE = (*HARD, "import_time")
@@ -22,7 +20,7 @@ _ELSEWHERE = (*HARD, "import_time")
 def failures(table: pd.DataFrame) -> Table:
     """Return the runs that did not reach their end or that the study did not wait for."""
     rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *_ABSENT)
-    rows = with_names(rows).assign(text=list(map(outcome_text, outcomes(rows))))
+    rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
     body = [
         [*map(str, key), ", ".join(members["study"].unique()), _steps(members)]
         for key, members in rows.groupby(["scene", "name", "text"], sort=False)
@@ -37,16 +35,14 @@ def _steps(members: pd.DataFrame) -> str:
 
 def unsupported(table: pd.DataFrame) -> Table:
     """Return what cannot be done, or is not installed, and why: a row a reason, with all methods that have it."""
-    rows = with_names(with_outcome(table[~table["study"].isin(_ELSEWHERE)], *_ABSENT))
-    rows = rows.assign(pattern=[_DIGITS.sub("…", reason) for reason in rows["reason"]])
+    rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *_ABSENT)
+    # A reason can have numbers that differ from step to step: the first stands for all that a method has of a kind.
+    rows = rows.assign(reason=rows.groupby(["scene", "outcome", "name"])["reason"].transform("first"))
     body = [
-        [*map(str, key[:2]), str(members["reason"].iloc[0]), ", ".join(members["name"].unique())]
-        for key, members in rows.groupby(["scene", "outcome", "pattern"], sort=False)
+        [*map(str, key), ", ".join(members["name"].unique())]
+        for key, members in rows.groupby(["scene", "outcome", "reason"], sort=False)
     ]
     return ["scene", "outcome", "why (numbers: of the first)", "methods"], body
-
-
-_DIGITS = re.compile(r"\d[\d.e+-]*")
 
 
 def truths(table: pd.DataFrame) -> Table:

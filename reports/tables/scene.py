@@ -8,18 +8,16 @@ from collections.abc import Iterable, Iterator
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.entry_points import DEFAULT_METHOD
 
 from .cells import Row, Table, number
-from .rows import of_measure, of_study, with_names
-from .work_precision import Contest, Cost
-
-UNIT = "reduced"
-"""The method whose step the others' are counted in."""
+from .rows import of_measure, of_study
+from .work_precision import CheapestLine, Contest
 
 
 def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
     """Return the values of a study at the scene's step: a row a method, ours first, and a column (measure, quantity)."""
-    rows = with_names(of_study(table, study, scene))
+    rows = of_study(table, study, scene)
     rows = rows[rows["dt"] == rows.groupby("method")["dt"].transform("max")]
     return rows.pivot_table(index="name", columns=["measure", "quantity"], values="value", sort=False)
 
@@ -54,7 +52,7 @@ _ERRORS = ((Measure.ATTITUDE_MAX, "rad"), (Measure.ATTITUDE_FINAL, "rad"), (Meas
 
 def accuracy(table: pd.DataFrame, scene: str) -> Table:
     """Return errors of attitude and rates at the paper's steps: the scene's own, a half and a quarter of it."""
-    rows = with_names(of_study(table, "paper", scene))
+    rows = of_study(table, "paper", scene)
     rows = rows[rows["measure"].isin([measure.text for measure, _ in _ERRORS])]
     steps = sorted(rows["dt"].unique(), reverse=True)
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
@@ -66,11 +64,9 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
 def order(attitude: pd.DataFrame, rates: pd.DataFrame) -> Table:
     """Return observed orders of attitude and rates, from `orders.fits`, and the window of steps that the attitude's fit saw."""
     header = ["method", "order, attitude", "order, rates", "fit window, s", "points", "floor, rad"]
-    of_rates = dict(zip(rates["series"], rates["text"], strict=True))
+    of_rates = dict(zip(rates["name"], rates["text"], strict=True))
     lines = [fit for _, fit in attitude.iterrows()]
-    return header, [
-        [str(fit["series"]), str(fit["text"]), str(of_rates.get(fit["series"], "–")), *_window(fit)] for fit in lines
-    ]
+    return header, [[str(fit["name"]), str(fit["text"]), str(of_rates.get(fit["name"], "–")), *_window(fit)] for fit in lines]
 
 
 def _window(fit: pd.Series[float]) -> list[str]:
@@ -92,11 +88,11 @@ _TIMES = (
 def time(table: pd.DataFrame, scene: str) -> Table:
     """Return wall times at the scene's step: minimum and median of interleaved rounds, how many, and what is paid once."""
     values = _wide(table, "speed", scene)
-    rows = with_names(of_measure(of_study(table, "speed", scene), Measure.TIME))
+    rows = of_measure(of_study(table, "speed", scene), Measure.TIME)
     details = rows.set_index("name")["detail"]
-    header = ["method", f"steps of {UNIT}", *(title for _, _, title in _TIMES), "timed"]
+    header = ["method", f"steps of {DEFAULT_METHOD}", *(title for _, _, title in _TIMES), "timed"]
     lines = _lines(values)
-    unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == UNIT), math.nan)
+    unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == DEFAULT_METHOD), math.nan)
     return header, [[name, *_times(row, unit), str(details.get(name, ""))] for name, row in lines]
 
 
@@ -111,15 +107,15 @@ def contests(contests: Iterable[Contest]) -> Table:
     return header, [[f"{c.error:.0e}", *_cost(c.ours), *_cost(c.theirs), number(c.ratio, 3)] for c in contests]
 
 
-def _cost(cost: Cost | None) -> tuple[str, str]:
-    return (cost.series, number(cost.time * 1e6, 3)) if cost else ("none gets there", "–")
+def _cost(cost: CheapestLine | None) -> tuple[str, str]:
+    return (cost.name, number(cost.time * 1e6, 3)) if cost else ("none gets there", "–")
 
 
 _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))
 
 
 def costs_paid_once(table: pd.DataFrame, scene: str) -> Table:
-    """Return what a method costs before its first step: conversion, compilation, the first call."""
+    """Return what a method costs before its first step: conversion, with compiled code at hand, and the first call."""
     values = _wide(table, "speed", scene)
     body = [[name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)] for name, row in _lines(values)]
     return ["method", "prepare, ms", "first call, ms", "simulated second, µs"], body

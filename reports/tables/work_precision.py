@@ -14,22 +14,23 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from ..labels import display_name, without_tolerance
 from .rows import of_study, with_outcome
 
+_NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
 DECADES = tuple(10.0**-k for k in range(1, 14))
-_KEYS = ["scene", "series", "method", "label", "role", "dt"]
+_KEYS = ["scene", "series", "method", *_NAMES, "role", "dt"]
 _VALUES = {Measure.ATTITUDE_MAX.text: "error", Measure.TIME.text: "time"}
 
 
 @dataclass(frozen=True)
-class Cost:
-    """The cheapest way to an error: the line it is on and its time, s per simulated second."""
+class CheapestLine:
+    """The line that gets to an error in the least time, and that time, s per simulated second."""
 
-    series: str
+    name: str
     time: float
 
 
@@ -39,8 +40,8 @@ class Contest:
 
     scene: str
     error: float
-    ours: Cost | None
-    theirs: Cost | None
+    ours: CheapestLine | None
+    theirs: CheapestLine | None
 
     @property
     def ratio(self) -> float:
@@ -56,8 +57,8 @@ class Contest:
 def points(table: pd.DataFrame) -> pd.DataFrame:
     """Return the measured points of the work-precision study.
 
-    Columns scene, series, method, label, role, dt, error (rad), time (s per simulated second); of each line coarse to fine. An
-    error below what the truth is known to is raised to that.
+    Columns scene, series, name (what to call its line), method, family, version, setting (of the line), role, dt, error (rad),
+    time (s per simulated second); of each line coarse to fine. An error below what the truth is known to is raised to that.
     """
     rows = with_outcome(of_study(table, "work_precision"), OutcomeKind.OK)
     rows = rows[rows["measure"].isin(list(_VALUES))]
@@ -65,20 +66,20 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys
     wide = wide.reindex(columns=[*_KEYS, *_VALUES]).rename(columns=_VALUES)
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
-    return wide.dropna(subset=["error", "time"]).assign(series=_line_names).reset_index(drop=True)
+    return _name_lines(wide.dropna(subset=["error", "time"]).reset_index(drop=True))
 
 
 def truth_resolution(table: pd.DataFrame) -> dict[str, float]:
-    """Return, for scenes whose truth is no closed form and not multi-precision, how far two of its kind agree, rad."""
-    rows = table[(table["measure"] == Measure.AGREEMENT.text) & table["label"].str.startswith("scipy")]
+    """Return, for scenes whose truth is approximate (see `Truth`), how far two of its kind agree, rad."""
+    rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)]
     return {str(scene): float(value) for scene, value in rows.groupby("scene")["value"].max().items()}
 
 
-def _line_names(rows: pd.DataFrame) -> list[str]:
-    """Return what to call each point's line; a line of several methods differs in tolerance."""
-    settings = rows.groupby("series")["method"].transform("nunique")
-    names = [display_name(method, label) for method, label in zip(rows["method"], rows["label"], strict=True)]
-    return [without_tolerance(name) if count > 1 else name for name, count in zip(names, settings, strict=True)]
+def _name_lines(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return points under the name and the setting of their line; a line of several methods differs in tolerance."""
+    alone = rows.groupby("series")["method"].transform("nunique") == 1
+    name, setting = rows["name"].where(alone, rows["line"]), rows["setting"].where(alone, rows["series_setting"])
+    return rows.assign(name=name, setting=setting).drop(columns=["line", "series_setting"])
 
 
 def front(points: pd.DataFrame) -> pd.DataFrame:
@@ -116,6 +117,6 @@ def contests(points: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[C
     return out
 
 
-def _cheapest(members: pd.DataFrame, error: float) -> Cost | None:
-    costs = [Cost(str(series), cost(line, error)) for series, line in members.groupby("series", sort=False)]
+def _cheapest(members: pd.DataFrame, error: float) -> CheapestLine | None:
+    costs = [CheapestLine(str(name), cost(line, error)) for name, line in members.groupby("name", sort=False)]
     return min((c for c in costs if not math.isnan(c.time)), key=lambda c: c.time, default=None)

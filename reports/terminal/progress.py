@@ -16,7 +16,7 @@ DELAY = 1.0
 """Time, s, that one piece of work takes before a bar appears."""
 
 
-def shown() -> bool:
+def has_terminal() -> bool:
     """Return whether there is a terminal to show progress on."""
     return sys.stderr.isatty()
 
@@ -24,7 +24,7 @@ def shown() -> bool:
 @contextmanager
 def progress() -> Iterator[Step]:
     """Yield the function to call before each step."""
-    if not shown():
+    if not has_terminal():
         yield lambda share, what: None
         return
     from .bars import Bar
@@ -35,9 +35,9 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def waiting(what: str) -> Iterator[Expect | None]:
+def show_waiting(what: str) -> Iterator[Expect | None]:
     """Show, if it takes long, that one piece of work goes on; yield the function to tell how long, None without a terminal."""
-    if not shown():
+    if not has_terminal():
         yield None
         return
     from .bars import Bar

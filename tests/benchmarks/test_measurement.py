@@ -31,6 +31,7 @@ LINE = Samples(
     scene="brick_flip",
     method="reduced",
     label="conservative==1/reduced",
+    series="reduced",
     role=Role.OURS,
     dt=0.01,
     quantity="energy",
@@ -79,10 +80,10 @@ def test_rows_are_frozen():
 
 
 def test_every_measure_is_found_by_its_text():
-    assert [Measure.named(measure.text) for measure in Measure] == list(Measure)
+    assert [Measure.from_text(measure.text) for measure in Measure] == list(Measure)
     assert len({measure.text for measure in Measure}) == len(Measure)
     with pytest.raises(KeyError):
-        Measure.named("energy drift max")
+        Measure.from_text("energy drift max")
 
 
 def test_a_drift_is_called_by_its_quantity():

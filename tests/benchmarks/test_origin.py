@@ -30,7 +30,7 @@ def linux(tmp_path, monkeypatch):
 
 def test_a_machine_is_that_of_its_first_processor(linux):
     assert (linux.processor, linux.model, linux.memory) == ("AMD EPYC", "cpu family 25 model 1", "16000000 kB")
-    assert set(linux.described) == {"processor", "architecture", "cores", "memory", "system"}
+    assert set(linux.as_dict()) == {"processor", "architecture", "cores", "memory", "system"}
 
 
 def test_times_are_compared_on_one_processor_with_one_compiler(linux):

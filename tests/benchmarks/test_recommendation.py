@@ -152,7 +152,7 @@ def test_amplification_tells_exponential_growth_from_linear():
     assert linear.excess(1.0, 10.0) == pytest.approx(1.0)
     steep = Amplification(T, np.exp(3 * T), 1e-9, "")
     assert steep.unstable
-    assert steep.until == pytest.approx(6.3)  # e^(3 t) 1e-9 = 0.2 rad at t = 6.37 s
+    assert steep.end == pytest.approx(6.3)  # e^(3 t) 1e-9 = 0.2 rad at t = 6.37 s
     assert math.isinf(steep.excess(1.0, 10.0))
     assert steep.excess(1.0, 2.0) == pytest.approx(math.exp(3) / 2)
 

@@ -58,7 +58,7 @@ def test_a_curve_lies_on_the_unit_sphere(scene):
 def test_the_papers_figures_are_those_of_its_scenes():
     rows, lines = findings("paper_figures", cv.Reduced())
     assert rows == []
-    rates = {line.quantity for line in lines if line.method == paper_figures.THEIRS}
+    rates = {line.quantity for line in lines if line.method == paper_figures.PAPER_MAP}
     assert rates == {*paper_figures.RATES, paper_figures.ENERGY, paper_figures.MOMENTUM}
     assert findings("paper_figures", cv.Reduced(), scenes=(registry.scene("needle"),)) == ([], [])
 

@@ -13,7 +13,7 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import stability, studies
 from conservative.benchmarks.studies.study import Study
-from conservative.benchmarks.studies.time_limit import TooLong, within
+from conservative.benchmarks.studies.time_limit import TimeLimitExceeded, run_within
 from conservative.method import Role
 from conservative.outcome import OK, OutcomeKind
 from conservative.references.exact.method import Exact
@@ -110,17 +110,17 @@ def test_a_body_at_rest_is_measured_in_its_own_steps():
 
 def test_waiting_has_an_end():
     release, finished = threading.Event(), []
-    with pytest.raises(TooLong, match="abandoned after"):
-        within(0.05, lambda: finished.append(release.wait(60)))
+    with pytest.raises(TimeLimitExceeded, match="abandoned after"):
+        run_within(0.05, lambda: finished.append(release.wait(60)))
     assert finished == []
     release.set()
-    assert within(5.0, lambda: 3) == 3
+    assert run_within(5.0, lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
-        within(5.0, lambda: 1 // 0)
+        run_within(5.0, lambda: 1 // 0)
 
 
 def test_the_scenes_of_the_study_are_registered():
-    study = studies.hard((cv.Reduced(),))[0]
+    study = studies.list_hard_studies((cv.Reduced(),))[0]
     assert tuple(scene.name for scene in study.scenes) == stability.SCENES
     assert np.all(np.diff(stability.STEP_SIZES) > 0)
     assert (stability.UNIT * stability.STEP_SIZES[0], stability.UNIT * stability.STEP_SIZES[-1]) == pytest.approx((0.1, 10.0))

@@ -225,10 +225,10 @@ def test_a_motion_is_found_once_by_the_studies_that_share_it():
 
 
 def test_the_studies_of_a_report_share_their_truths():
-    found = studies.crossed((SCENE,), (cv.Reduced(),))
+    found = studies.cross_studies((SCENE,), (cv.Reduced(),))
     assert [study.name for study in found] == list(studies.CROSSED)
     assert len({id(study.truth) for study in found}) == 1
-    assert studies.crossed((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
+    assert studies.cross_studies((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
 
 
 def test_preparation_is_timed_as_if_for_the_first_time():

@@ -7,7 +7,6 @@ import numpy as np
 from conservative import Reduced, registry
 from conservative.benchmarks.measures import samples
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Study
@@ -15,7 +14,7 @@ from conservative.method import Role
 from conservative.reports.run.measure import Measurements
 
 from . import rows
-from .rows import point
+from .rows import frame, parts, point
 
 
 def row(study, method, measure, value, dt=0.1, scene="brick_flip", **fields):
@@ -33,7 +32,7 @@ def table():
     """Rows of every study but the hard cases."""
     lines = [
         *point("reduced", "ours", 1e-2, 1e-6, scene="brick_flip"),
-        *point("reduced", "ours", 1e-4, 1e-5, 0.01, "brick_flip"),
+        *point("reduced", "ours", 1e-4, 1e-5, 0.01, scene="brick_flip"),
     ]
     lines += [*point("scipy:DOP853", "engine", 1e-3, 1e-4, scene="brick_flip")]
     drift = [
@@ -48,8 +47,11 @@ def measurements():
     """Rows and lines."""
     t = np.linspace(0.5, 60, 120)
     common = {"study": "long_runs", "scene": "brick_flip", "role": Role.OURS, "dt": 0.1, "quantity": "energy"}
-    lines = [Samples(method=name, label=name, t=t, value=1e-15 * t, **common) for name in ("reduced", "mujoco")]
-    return Measurements(table(), samples.frame([*lines, *curves(registry.scene("brick_flip"), Reduced())]))
+    names = ({"method": name, "label": name, "series": name, **parts(name)} for name in ("reduced", "mujoco"))
+    lines = [Samples(**names_of, t=t, value=1e-15 * t, **common) for names_of in names]
+    return Measurements(
+        table().drop(columns=["name", "line"]), samples.frame([*lines, *curves(registry.scene("brick_flip"), Reduced())])
+    )
 
 
 def curves(scene, *methods):

@@ -1,9 +1,11 @@
 """Made-up measurements, so that what tables and pictures say of them is known beforehand."""
 
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import Measurement, frame
+from conservative.benchmarks.measures.measurement import Measurement
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.reports.labels import with_names
 
 
 def row(study, method, measure, value, dt=0.1, **fields):
@@ -13,10 +15,11 @@ def row(study, method, measure, value, dt=0.1, **fields):
         if " drift " in measure:
             quantity, measure = measure.split(" drift ")
             measure = f"drift {measure}"
-        measure = Measure.named(measure)
+        measure = Measure.from_text(measure)
     outcome = fields.pop("outcome", OK)
-    common = {"scene": "made_up", "label": method, "role": Role.OURS, "series": method, **fields}
+    common = {"scene": "made_up", "label": method, "role": Role.OURS, "series": method, **parts(method), **fields}
     common["role"] = Role(common["role"])
+    common.setdefault("series_setting", common["setting"])
     return Measurement(
         study=study,
         method=method,
@@ -29,15 +32,25 @@ def row(study, method, measure, value, dt=0.1, **fields):
     )
 
 
-def point(line, role, error, time, dt=0.1, scene="made_up", **fields):
-    """Error and time of a method, both at one step; by default the method, its label and its line have one name."""
+def parts(method):
+    """Family and setting of a method without a version."""
+    family, _, setting = method.partition(":")
+    return {"family": family, "version": "", "setting": setting}
+
+
+def point(line, role, error, time, dt=0.1, **fields):
+    """Error and time of a made-up point of a line; it may have another `method`."""
     method = fields.pop("method", line)
-    common = {"dt": dt, "scene": scene, "label": method, "role": role, "series": line, **fields}
     return [
-        row("work_precision", method, Measure.ATTITUDE_MAX, error, **common),
-        row("work_precision", method, Measure.TIME, time, **common),
+        row("work_precision", method, measure, value, dt, role=role, **{"series": line, **fields})
+        for measure, value in ((Measure.ATTITUDE_MAX, error), (Measure.TIME, time))
     ]
 
 
 def table(*groups):
     return frame([row for group in groups for row in group])
+
+
+def frame(rows):
+    """The table of rows with their names, as a view has it."""
+    return with_names(measurement.frame(rows))

@@ -45,7 +45,7 @@ def test_run_equals_the_known_rates():
     assert error < 1e-8  # measured 3.8e-9, the digits printed there
     assert summary["counters"]["steps"] == 600
     assert summary["drift"]["energy"] < 1e-14  # measured 4.5e-16
-    assert summary["status"] == "ok"
+    assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
 
 
 def test_run_as_text_has_the_same_figures():

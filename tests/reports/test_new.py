@@ -13,7 +13,7 @@ def test_new_writes_a_file_that_every_command_takes_for_a_scene(tmp_path):
     done = CliRunner().invoke(main, ["run", str(path), "--t-end", "0.1", "--json"])
     assert done.exit_code == 0
     summary = json.loads(done.stdout)
-    assert (summary["scene"], summary["status"], summary["dt"]) == ("my_body", "ok", 0.002)
+    assert (summary["scene"], summary["outcome"]["kind"], summary["dt"]) == ("my_body", "ok", 0.002)
 
 
 def test_a_mistake_in_a_file_is_one_line_with_its_line_and_exit_code_2(tmp_path):

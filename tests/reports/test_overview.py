@@ -3,13 +3,13 @@ import math
 import pytest
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.errors import Diverged
 from conservative.reports.tables import hard_cases, overview
 from conservative.reports.tables.cells import Cell, Grade, grade_drift
 from conservative.reports.tables.work_precision import points
 
 from .made_up import row, table
+from .rows import frame
 
 
 def test_verdict_names_the_cheapest_and_what_it_keeps():

@@ -13,7 +13,8 @@ from conservative.reports.page import figures as page_figures
 from conservative.reports.page import page
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables.work_precision import points
+from conservative.reports.tables import lines
+from conservative.reports.tables.work_precision import front, points
 from conservative.reports.view import build
 
 from .made_up import measurements, table
@@ -21,7 +22,12 @@ from .made_up import measurements, table
 
 @pytest.fixture(scope="module")
 def text():
-    return page.render(build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance(["report"])))
+    return rendered(plan_report(["brick_flip"], ["reduced"], quick=True), provenance(["report"]))
+
+
+def rendered(plan, source):
+    view = build(plan, measurements(), source)
+    return page.render(view, {scene.name: figures.scene_charts(scene) for scene in view.scenes})
 
 
 class Outward(HTMLParser):
@@ -75,7 +81,7 @@ def test_text_cannot_become_markup():
     assert "</script" not in page._in_script({"name": "</script><b>"})
     assert json.loads(page._in_script({"name": "</script>"})) == {"name": "</script>"}
     scene = Scene("<b>", scenes.brick_flip().body, np.eye(3), (0.1, 0.2, 3.0), 1.0, dt=0.1, source="<i>")
-    shown = page.render(build(Plan((scene,), (Reduced(),), quick=True), measurements(), provenance([])))
+    shown = rendered(Plan((scene,), (Reduced(),), quick=True), provenance([]))
     assert "<i>" not in shown
     assert "&lt;i&gt;" in shown
     assert "Nothing was measured that could be drawn" in shown
@@ -90,21 +96,22 @@ def drawn(spec, hidden=()):
 
 
 def test_chart_draws_its_lines_and_the_switch_takes_one_away():
-    (spec,) = vega_embed.embed(figures.work_precision(points(table()), "brick_flip"), page_figures.hover("error"))
-    colour = vega_embed.legend(["reduced"], True)[0].colour
+    found = points(table())
+    (spec,) = vega_embed.embed(figures.work_precision(found, front(found), "brick_flip"), page_figures.hover("error"))
+    colour = vega_embed.legend({"reduced": "reduced"}, True)[0].colour
     assert drawn(spec).count(colour) > 1
     assert colour not in drawn(spec, ["reduced"])
-    assert vega_embed.legend(["scipy DOP853"], True)[0].colour in drawn(spec, ["reduced"])
+    assert vega_embed.legend({"scipy DOP853": "scipy"}, True)[0].colour in drawn(spec, ["reduced"])
     assert "legend" not in json.dumps(spec).replace('"legend": null', "")
 
 
 def test_legend_has_the_lines_of_the_charts():
     (scene,) = build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance([])).scenes
-    found = page_figures.scene_figures(scene)
+    found = page_figures.scene_figures(scene, figures.scene_charts(scene))
     assert [entry.name for entry in found.work_precision.legend] == ["reduced", "scipy DOP853"]
     panels = found.drift.charts
     assert len(panels) == 1
-    assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * page_figures.DRIFT_SAMPLES + 1
+    assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * lines.THIN + 1
 
 
 def test_data_are_short_and_exact_to_their_digits():

@@ -18,8 +18,8 @@ with progress() as step:
 """
 SLOW = """
 from time import sleep
-from conservative.reports.terminal.progress import waiting
-with waiting("a scene: a method") as expect:
+from conservative.reports.terminal.progress import show_waiting
+with show_waiting("a scene: a method") as expect:
     expect(4.0)
     sleep(1.5)
 """
@@ -64,6 +64,6 @@ def test_what_takes_no_time_shows_nothing():
 def test_elsewhere_there_is_nothing(capsys):
     with progress.progress() as step:
         step(0.5, "a study")
-    with progress.waiting("a scene") as expect:
+    with progress.show_waiting("a scene") as expect:
         assert expect is None
     assert capsys.readouterr() == ("", "")

@@ -12,12 +12,9 @@ from conservative.reports.tables.work_precision import points
 from .rows import point, table
 
 ROOT = Path(__file__).parents[2]
-OURS = [
-    point("gauss", "ours", error, time, dt=dt, label="conservative==1/gauss")
-    for error, time, dt in ((1e-2, 1e-6, 2), (1e-7, 4e-6, 1))
-]
-EXACT = point("lame", "ours", 1e-15, 2e-6, label="conservative==1/lame")
-MUJOCO = [point("mujoco", "engine", 1e-4, 1e-6, dt=dt, label="mujoco==4.0.0/RK4") for dt in (1, 2)]
+OURS = [point("gauss", "ours", error, time, dt=dt) for error, time, dt in ((1e-2, 1e-6, 2), (1e-7, 4e-6, 1))]
+EXACT = point("lame", "ours", 1e-15, 2e-6)
+MUJOCO = [point("mujoco", "engine", 1e-4, 1e-6, dt=dt, version="4.0.0", setting="RK4") for dt in (1, 2)]
 
 
 def written(*groups):

@@ -2,6 +2,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
-from conservative.benchmarks.measures.measurement import COLUMNS, frame
+from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.benchmarks.studies import studies
 from conservative.reports import document
 from conservative.reports.charts import style
@@ -22,7 +23,8 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import runs
 
-from .rows import row
+from .made_up import measurements
+from .rows import frame, row
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +56,20 @@ def test_progress_never_goes_back_and_ends_near_the_whole():
     assert spans[0][0] == 0
     assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
     assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
+
+
+def test_the_studies_of_a_plan_are_built_once_and_share_their_truths():
+    made = plan_report(["brick_flip"], ["reduced"], quick=True)
+    assert made.studies is made.studies
+    assert len({id(study.truth) for study in made.studies}) == 1
+
+
+def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
+    commits = iter(["before", "after"])
+    monkeypatch.setattr(document, "provenance", lambda: replace(provenance([]), commit=next(commits)))
+    monkeypatch.setattr(document, "measure", lambda plan, step, progress: measurements())
+    written = document.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
+    assert written.source.commit == "before"
 
 
 def test_progress_knows_how_long_every_study_takes():
@@ -200,19 +216,23 @@ def test_an_option_that_names_nothing_does_not_mean_everything(option, value, tm
     assert list(tmp_path.iterdir()) == []
 
 
+MUJOCO = dict.fromkeys(("mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler"), "mujoco")
+
+
 def test_colours_belong_to_families_whatever_else_is_drawn():
-    some = style.colours(["reduced", "mujoco 4.0.0 RK4"])
-    more = style.colours(["heyoka 7.13.2 body", "mujoco 4.0.0 Euler", "reduced", "their_own x"])
+    some = style.colours({"reduced": "reduced", **MUJOCO})
+    more = style.colours({"heyoka 7.13.2 body": "heyoka", **MUJOCO, "reduced": "reduced", "their_own x": "their_own"})
     assert some["reduced"] == more["reduced"]
     assert some["mujoco 4.0.0 RK4"] == more["mujoco 4.0.0 Euler"]
     assert len(set(more.values())) == 4
-    marks = style.within_family(["mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler", "reduced"])
-    assert list(marks.values()) == [0, 1, 0]
+    assert list(style.number_in_family({**MUJOCO, "reduced": "reduced"}).values()) == [0, 1, 0]
 
 
 def test_legends_follow_the_families_and_the_numbers_in_a_name():
     names = ["mujoco 4.0.0 RK4", "reduced order=10", "their_own", "reduced order=4", "reduced", "heyoka 7.13.2 tol=1e-06,body"]
-    assert style.series_order(names) == [names[4], names[3], names[1], names[5], names[0], names[2]]
+    families = ["mujoco", "reduced", "their_own", "reduced", "reduced", "heyoka"]
+    ordered = style.order_lines(dict(zip(names, families, strict=True)))
+    assert list(ordered) == [names[4], names[3], names[1], names[5], names[0], names[2]]
 
 
 def test_provenance_names_what_can_change_a_number():

@@ -147,7 +147,15 @@ def unfinished(tmp_path, monkeypatch):
     made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     source = provenance(SMALL)
     kept = checkpoint.begin(made, Path("report"), source, resume=False)
-    line = {"study": "paper", "scene": "brick_flip", "method": "reduced", "label": "reduced", "role": Role.OURS, "dt": 0.1}
+    line = {
+        "study": "paper",
+        "scene": "brick_flip",
+        "method": "reduced",
+        "label": "reduced",
+        "series": "reduced",
+        "role": Role.OURS,
+        "dt": 0.1,
+    }
     lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
     kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
     return tmp_path

@@ -3,19 +3,19 @@ import math
 import pytest
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.errors import Diverged
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports import labels
 from conservative.reports.tables import cells, orders, runs, scene
 
 from . import rows
+from .rows import frame
 
 DIVERGED = Diverged(1.0, "").outcome
 
 
-def row(study, measure, value, dt=0.01, method="reduced", label="conservative==0.1.0/reduced", **fields):
-    return rows.row(study, method, measure, value, dt, label=label, **fields)
+def row(study, measure, value, dt=0.01, method="reduced", **fields):
+    return rows.row(study, method, measure, value, dt, **fields)
 
 
 def cannot(reason, kind="unsupported"):
@@ -31,23 +31,20 @@ def test_number(value, text):
 
 
 @pytest.mark.parametrize(
-    ("method", "label", "text"),
+    ("parts", "text"),
     [
-        ("mujoco", "mujoco==4.0.0/RK4", "mujoco 4.0.0 RK4"),
-        ("pinocchio", "pin==4.1.0/aba+RK4", "pinocchio 4.1.0 aba+RK4"),
-        ("gauss:stages=2", "conservative==0.1.0/gauss:stages=2", "gauss stages=2"),
-        ("mujoco:integrator=Euler", "mujoco:integrator=Euler", "mujoco integrator=Euler"),
+        (("mujoco", "4.0.0", "RK4"), "mujoco 4.0.0 RK4"),
+        (("gauss", "", "stages=2"), "gauss stages=2"),
+        (("reduced", "", ""), "reduced"),
     ],
 )
-def test_what_a_method_is_called(method, label, text):
-    assert labels.display_name(method, label) == text
-    assert labels.family(text) == labels.family(method)
+def test_what_a_method_is_called(parts, text):
+    assert labels.display_name(*parts) == text
 
 
-def test_name_without_tolerance():
-    assert labels.without_tolerance("heyoka 7.13.2 tol=1e-06,body") == "heyoka 7.13.2 body"
-    assert labels.without_tolerance("scipy 1.17.1 DOP853,rtol=1e-09") == "scipy 1.17.1 DOP853"
-    assert labels.without_tolerance("reduced") == "reduced"
+def test_rows_have_the_names_of_their_method_and_of_their_line():
+    found = frame([row("paper", "energy drift max", 1.0, method="heyoka", setting="tol=1e-06,body", series_setting="body")])
+    assert found[["name", "line"]].to_numpy().tolist() == [["heyoka tol=1e-06,body", "heyoka body"]]
 
 
 def test_drift_is_that_of_the_scenes_own_step():
@@ -61,7 +58,7 @@ def test_drift_is_that_of_the_scenes_own_step():
 
 def test_time_is_in_steps_of_reduced_too():
     found = [row("speed", "time per step", 5e-8), row("speed", "time per simulated second", 5e-6, detail="9 rounds")]
-    engine = {"method": "mujoco", "label": "mujoco==4.0.0/RK4"}
+    engine = {"method": "mujoco", "version": "4.0.0", "setting": "RK4"}
     found += [row("speed", "time per step", 6e-6, **engine), row("speed", "time per simulated second", 6e-4, **engine)]
     body = scene.time(frame(found), "made_up")[1]
     assert body[0][:3] == ["reduced", "1", "50"]
@@ -106,6 +103,17 @@ def test_failures_and_what_is_unsupported_are_told_apart():
     assert runs.unsupported(table)[1] == [
         ["made_up", "unsupported", "for free bodies", "reduced"],
         ["made_up", "missing", "pip install x", "reduced"],
+    ]
+
+
+def test_what_a_method_cannot_do_is_told_once_with_its_first_reason():
+    found = [
+        row("paper", "energy drift max", math.nan, method=method, outcome=cannot(reason))
+        for method, reason in (("a", "2 > 1"), ("a", "3 > 1"), ("b", "for free bodies"), ("c", "for free bodies"))
+    ]
+    assert runs.unsupported(frame(found))[1] == [
+        ["made_up", "unsupported", "2 > 1", "a"],
+        ["made_up", "unsupported", "for free bodies", "b, c"],
     ]
 
 

@@ -16,7 +16,7 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import orders, work_precision
 
-from .made_up import curves, table
+from .made_up import curves, measurements
 
 
 def classes(base):
@@ -48,7 +48,7 @@ def report():
     found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
     found += studies.findings(Study("paper_figures", plan.scenes, plan.methods))
     lines = [finding for finding in found if isinstance(finding, Samples)]
-    return plan, Measurements(table(), samples.frame(lines)), provenance(["report"])
+    return plan, Measurements(measurements().table, samples.frame(lines)), provenance(["report"])
 
 
 def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):

@@ -16,7 +16,7 @@ def clock():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(yardstick, "wall_time", wall_time)
-        patch.setattr(yardstick, "compiled_turn", lambda: lambda n_steps, h: n_steps)
+        patch.setattr(yardstick, "compile_reference", lambda: lambda n_steps, h: n_steps)
         yield
 
 

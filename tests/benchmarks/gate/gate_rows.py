@@ -13,7 +13,7 @@ METHODS = ("reduced", "reduced:order=4", "mujoco:Euler")
 SECOND, FOURTH, ENGINE = METHODS
 
 
-COMPILED_TURN = yardstick.compiled_turn
+COMPILE_REFERENCE = yardstick.compile_reference
 STEP, TURN = 1e-7, 2e-8
 """Time, s, of a step of any method and of a turn of the yardstick on a clock that only counts them."""
 

@@ -3,6 +3,7 @@ import math
 import pytest
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.tables import headline, work_precision
 
 from .rows import point, row, table
@@ -11,13 +12,17 @@ OURS = (point("ours", "ours", 1e-2, 1.0, dt=0.4), point("ours", "ours", 1e-4, 4.
 ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine", 1e-8, 8.0))
 
 
+def statements(contests):
+    return [f"{found.scene}: {found.text}" for found in headline.statements(contests)]
+
+
 def contest(error, *groups):
     return next(c for c in work_precision.contests(work_precision.points(table(*groups)), [error]))
 
 
 def test_measured_point_is_its_own_cost():
     found = contest(1e-4, *OURS, *ENGINE)
-    assert found.ours == work_precision.Cost("ours", 4.0)
+    assert found.ours == work_precision.CheapestLine("ours", 4.0)
 
 
 def test_between_points_the_cost_is_log_log():
@@ -30,19 +35,19 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
     first = [point("first", "ours", dt, 1 / dt, dt=dt) for dt in (2.0, 1.0)]
     second = [point("second", "engine", dt, 1 / dt, dt=dt) for dt in (3.0, 2.0, 1.5, 1.0)]
     found = work_precision.points(table(*first, *second))
-    assert found[["series", "dt"]].to_numpy().tolist() == [
+    assert found[["name", "dt"]].to_numpy().tolist() == [
         *(["first", 2.0], ["first", 1.0]),
         *(["second", 3.0], ["second", 2.0], ["second", 1.5], ["second", 1.0]),
     ]
 
 
 def test_nothing_is_claimed_below_what_the_truth_is_known_to():
-    def agreement(label):
-        return [row("paper", "truth", Measure.AGREEMENT, 1e-5, label=label, role="truth")]
+    def agreement(detail):
+        return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
 
-    checked = work_precision.points(table(*OURS, *ENGINE, agreement("scipy==1.17.1/DOP853 and scipy==1.17.1/LSODA")))
+    checked = work_precision.points(table(*OURS, *ENGINE, agreement(APPROXIMATE)))
     assert [c.error for c in work_precision.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
-    exact = work_precision.points(table(*OURS, *ENGINE, agreement("references==0.1.0/exact and heyoka==7.13.2/precise")))
+    exact = work_precision.points(table(*OURS, *ENGINE, agreement("")))
     assert work_precision.contests(exact)[-1].error == 1e-8
 
 
@@ -63,15 +68,18 @@ def test_points_of_failed_runs_and_of_truths_do_not_compete():
     truth = point("exact", "truth", 1e-15, 1e-9)
     found = contest(1e-5, *OURS, *ENGINE, failed, truth)
     assert found.ours.time == pytest.approx(8.0, rel=1e-14)
-    assert found.theirs.series == "engine"
+    assert found.theirs.name == "engine"
 
 
 def test_lines_that_differ_in_tolerance_alone_are_one():
     groups = [
-        point("heyoka", "engine", 10.0**-k, k, method=f"heyoka:tol=1e-{k}", label=f"heyoka==7.13.2/tol=1e-{k},body")
+        point("heyoka", "engine", 10.0**-k, k, method=f"heyoka:tol=1e-{k}", version="7.13.2", series_setting="body")
         for k in (3, 9)
     ]
-    assert work_precision.points(table(*groups))["series"].unique().tolist() == ["heyoka 7.13.2 body"]
+    found = work_precision.points(table(*groups))
+    assert found["name"].unique().tolist() == ["heyoka 7.13.2 body"]
+    assert found["setting"].unique().tolist() == ["body"]
+    assert found["series"].unique().tolist() == ["heyoka"]
 
 
 def test_front_is_what_nothing_beats():
@@ -82,28 +90,26 @@ def test_front_is_what_nothing_beats():
 
 def test_verdict_names_the_engine_the_errors_and_the_factor():
     decades = [1e-2, 1e-6, 1e-7]
-    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), decades))
+    lines = statements(work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), decades))
     assert lines == [
-        "**made_up**: engine beats us: it is faster than anything of ours at 1e-06 rad, by 3.5 times, "  # 16 / (2 x 4^0.6)
+        "made_up: engine beats us: it is faster than anything of ours at 1e-06 rad, by 3.5 times, "  # 16 / (2 x 4^0.6)
         "and reaches 1e-07 rad, which nothing of ours was measured to reach.",
-        "**made_up**: ours is faster at 1e-02 rad, by 2 times.",
+        "made_up: ours is faster at 1e-02 rad, by 2 times.",
     ]
 
 
 def test_verdict_where_ours_wins_everywhere():
-    lines = headline.lines(
-        work_precision.contests(work_precision.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2])
-    )
-    assert lines[0] == "**made_up**: no engine beats us at any error that it reaches."
+    lines = statements(work_precision.contests(work_precision.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2]))
+    assert lines[0] == "made_up: no engine beats us at any error that it reaches."
 
 
 def test_verdict_joins_neighbouring_decades():
-    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS, *ENGINE))))
+    lines = statements(work_precision.contests(work_precision.points(table(*OURS, *ENGINE))))
     assert "reaches 1e-07, 1e-08 rad" in lines[0]
     assert "1e-04 to 1e-06 rad" in lines[0]
 
 
 def test_verdict_without_engines_claims_nothing():
-    lines = headline.lines(work_precision.contests(work_precision.points(table(*OURS)), [1e-2]))
-    assert lines == ["**made_up**: no engine was measured."]
-    assert "No engine" in headline.lines([])[0]
+    lines = statements(work_precision.contests(work_precision.points(table(*OURS)), [1e-2]))
+    assert lines == ["made_up: no engine was measured."]
+    assert "No engine" in statements([])[0]
