@@ -8,8 +8,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from .charts.figures import scene_charts
-from .page import markdown, page
+from conservative.errors import BadInput
+
+from .page import markdown, page, scene_charts
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
@@ -36,14 +37,15 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     source = provenance()  # before any work: files, and the commit, can change while that goes on
     progress = checkpoint.begin(plan, out, source, resume)
     spans = plan.spans(name for name in plan.names if name not in progress.results)
-    with atomic_files.report_folder(out) as folder:
-        try:
+    try:
+        with atomic_files.report_folder(out) as folder:
             measurements = measure(plan, step, progress)
             view = build(plan, measurements, replace(source, resumed=progress.describe_earlier()))
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
-        except BaseException as error:
+    except BaseException as error:
+        if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
-            raise
+        raise
     progress.remove()
     return view
 
@@ -51,7 +53,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
 def render(view: View, folder: Path, png: bool, announce: Callable[[str], None]) -> None:
     """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
     announce("pictures")
-    charts = {scene.name: scene_charts(scene) for scene in view.scenes}
+    charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
     (folder / "report.md").write_text(text, encoding="utf-8")
     announce("page")

@@ -8,14 +8,13 @@ import pytest
 import conservative as cv
 from conservative import entry_points, registry
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import automatic
 from conservative.reports.charts import style
 from conservative.reports.tables import claims, orders
 
-from .reports.rows import row
+from .reports.rows import frame, row
 
 SOURCE = '''
 from dataclasses import dataclass
@@ -116,11 +115,11 @@ def test_the_suite_times_the_settings_that_it_names(installed):
 
 
 def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
-    names = ["heyoka 7.13.2 body", "borrowed parts=2", "reduced"]
-    assert style.colours(names)["borrowed parts=2"] != "#123456"
+    lines = {"heyoka 7.13.2 body": "heyoka", "borrowed parts=2": "borrowed", "reduced": "reduced"}
+    assert style.colours(lines)["borrowed parts=2"] != "#123456"
     installed(SOURCE)
-    assert style.colours(names)["borrowed parts=2"] == "#123456"
-    assert style.series_order(names) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
+    assert style.colours(lines)["borrowed parts=2"] == "#123456"
+    assert list(style.order_lines(lines)) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
     methods = selection.methods(["borrowed", "reduced:order=4"])
     assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
@@ -157,7 +156,7 @@ def test_a_method_need_not_say_anything(installed):
     assert method in [point.method for point in points.points()]
     assert method in hard_cases.settings(selection.methods())
     assert method in sphere_curves.select_methods(selection.methods())
-    assert style.colours(["borrowed"])["borrowed"] not in style.PALETTE.values()
+    assert style.colours({"borrowed": "borrowed"})["borrowed"] not in style.PALETTE.values()
     assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
 
 
@@ -195,4 +194,4 @@ def test_a_broken_entry_point_breaks_nothing(installed, what):
     installed(*BROKEN[what])
     assert registry.list_families() == families
     assert automatic.candidates(top) == chosen
-    assert style.series_order(["mujoco 4.0.0 RK4", "reduced"]) == ["reduced", "mujoco 4.0.0 RK4"]
+    assert list(style.order_lines({"mujoco 4.0.0 RK4": "mujoco", "reduced": "reduced"})) == ["reduced", "mujoco 4.0.0 RK4"]

@@ -78,6 +78,8 @@ def git(folder: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def commit(folder: Path) -> str:
-    """Return the commit of a folder; "" outside git."""
-    return git(folder, "rev-parse", "HEAD")
+def commit(folder: Path, mark_changes: bool = False) -> str:
+    """Return the commit of a folder, where asked for with "+changes" if files differ from it; "" outside git."""
+    head = git(folder, "rev-parse", "HEAD")
+    changed = head and mark_changes and git(folder, "status", "--porcelain", "--untracked-files=no")
+    return f"{head}+changes" if changed else head

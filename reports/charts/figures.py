@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import altair as alt
 import pandas as pd
 
-from ..view import SceneView
 from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, dash_scale, families_of, power_axis, shape_scale
 
 FLOOR = 1e-17
@@ -23,23 +22,6 @@ def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, 
         "scale": alt.Scale(type="log", domain=[low, high], nice=False, clamp=True),
         "axis": power_axis(title, low, high),
     }
-
-
-class SceneCharts(NamedTuple):
-    """The charts of a scene that its report and its page share."""
-
-    work_precision: Any
-    drift: Any
-    convergence: Any
-
-
-def scene_charts(scene: SceneView) -> SceneCharts:
-    """Return the charts of a scene."""
-    return SceneCharts(
-        work_precision(scene.points, scene.front, scene.name),
-        drift(scene.drifts, scene.name),
-        convergence(scene.errors, scene.fit_ends, scene.name),
-    )
 
 
 def _line_look(families: Families, title: str) -> dict[str, Any]:

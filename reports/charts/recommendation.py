@@ -20,7 +20,7 @@ STEP, TOLERANCE = "step, s", "tolerance"
 
 
 def points(recommendation: Recommendation) -> pd.DataFrame:
-    """Return a row for each probe: name and family of its method, kind and value of its setting, error to expect, rad, number."""
+    """Return a row for each probe: name and family, kind and value of the setting, error to expect, rad, number."""
     rows = [
         {
             "name": method_text(advice),

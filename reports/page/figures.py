@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 from conservative.benchmarks.studies import long_runs
 
 from ..charts import figures, spheres, vega_embed
-from ..charts.figures import SceneCharts
 from ..charts.style import families_of
 from ..charts.vega_embed import PageFigure
 from ..view import SceneView
+from .scene_charts import SceneCharts
 
 NUMBERS = {
     "error": ("error", "Q", "attitude error, rad"),

@@ -11,9 +11,9 @@ from conservative.benchmarks.studies import long_runs
 from conservative.entry_points import DEFAULT_METHOD
 
 from ..charts import paper
-from ..charts.figures import SceneCharts
 from ..tables.cells import Table, markdown
 from ..view import PaperView, View
+from .scene_charts import SceneCharts
 
 Draw = Callable[[str, Any], str]
 """Draws a chart under a name, and returns the name of its file."""

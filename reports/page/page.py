@@ -15,13 +15,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from conservative.benchmarks.studies import long_runs
 
 from ..charts import spheres
-from ..charts.figures import SceneCharts
 from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
 from ..charts.vega_embed import PageFigure
 from ..tables import overview
 from ..tables.cells import CONSERVED, SMALL
 from ..view import View
 from .figures import SceneFigures, scene_figures
+from .scene_charts import SceneCharts
 
 DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", OLIVE: "#C2C25A", VERMILION: "#FF7F32"}
 """Colours that are too dark on a dark page, and what stands for them there."""

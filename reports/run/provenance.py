@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from importlib.metadata import distributions
 from pathlib import Path
 
-from conservative.benchmarks.measures.origin import git, machine
+from conservative.benchmarks.measures.origin import commit, git, machine
 
 COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy", "numba", "mpmath", "pandas", "altair")
 """Packages whose versions can change a number; a report names them first."""
@@ -50,7 +50,7 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
         machine().as_dict(),
         f"{platform.python_implementation()} {platform.python_version()}",
         packages(),
-        commit(),
+        source_commit(),
         datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
@@ -61,11 +61,9 @@ def packages() -> dict[str, str]:
     return dict(sorted(found.items(), key=lambda item: item[0].lower()))
 
 
-def commit() -> str:
+def source_commit() -> str:
     """Return the commit of the source this runs from, with "+changes" where files differ from it; "unknown" outside git."""
     here = Path(__file__).parent
     if not git(here, "ls-files", "--error-unmatch", Path(__file__).name):
         return "unknown"  # installed into some other project's working tree
-    head = git(here, "rev-parse", "HEAD")
-    changed = git(here, "status", "--porcelain", "--untracked-files=no")
-    return (head + ("+changes" if changed else "")) or "unknown"
+    return commit(here, mark_changes=True) or "unknown"

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
+from uuid import uuid4
 
 from conservative.errors import BadInput
 
@@ -37,10 +38,11 @@ def report_folder(target: Path) -> Iterator[Path]:
     """
     target = target.resolve()  # a link stays one
     foreign = _foreign_files(target)
-    with _as_bad_input("out", target, _FOLDER):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
+    fresh = target.with_name(f".{target.name}-{uuid4().hex[:12]}")
+    try:  # from before the folder is there: an interrupt can come at any time
+        with _as_bad_input("out", target, _FOLDER):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            fresh.mkdir(mode=0o700)
         yield fresh
         with unstoppable():
             _swap(fresh, target, foreign)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from time import monotonic
 
 from rich.console import Console, RenderableType
 from rich.constrain import Constrain
@@ -16,7 +17,7 @@ ECHO = len("^C") + 1
 class Bar(Progress):
     """A bar on stderr: share, time spent, time left, what is done. It is gone when it stops."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         # Numbers keep their width where the terminal is narrow; bar and text share what is left.
         columns = (
             BarColumn(None, table_column=Column(ratio=1)),
@@ -27,7 +28,7 @@ class Bar(Progress):
             TextColumn("{task.description}", table_column=Column(ratio=2, no_wrap=True, overflow="ellipsis")),
         )
         self._terminal = Console(stderr=True)
-        super().__init__(*columns, console=self._terminal, transient=True, expand=True)
+        super().__init__(*columns, console=self._terminal, transient=True, expand=True, get_time=clock)
 
     def get_renderables(self) -> Iterable[RenderableType]:
         """Yield what is shown, a little narrower than the terminal."""

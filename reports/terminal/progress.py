@@ -35,29 +35,29 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str) -> Iterator[Expect | None]:
+def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[Expect | None]:
     """Show, if it takes long, that one piece of work goes on; yield the function to tell how long, None without a terminal."""
     if not has_terminal():
         yield None
         return
     from .bars import Bar
 
-    bar, done = Bar(), Event()
+    bar, done = Bar(clock), Event()
     task = bar.add_task(what, total=None)
 
-    start = monotonic()
+    start = clock()
 
     def expect(seconds: float) -> None:
         # Compiled code keeps the interpreter locked, and the bar standing: so its text has the time as well.
-        bar.update(task, total=monotonic() - start + seconds, description=f"{what}, about {seconds:.0f} s")
+        bar.update(task, total=clock() - start + seconds, description=f"{what}, about {seconds:.0f} s")
         if seconds > DELAY:
             bar.start()
 
     def tick() -> None:
         while not done.wait(0.1):
-            if monotonic() - start > DELAY:
+            if clock() - start > DELAY:
                 bar.start()
-            bar.update(task, completed=monotonic() - start)
+            bar.update(task, completed=clock() - start)
 
     ticking = Thread(target=tick, daemon=True)
     ticking.start()

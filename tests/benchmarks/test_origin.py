@@ -56,4 +56,8 @@ def test_commit(tmp_path):
     for words in (["init", "-q"], [*who, "commit", "-q", "--allow-empty", "-m", "first"]):
         subprocess.run(["git", "-C", tmp_path, *words], check=True)
     assert len(commit(tmp_path)) == 40
+    assert commit(tmp_path, mark_changes=True) == commit(tmp_path)
+    (tmp_path / "file").write_text("new")
+    subprocess.run(["git", "-C", tmp_path, "add", "file"], check=True)
+    assert commit(tmp_path, mark_changes=True) == f"{commit(tmp_path)}+changes"
     assert origin.git(tmp_path, "no-such-command") == ""

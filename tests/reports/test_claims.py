@@ -4,10 +4,10 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.reports.tables import claims, orders
 
 from .made_up import convergence, row
+from .rows import frame
 
 
 def verdicts(rows, scene="brick_flip"):

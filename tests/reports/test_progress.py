@@ -17,13 +17,22 @@ with progress() as step:
         sleep(0.2)
 """
 SLOW = """
-from time import sleep
+from threading import Event
+from conservative.reports.terminal import bars
 from conservative.reports.terminal.progress import show_waiting
-with show_waiting("a scene: a method") as expect:
+now, shown = [0.0], {0.5: Event(), 1.0: Event()}
+class Watched(bars.Bar):
+    def update(self, task, **what):
+        super().update(task, **what)
+        if what.get("completed") in shown:
+            shown[what["completed"]].set()
+bars.Bar = Watched
+with show_waiting("a scene: a method", clock=lambda: now[0]) as expect:
     expect(4.0)
-    sleep(1.5)
+    for now[0], seen in shown.items():
+        seen.wait()
 """
-FAST = SLOW.replace("4.0", "0.1").replace("1.5", "0.2")
+FAST = SLOW.replace("4.0", "0.1")
 
 
 def on_a_terminal(code, columns=80):
@@ -54,7 +63,7 @@ def test_a_terminal_shows_share_time_spent_and_time_left(columns):
 
 
 def test_a_single_piece_of_work_shows_how_long_it_is_expected_to_take():
-    assert re.search(r"\d\d% 0:00:01 left 0:00:0[23] a scene: a method, about 4 s", on_a_terminal(SLOW))
+    assert re.search(r"\d\d% 0:00:01 left 0:00:03 a scene: a method, about 4 s", on_a_terminal(SLOW))
 
 
 def test_what_takes_no_time_shows_nothing():

@@ -35,6 +35,8 @@ def test_json_says_what_to_use_and_why(answered):
     assert best["dt"] > 0
     assert best["law"] == "measured over all 0.4 s"
     assert set(best["drift"]) == {"energy", "momentum"}
+    assert best["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
+    assert named["heyoka"]["called"].endswith(" body")
     assert named["mujoco"]["cost"] > 0
     assert len(named["mujoco:integrator=Euler"]["probes"]) > 1
     assert "tol" in named["heyoka"]["best"]

@@ -11,6 +11,7 @@ from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import import_time, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.reports import document, view
+from conservative.reports.charts import figures
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -82,6 +83,16 @@ def test_the_view_is_computed_once_for_all_scenes(report, monkeypatch):
     assert calls.count("points") == 1
     assert calls.count("errors") == 2  # of the attitude, and of the rates
     assert calls.count("fits") == 2
+
+
+def test_each_chart_is_built_once_for_the_report_and_its_page(report, monkeypatch, tmp_path):
+    calls = []
+    for name in ("work_precision", "convergence", "drift"):
+        monkeypatch.setattr(figures, name, counting(getattr(figures, name), calls))
+    document.render(view.build(*report), tmp_path, png=False, announce=lambda what: None)
+    scenes = len(report[0].scenes)
+    assert calls.count("work_precision") == calls.count("convergence") == scenes
+    assert calls.count("drift") == 2 * scenes  # the page's has fewer samples
 
 
 def counting(function, calls):
