@@ -74,7 +74,7 @@ LONG = [(1, 3.0, 29), (1, 4.0, 23), (2, 2.0, 25), (2, 4.0, 29), (3, 3.0, 25), (2
 
 
 @pytest.mark.parametrize(("stages", "h", "seed"), LONG)
-def test_collocation_stays_on_the_continuous_branch(stages: int, h: float, seed: int) -> None:
+def test_gauss_stays_on_the_continuous_branch(stages: int, h: float, seed: int) -> None:
     scene = heavy_body(seed)
     run = cv.Gauss(stages).run(scene, h, h)
     assert run.ok
@@ -93,7 +93,7 @@ def test_one_long_step_of_many_stages_is_near_the_truth() -> None:
     assert max(errors) < 2e-8  # measured 4e-9, where |w| dt ends at 3.4
 
 
-def test_collocation_says_where_its_branch_ends() -> None:
+def test_gauss_says_where_its_branch_ends() -> None:
     scene = heavy_body(25)
     assert collocated(scene, 2, 4.0) is None
     run = cv.Gauss(2).run(scene, 4.0, 12.0)
