@@ -1,7 +1,6 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -12,12 +11,14 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import step_ladder, studies
+from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
 from conservative.method import Grid, Role, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.exact.method import Exact
+from conservative.references.truth import Truth
 from conservative.registry import method
 
 TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
@@ -64,7 +65,7 @@ CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "pa
 
 @cache
 def truth(scene, grid):
-    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)
 
 
 def rows(name, *methods, quick=True, **settings):
@@ -96,6 +97,9 @@ def test_paper_measures_every_method_at_three_steps():
 def test_paper_says_how_well_the_truths_agree():
     row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
+    assert row.detail == ""
+    rough = agreement(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
+    assert rough.detail == APPROXIMATE
 
 
 def test_paper_errors_are_those_of_the_run():
