@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cache
-from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +10,7 @@ import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.method import Role
 from conservative.references.exact.method import Exact
+from conservative.references.truth import Truth
 
 TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
 START = rotation_about((-0.2, 0.4, 0.9), 2.2)
@@ -44,4 +44,4 @@ class Broken(cv.Method):
 
 @cache
 def truth(scene, grid):
-    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)

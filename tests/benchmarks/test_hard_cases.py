@@ -1,6 +1,5 @@
 import math
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -13,13 +12,14 @@ from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.exact.method import Exact
+from conservative.references.truth import Truth
 
 METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
 
 
 @cache
 def truth(scene, grid):
-    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)
 
 
 @cache

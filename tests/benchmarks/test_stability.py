@@ -2,7 +2,6 @@ import math
 import threading
 import time
 from functools import cache
-from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +16,7 @@ from conservative.benchmarks.studies.time_limit import TimeLimitExceeded, run_wi
 from conservative.method import Role
 from conservative.outcome import OK, OutcomeKind
 from conservative.references.exact.method import Exact
+from conservative.references.truth import Truth
 
 TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
 KINDS = ("not converged", "wrong branch", "diverged", "timeout", "unsupported", "crashed")
@@ -26,7 +26,7 @@ AXIS = cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, 0, 2.0), 2.0)
 
 @cache
 def truth(scene, grid):
-    return SimpleNamespace(trajectory=Exact().prepare(scene, grid)(), agreement_rad=2e-15, names=("exact", "other"))
+    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)
 
 
 def rows(*methods, scene=AXIS):

@@ -8,11 +8,13 @@ import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import step_ladder, studies
+from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Grid, Role, grid_for
 from conservative.outcome import OutcomeKind
+from conservative.references.truth import Truth
 from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
@@ -58,6 +60,9 @@ def test_paper_measures_every_method_at_three_steps():
 def test_paper_says_how_well_the_truths_agree():
     row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
+    assert row.detail == ""
+    rough = agreement(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
+    assert rough.detail == APPROXIMATE
 
 
 def test_paper_errors_are_those_of_the_run():

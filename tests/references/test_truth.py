@@ -12,6 +12,7 @@ R0 = rotation_about((0.3, -1, 0.4), 2.1)
 def test_a_closed_form_is_checked_by_integration():
     scene = cv.scenes.brick_flip()
     found = truth.reference(scene, Grid(0.1, 60, 3))
+    assert not found.approximate
     assert found.names[0].endswith("/exact")
     assert found.names[1].startswith("heyoka==")
     assert found.agreement_rad < 2e-14  # measured 1.2e-15
@@ -63,6 +64,7 @@ def test_a_field_of_ones_own_gets_two_integrations_in_doubles():
     scene = cv.Scene("bowl", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 2.0, Bowl())
     found = truth.reference(scene, Grid(0.5, 4))
     assert [name.split("/")[1].split(",")[0] for name in found.names] == ["DOP853", "LSODA"]
+    assert found.approximate
     assert found.agreement_rad < 1e-9  # measured 2e-11
 
 
