@@ -3,6 +3,9 @@
 Frozen values whose constructors convert what they are given are written in two classes, here and everywhere: a frozen dataclass
 has the fields, and the public class derived from it has an `__init__` that checks, converts, and calls the generated one. So
 nothing is ever assigned to a frozen value, and `dataclasses.replace` works, as what is converted already converts to itself.
+
+Why not attrs: a lean install does not bring it. Why not `__post_init__`: it would have to assign to frozen fields, and the
+constructor's types would be those of the fields, where the public ones accept more (array-likes, plain functions, None).
 """
 
 from __future__ import annotations

@@ -102,5 +102,5 @@ class Claims:
     comparisons: tuple[Comparison, ...] = ()
 
 
-README = "README, Methods"
+README = "conservative/README.md, Methods"
 """Source of what this project claims of its own methods."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from .shapes import MassDistribution
 
 METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
@@ -22,6 +23,8 @@ DEFAULT_METHOD = "reduced"
 @lru_cache(maxsize=8)
 def list_entries(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group such as `SCENES` by name, in order of their names; nothing is imported."""
+    from importlib.metadata import entry_points  # here, as it takes 20 ms, and an integration with a given method needs none
+
     return {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
 
 

@@ -127,7 +127,10 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }
 )
-"""Packages, under the names they are imported by, of each extra in pyproject.toml."""
+"""Packages, under the names they are imported by, of each extra in pyproject.toml.
+
+Packaging data, and nothing that the code here depends on: an extra that is missing has to be named before it is imported.
+"""
 
 
 def require_extra(what: str, extra: str, *packages: str) -> None:

@@ -59,7 +59,7 @@ class Grid:
         t *= self.dt
         return t
 
-    def kept(self, done: int) -> int:
+    def count_samples(self, done: int) -> int:
         """Return how many samples a run of `done` steps has filled."""
         return self.n_samples if done == self.n_steps else 1 + done // self.every
 
@@ -86,9 +86,9 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
 
 
 class Method(ABC):
-    """A way to integrate any scene it supports: a frozen value, one file, one line of registration.
+    """A way to integrate scenes: a frozen value, defined in one file and registered in one line.
 
-    Only `family`, `role`, `order` and `prepare` have no default. All that others need to know about a method it says itself.
+    Subclasses must define `family`, `role`, `order` and `prepare`; everything else has a default.
 
     Attributes
     ----------

@@ -19,6 +19,7 @@ class OutcomeKind(StrEnum):
     MISSING = "missing"
     SKIPPED = "skipped"
     NO_ORDER = "no order"
+    """Of studies alone, no end of a run: an order of convergence cannot be fitted to the errors."""
 
 
 @dataclass(frozen=True)

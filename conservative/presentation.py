@@ -35,8 +35,8 @@ MOST_DRAWN = 1000
 _WIDTH, _HEIGHT = 480, 160
 
 
-class Motion(Protocol):
-    """What is presented: a `Trajectory`, whose methods call these functions."""
+class Sampled(Protocol):
+    """What is presented: a `Trajectory`, whose file imports this one, so that naming the class would close a circle."""
 
     @property
     def scene(self) -> Scene:
@@ -80,13 +80,13 @@ class Motion(Protocol):
     def __len__(self) -> int: ...
 
 
-def samples(trajectory: Motion) -> Array:
+def samples(trajectory: Sampled) -> Array:
     """Return a row for each of n samples under `COLUMNS`, (n, 17): s, rad/s, J and kg m^2/s."""
     R_by_rows = trajectory.R_WB.reshape(len(trajectory), 9)
     return np.column_stack([trajectory.t, R_by_rows, trajectory.w_WB_B, trajectory.energy, trajectory.momentum_W])
 
 
-def table(trajectory: Motion) -> pandas.DataFrame:
+def table(trajectory: Sampled) -> pandas.DataFrame:
     """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and outcome.
 
     Raises
@@ -102,7 +102,7 @@ def table(trajectory: Motion) -> pandas.DataFrame:
     return frame
 
 
-def picture(trajectory: Motion) -> altair.VConcatChart:
+def picture(trajectory: Sampled) -> altair.VConcatChart:
     """Return the body rates, and under them the drift of every invariant, over time; zoom and hover for values.
 
     Raises
@@ -130,7 +130,7 @@ def picture(trajectory: Motion) -> altair.VConcatChart:
     return chart
 
 
-def _lines(trajectory: Motion, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
+def _lines(trajectory: Sampled, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:
     """Return one line for each of `series`, (n,), over time."""
     import altair as alt
     import pandas as pd
@@ -158,7 +158,7 @@ def _lines(trajectory: Motion, series: dict[str, Array], quantity: str, scale: L
     return chart
 
 
-def card(trajectory: Motion) -> str:
+def card(trajectory: Sampled) -> str:
     """Return a small HTML table: what was run, how it ended, what it cost and what drifted."""
     work = [f"{count} {name}" for name, count in trajectory.work.items()]
     end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"

@@ -149,7 +149,7 @@ class Scene(_Fields):
         """Drop what `derive` has kept, so that whoever times the preparation of a run times all of it."""
         self._derivations.clear()
 
-    def renamed(self, name: str, **changes: Any) -> Scene:
+    def rename(self, name: str, **changes: Any) -> Scene:
         """Return the scene under another name and with other fields where `changes` says so."""
         return replace(self, name=name, **changes)
 

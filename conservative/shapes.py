@@ -3,7 +3,7 @@
     top = shapes.cone(radius=0.05, height=0.1, density=2700).about(com_B=(0, 0, 0.075))     # standing on its tip
     scene = Scene("top", top.body, R_WB0, w_WB_B0, t_end, top.gravity(9.81))
 
-A shape comes with its centre of mass as the fixed point, in its own axes S; `turned` says how they lie in the body. Source of
+A shape comes with its centre of mass as the fixed point, in its own axes S; `rotate` says how they lie in the body. Source of
 the moments: textbook integrals, each beside its shape.
 """
 
@@ -84,7 +84,7 @@ class MassDistribution(_Fields):
         """
         return UniformGravity(self.mass * finite_number("g", g, "a finite acceleration, m/s^2"), self.com_B)
 
-    def turned(self, R_BS: ArrayLike | Rotation) -> MassDistribution:
+    def rotate(self, R_BS: ArrayLike | Rotation) -> MassDistribution:
         """Return the distribution whose axes so far, S, lie in the body as `R_BS`, a rotation (3, 3), says.
 
         Raises

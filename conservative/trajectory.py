@@ -49,7 +49,7 @@ class Choice:
         Steps tried on the whole run, s, with the estimate of each, rad.
     """
 
-    method: Any  # a `Method`; that file imports this one
+    method: Any  # a `Method`: naming the type would close a circle, as that file imports this one
     dt: float
     error: float
     estimate: float

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
+LEAN = {"numpy", "scipy", "numba", "mpmath"}
+"""What the package requires without an extra."""
 PYTEST = "import sys\nfrom pytest import console_main\nsys.exit(console_main())\n"
 
 
@@ -24,6 +26,14 @@ def variables(**changed):
     """Return the environment of a process that finds packages where its interpreter has them, and only there."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHONPATH", "PYTEST"))}
     return kept | changed
+
+
+def run_python(code, *arguments, **changed):
+    """Run code in a fresh interpreter, with this checkout in front; return its exit code, output and errors."""
+    command = [sys.executable, "-c", code, *arguments]
+    environment = variables(**{"PYTHONPATH": str(ROOT), **changed})
+    done = subprocess.run(command, env=environment, cwd="/", capture_output=True, text=True, timeout=300, check=False)
+    return done.returncode, done.stdout, done.stderr
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from nbclient import NotebookClient
 import conservative
 import conservative as cv
 from conservative import registry
+from conservative.benchmarks.measures.measurement import COLUMNS
+from conservative.outcome import OutcomeKind
 from conservative.reports.cli.main import main
 
 from .pages import ROOT, blocks, dead_links, links, pages, shell_lines
@@ -169,3 +171,14 @@ def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
     shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in code_cells(notebook) if cell.outputs}
     assert "moser_veselov" in shown["cheapest"]
     assert "mujoco" in shown["runs"]
+
+
+def test_every_column_of_a_row_is_explained():
+    _, _, rest = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8").partition("| column | is |")
+    lines = [line for line in rest.partition("\n\n")[0].splitlines() if line.startswith("| `")]
+    assert [name for line in lines for name in re.findall(r"`(\w+)`", line.split("|")[1])] == list(COLUMNS)
+
+
+def test_every_outcome_is_in_the_glossary():
+    (line,) = re.findall(r"^\| outcome \| .*$", (ROOT / "conservative" / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [kind.value for kind in OutcomeKind if kind.value not in line] == []

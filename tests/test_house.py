@@ -1,4 +1,7 @@
-"""The shape of the house, measured: entries of a room, lines of files and functions, parameters. Each rule is fed a breach."""
+"""The shape of the house, measured: entries of a room, lines of files and functions, parameters. Each rule is fed a breach.
+
+Files of tests have as few lines and parameters; how long their functions are is not counted.
+"""
 
 import ast
 import statistics
@@ -20,6 +23,10 @@ TEMPORARY = {"__pycache__", ".DS_Store"}
 def sources(root):
     """Return the Python files of all rooms, each once: the links below `conservative` are not followed."""
     return [path for room in ROOMS for path in sorted((root / room).rglob("*.py")) if not linked(path, root)]
+
+
+def files_of_tests(root):
+    return sorted((root / "tests").rglob("*.py"))
 
 
 def linked(path, root):
@@ -53,18 +60,21 @@ def breaches(root):
         if len(entries) > ENTRIES[room]:
             yield f"{room}: {len(entries)} entries"
     found = {path: functions(path) for path in sources(root)}
-    for path, members in found.items():
+    for path, members in [*found.items(), *((path, functions(path)) for path in files_of_tests(root))]:
         if not kernel(path):
-            name = path.relative_to(root).as_posix()
-            length = len(path.read_text(encoding="utf-8").splitlines())
-            if length > LINES:
-                yield f"{name}: {length} lines"
-            yield from (f"{name}: {f.name} has {parameters_of(f)} parameters" for f in members if parameters_of(f) > PARAMETERS)
+            yield from breaches_of_file(path.relative_to(root).as_posix(), path, members)
     lengths = sorted(lines_of(function) for members in found.values() for function in members)
     if statistics.median(lengths) > MEDIAN:
         yield f"median function: {statistics.median(lengths)} lines"
     if lengths[int(0.9 * len(lengths))] > NINETIETH:
         yield f"90th percentile of functions: {lengths[int(0.9 * len(lengths))]} lines"
+
+
+def breaches_of_file(name, path, members):
+    length = len(path.read_text(encoding="utf-8").splitlines())
+    if length > LINES:
+        yield f"{name}: {length} lines"
+    yield from (f"{name}: {f.name} has {parameters_of(f)} parameters" for f in members if parameters_of(f) > PARAMETERS)
 
 
 def test_the_house_keeps_its_shape():
@@ -83,6 +93,7 @@ LONG = "def g():\n" + "    x = 1\n" * 20
 BREACHES = {
     "reports: 15 entries": {f"reports/m{i}.py": SHORT for i in range(15)},
     "benchmarks/long.py: 251 lines": {"benchmarks/long.py": "x = 1\n" * 251},
+    "tests/room/test_long.py: 251 lines": {"tests/room/test_long.py": "x = 1\n" * 251},
     "references/wide.py: wide has 8 parameters": {"references/wide.py": "def wide(a, b, c, d, e, f, *, g, h): return a\n"},
     "median function: 21 lines": {"conservative/a.py": LONG * 3},
     "90th percentile of functions: 21 lines": {"conservative/a.py": SHORT * 4 + LONG},
@@ -99,5 +110,6 @@ def test_a_breach_is_found(what, tmp_path):
     )
     (tmp_path / "conservative" / "few.py").write_text(SHORT)
     for name, text in BREACHES[what].items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     assert what in list(breaches(tmp_path))

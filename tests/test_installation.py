@@ -7,35 +7,16 @@ import tarfile
 import tomllib
 import zipfile
 from email import message_from_string
-from importlib.metadata import packages_distributions
 from pathlib import Path, PurePosixPath
 
 import pytest
 
 from conservative.errors import EXTRAS
 
-from .environments import ROOT, variables
+from .environments import LEAN, ROOT, run_python, variables
 
 ROOMS = ("references", "benchmarks", "reports")
-LEAN = {"numpy", "scipy", "numba", "mpmath"}
 IMPORTED_AS = {"pin": "pinocchio", "vl-convert-python": "vl_convert", "pytest-benchmark": "pytest_benchmark"}
-REFUSE = """
-import sys
-
-class Refuse:
-    def find_spec(self, name, path=None, target=None):
-        if path is None and name in refused:
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-refused = set(sys.argv.pop(1).split(","))
-sys.meta_path.insert(0, Refuse())
-"""
-LOOK = """
-import importlib.util
-find_spec = importlib.util.find_spec
-importlib.util.find_spec = lambda name, package=None: None if name in refused else find_spec(name, package)
-"""
-"""For code that only looks whether a package is there."""
 
 
 def modules():
@@ -98,20 +79,12 @@ def test_the_commands_in_the_readme_name_extras_that_exist():
     assert named <= set(extras)
 
 
-def python(code, *arguments, **changed):
-    """Run code in a fresh interpreter, with this checkout in front; return its exit code, output and errors."""
-    command = [sys.executable, "-c", code, *arguments]
-    environment = variables(**{"PYTHONPATH": str(ROOT), **changed})
-    done = subprocess.run(command, env=environment, cwd="/", capture_output=True, text=True, timeout=300, check=False)
-    return done.returncode, done.stdout, done.stderr
-
-
 @pytest.mark.parametrize("room", ROOMS)
 def test_a_room_has_one_name(room):
-    code, _, error = python(f"import {room}")
+    code, _, error = run_python(f"import {room}")
     assert code == 1
     assert error.splitlines()[-1] == f"ImportError: {room}: got another name than its own; allowed: import conservative.{room}"
-    code, out, error = python(f"import conservative.{room}; print(conservative.{room}.__name__)")
+    code, out, error = run_python(f"import conservative.{room}; print(conservative.{room}.__name__)")
     assert (code, out.strip()) == (0, f"conservative.{room}"), error
 
 
@@ -119,7 +92,7 @@ def test_a_room_has_one_name(room):
 def test_the_package_of_another_project_comes_first(room, tmp_path):
     (tmp_path / room).mkdir()
     (tmp_path / room / "__init__.py").write_text("OWNER = 'another project'\n")
-    code, out, error = python(f"import {room}; print({room}.OWNER)", PYTHONPATH=f"{tmp_path}:{ROOT}")
+    code, out, error = run_python(f"import {room}; print({room}.OWNER)", PYTHONPATH=f"{tmp_path}:{ROOT}")
     assert (code, out.strip()) == (0, "another project"), error
 
 
@@ -141,24 +114,15 @@ print(*(sorted(each) for each in names.values() if len(each) > 1))
 """
 
 
-TWICE = """
-import importlib.util, sys
-from pathlib import Path
-import conservative.version
-spec = importlib.util.spec_from_file_location("other", conservative.version.__file__)
-sys.modules["other"] = importlib.util.module_from_spec(spec)
-"""
-
-
 def test_no_module_is_imported_under_two_names():
-    code, out, error = python(EVERYTHING + DOUBLES, str(ROOT))
+    code, out, error = run_python(EVERYTHING + DOUBLES, str(ROOT))
     assert (code, out.strip()) == (0, ""), error
 
 
 def test_a_module_under_two_names_would_be_seen():
     twice = "import importlib.util as u\nspec = u.spec_from_file_location('other', conservative.version.__file__)\n"
     twice += "sys.modules['other'] = u.module_from_spec(spec)\n"
-    code, out, error = python(
+    code, out, error = run_python(
         "import sys\nfrom pathlib import Path\nimport conservative.version\n" + twice + DOUBLES, str(ROOT)
     )
     assert (code, out.strip()) == (0, "['conservative.version', 'other']"), error
@@ -176,74 +140,6 @@ def test_the_suite_has_one_name_whatever_its_path_is(path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "benchmarks/suite/test_speed.py::test_step_ratios" in done.stdout
     assert "1/" in done.stdout.splitlines()[-1]
-
-
-def others():
-    """Packages of this environment that a lean one does not have, under the names they are imported by."""
-    lean = {*LEAN, "llvmlite", "conservative-rotation"}
-    return ",".join(
-        name for name, packages in packages_distributions().items() if not lean & {each.lower() for each in packages}
-    )
-
-
-LEAN_RUN = """
-import conservative as cv
-assert cv.integrate(cv.scenes.brick_flip(), dt=0.01).outcome.ok
-from conservative import registry
-registry.method("exact"), registry.method("scipy")
-"""
-SHOWN = """
-import conservative as cv
-cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1).to_pandas()
-"""
-COMMAND = """
-sys.argv[0] = "conservative"
-from conservative.reports.cli.launch import launch
-launch()
-"""
-
-
-def test_a_lean_environment_integrates():
-    code, _, error = python(REFUSE + LEAN_RUN, others())
-    assert code == 0, error
-
-
-def test_what_a_lean_environment_lacks_is_refused():
-    code, _, error = python(REFUSE + "import pandas", others())
-    assert code == 1
-    assert "No module named 'pandas'" in error
-
-
-def test_a_table_names_its_extra():
-    code, _, error = python(REFUSE + LOOK + SHOWN, others())
-    assert code == 1
-    assert "Trajectory.to_pandas: got an environment without pandas" in error.splitlines()[-1]
-    assert "pip install 'conservative-rotation[report]'" in error.splitlines()[-1]
-
-
-COMMANDS = [
-    ("", "click", "report"),
-    ("list", "rich", "report"),
-    ("run brick_flip", "rich", "report"),
-    ("report --quick", "altair", "report"),
-    ("recommend brick_flip", "vl_convert", "report"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "without", "extra"), COMMANDS, ids=[row[0] or "conservative" for row in COMMANDS])
-def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, extra):
-    code, out, error = python(REFUSE + LOOK + COMMAND, without, *arguments.split())
-    assert (code, out) == (2, "")
-    assert len(error.splitlines()) == 1
-    what = " ".join(["conservative", *arguments.split()[:1]])
-    assert f"{what}: got an environment without {without}" in error
-    assert f"pip install 'conservative-rotation[{extra}]'" in error
-
-
-def test_the_gate_needs_no_table_library():
-    gate = "import conservative.benchmarks.suite.test_speed, conservative.reports.cli.gate, conservative.reports.cli.main"
-    code, _, error = python(REFUSE + gate, "pandas,altair,vl_convert,jinja2,rich,mujoco,pinocchio")
-    assert code == 0, error
 
 
 def test_the_citation_is_of_this_version():

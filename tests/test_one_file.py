@@ -1,41 +1,20 @@
-"""A method is one file: what is written in it and in one entry point is found wherever methods are used, and nowhere else."""
+"""A method is one file: what is written in it and in one entry point is found wherever methods are used."""
 
-import ast
 import importlib
-import re
 import sys
-from pathlib import Path
 
 import pytest
 
 import conservative as cv
 from conservative import entry_points, registry
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import automatic
 from conservative.reports.charts import style
 from conservative.reports.tables import claims, orders
 
-from .reports.rows import row
-
-ROOT = Path(__file__).parent.parent
-GENERIC = (
-    "conservative/declarations.py",
-    "conservative/methods/automatic.py",
-    "benchmarks/studies/hard_cases.py",
-    "benchmarks/studies/import_time.py",
-    "benchmarks/studies/selection.py",
-    "benchmarks/studies/sphere_curves.py",
-    "benchmarks/suite/points.py",
-    "benchmarks/suite/test_speed.py",
-    "reports/charts/spheres.py",
-    "reports/charts/style.py",
-    "reports/tables/claims.py",
-    "reports/tables/overview.py",
-)
-"""Files that have methods to do with, and know none."""
+from .reports.rows import frame, row
 
 SOURCE = '''
 from dataclasses import dataclass
@@ -136,11 +115,11 @@ def test_the_suite_times_the_settings_that_it_names(installed):
 
 
 def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
-    names = ["heyoka 7.13.2 body", "borrowed parts=2", "reduced"]
-    assert style.colours(names)["borrowed parts=2"] != "#123456"
+    lines = {"heyoka 7.13.2 body": "heyoka", "borrowed parts=2": "borrowed", "reduced": "reduced"}
+    assert style.colours(lines)["borrowed parts=2"] != "#123456"
     installed(SOURCE)
-    assert style.colours(names)["borrowed parts=2"] == "#123456"
-    assert style.series_order(names) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
+    assert style.colours(lines)["borrowed parts=2"] == "#123456"
+    assert list(style.order_lines(lines)) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
     methods = selection.methods(["borrowed", "reduced:order=4"])
     assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
@@ -177,7 +156,7 @@ def test_a_method_need_not_say_anything(installed):
     assert method in [point.method for point in points.points()]
     assert method in hard_cases.settings(selection.methods())
     assert method in sphere_curves.select_methods(selection.methods())
-    assert style.colours(["borrowed"])["borrowed"] not in style.PALETTE.values()
+    assert style.colours({"borrowed": "borrowed"})["borrowed"] not in style.PALETTE.values()
     assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
 
 
@@ -215,41 +194,4 @@ def test_a_broken_entry_point_breaks_nothing(installed, what):
     installed(*BROKEN[what])
     assert registry.list_families() == families
     assert automatic.candidates(top) == chosen
-    assert style.series_order(["mujoco 4.0.0 RK4", "reduced"]) == ["reduced", "mujoco 4.0.0 RK4"]
-
-
-def names_of_methods(source):
-    """Return the names of registered methods and of their classes that a source has in texts or imports; not in docstrings."""
-    families = registry.list_families()
-    classes = {family.__name__ for family in families.values()}
-    tree = ast.parse(source)
-    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
-            found |= families.keys() & {re.split(r"[:\s=]", node.value)[0]}
-        elif isinstance(node, ast.Name | ast.Attribute):
-            found |= classes & {node.id if isinstance(node, ast.Name) else node.attr}
-        elif isinstance(node, ast.ImportFrom | ast.Import):
-            found |= classes & {alias.name for alias in node.names}
-    return found
-
-
-@pytest.mark.parametrize("path", GENERIC)
-def test_no_method_is_known_by_name(path):
-    assert not names_of_methods((ROOT / path).read_text(encoding="utf-8"))
-
-
-BREACHES = {
-    "COLOURS = {'reduced': BLUE}": {"reduced"},
-    "rows = table['method'].str.startswith('mujoco')": {"mujoco"},
-    "GOALS = ('mujoco:RK4', 100)": {"mujoco"},
-    "from .gauss import Gauss": {"Gauss"},
-    "if isinstance(method, methods.Projected): pass": {"Projected"},
-    "'''reduced, in prose'''\nexact = reduced = 1": set(),
-}
-
-
-@pytest.mark.parametrize("source", BREACHES)
-def test_a_name_is_found(source):
-    assert names_of_methods(source) == BREACHES[source]
+    assert list(style.order_lines({"mujoco 4.0.0 RK4": "mujoco", "reduced": "reduced"})) == ["reduced", "mujoco 4.0.0 RK4"]

@@ -93,7 +93,7 @@ def measure_amplification(conditions: Conditions) -> Amplification:
     """Return how far a start with slightly other rates leads away: by closed forms, else by our own method."""
     scene = conditions.scene
     size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
-    off = scene.renamed(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
+    off = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
     exact = Exact().unsupported(scene) is None and Exact().unsupported(off) is None
     method, dt = (Exact(), conditions.duration) if exact else choose_ours(conditions, DISTURBANCE / 100)
     until = conditions.duration if exact else min(conditions.duration, affordable_duration(conditions, method, dt))

@@ -109,7 +109,7 @@ def _exponent(drift: Array) -> float:
 def ensemble(scene: Scene, members: int, seed: int = 0) -> list[Scene]:
     """Return scenes whose rates at the start differ from that of `scene` by `SPREAD`."""
     draw = np.random.default_rng(seed)
-    return [scene.renamed(scene.name, w_WB_B0=scene.w_WB_B0 * (1 + SPREAD * draw.normal(size=3))) for _ in range(members)]
+    return [scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 * (1 + SPREAD * draw.normal(size=3))) for _ in range(members)]
 
 
 def measure_drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """A field given by Python functions, called from the compiled loop through a C pointer.
 
-For each question the loop writes what it asks about into a new array, a talk, and finds the answer behind it; all arithmetic is
-done in Python, by `conservative.potentials.python_function`, so that nothing but these few lines is compiled.
+For each evaluation the loop writes the inputs into a new buffer, and the callback writes the outputs behind them. All of the
+arithmetic is Python's, in `conservative.potentials.python_function`: nothing but these few lines is compiled.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from .fields import body_torque, energy, finite_derivative, finite_torque, imple
 
 BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
 FAILED = 1
-STATE, GIVEN, ANSWER = 9, 27, 90
-"""Where the state begins, and how many numbers are given and answered."""
+STATE, N_INPUTS, N_OUTPUTS = 9, 27, 90
+"""Index of the state in a buffer, and numbers of inputs and outputs."""
 
 
 class Function(NamedTuple):
-    """Address of a C function int64(int64 what, int64 address of a talk), which returns FAILED or 0; rows of the frame R_BP.
+    """Address of a C function int64(int64 what, int64 address of a buffer), which returns FAILED or 0; rows of the frame R_BP.
 
-    A talk is R_BP (9), the state (18) and the answer (90). BODY_TORQUE: q to T. FINITE_TORQUE: q, a to T and its derivative by
-    a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q to V.
+    A buffer holds R_BP (9), the state (18) and the outputs (90). BODY_TORQUE: q to T. FINITE_TORQUE: q, a to T and its
+    derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q to V.
     """
 
     address: int
@@ -38,8 +38,8 @@ class Function(NamedTuple):
 
 
 @intrinsic
-def _call_compiled(typingctx, address, what, talk):
-    """Call the C function at `address` with the int64 `what` and the address of a talk."""
+def _call_compiled(typingctx, address, what, buffer):
+    """Call the C function at `address` with the int64 `what` and the address of a buffer."""
 
     def code(context, builder, signature, arguments):
         function = ir.FunctionType(ir.IntType(64), [ir.IntType(64), ir.IntType(64)])
@@ -48,35 +48,35 @@ def _call_compiled(typingctx, address, what, talk):
     return types.int64(types.int64, types.int64, types.int64), code
 
 
-def _call_plain(address, what, talk):
-    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(address)(what, int(talk))
+def _call_plain(address, what, buffer):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(address)(what, int(buffer))
 
 
 _call = _call_compiled if COMPILED else _call_plain
 
 
 @kernel
-def _begin(field):
-    talk = np.zeros(GIVEN + ANSWER)
-    talk[0], talk[1], talk[2] = field.first
-    talk[3], talk[4], talk[5] = field.second
-    talk[6], talk[7], talk[8] = field.third
-    return talk
+def _allocate(field):
+    buffer = np.zeros(N_INPUTS + N_OUTPUTS)
+    buffer[0], buffer[1], buffer[2] = field.first
+    buffer[3], buffer[4], buffer[5] = field.second
+    buffer[6], buffer[7], buffer[8] = field.third
+    return buffer
 
 
 @kernel
-def _begin_at(field, q):
-    talk = _begin(field)
-    talk[STATE], talk[STATE + 1], talk[STATE + 2], talk[STATE + 3] = q
-    return talk
+def _fill(field, q):
+    buffer = _allocate(field)
+    buffer[STATE], buffer[STATE + 1], buffer[STATE + 2], buffer[STATE + 3] = q
+    return buffer
 
 
 @kernel
-def _ask(field, what, talk):
-    """Return the answer, a view into the talk."""
-    if _call(field.address, what, np.int64(talk.ctypes.data)) == FAILED:
+def _evaluate(field, what, buffer):
+    """Return the outputs, a view into the buffer."""
+    if _call(field.address, what, np.int64(buffer.ctypes.data)) == FAILED:
         raise PotentialFailed
-    return talk[GIVEN:]
+    return buffer[N_INPUTS:]
 
 
 @kernel
@@ -86,25 +86,25 @@ def _triple(v, i):
 
 @implements(energy, Function)
 def _energy_function(field, q):
-    return _ask(field, ENERGY, _begin_at(field, q))[0]
+    return _evaluate(field, ENERGY, _fill(field, q))[0]
 
 
 @implements(body_torque, Function)
 def _body_torque_function(field, q):
-    return _triple(_ask(field, BODY_TORQUE, _begin_at(field, q)), 0)
+    return _triple(_evaluate(field, BODY_TORQUE, _fill(field, q)), 0)
 
 
 @implements(finite_torque, Function)
 def _finite_torque_function(field, q, a):
-    talk = _begin_at(field, q)
-    talk[STATE + 4], talk[STATE + 5], talk[STATE + 6] = a
-    v = _ask(field, FINITE_TORQUE, talk)
+    buffer = _fill(field, q)
+    buffer[STATE + 4], buffer[STATE + 5], buffer[STATE + 6] = a
+    v = _evaluate(field, FINITE_TORQUE, buffer)
     return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
 
 
 @implements(finite_derivative, Function)
 def _finite_derivative_function(field, q0, q1):
-    talk = _begin(field)
-    talk[STATE : STATE + 9], talk[STATE + 9 : GIVEN] = q0, q1
-    v = _ask(field, FINITE_DERIVATIVE, talk)
+    buffer = _allocate(field)
+    buffer[STATE : STATE + 9], buffer[STATE + 9 : N_INPUTS] = q0, q1
+    v = _evaluate(field, FINITE_DERIVATIVE, buffer)
     return v[:9].copy(), v[9:].copy().reshape(9, 9)

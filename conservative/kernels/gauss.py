@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import kernel, small
-from .protocol import Result, Workspace, loosen
+from .protocol import Result, Workspace, find_ends, loosen
 from .simd import LANES, four, fuse, lane, larger_size, put, splat, spread
 from .vector import accumulate, add, cross, dot, product, scale, subtract, vertical
 
@@ -369,10 +369,14 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * s, work, None, change, False)
 
 
+MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+
+
 @kernel
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(*loose[:7]), Coefficients(*loose[7:13]), Workspace(*loose[13:])))
+    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
+    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import kernel
-from .protocol import Result, Workspace, loosen
+from .protocol import Result, Workspace, find_ends, loosen
 from .twofold import minus, over, plus, scale, times, two
 from .vector import add, cross, product
 from .vector import scale as scale_vector
@@ -257,7 +257,11 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * parts, 0, None, 0.0, False)
 
 
+MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+
+
 @kernel
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(*loose[:4]), Coefficients(*loose[4:5]), Workspace(*loose[5:])))
+    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
+    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import kernel
-from .protocol import Result, Workspace, loosen
+from .protocol import Result, Workspace, find_ends, loosen
 from .vector import product
 
 NODES, WEIGHTS = (tuple(float(x) for x in part) for part in np.polynomial.legendre.leggauss(16))
@@ -64,7 +64,7 @@ class Step(NamedTuple):
 
 
 class Model(NamedTuple):
-    """Where L moves, as a `Polhode` or its values, and the attitude at the start, both in this module's axes."""
+    """Where L moves, the values of a `Polhode`, and the attitude at the start, both in this module's axes."""
 
     polhode: Any
     q: Any
@@ -188,17 +188,8 @@ def divide(a, b):
 
 
 @kernel
-def calibration_series(p, tau):
-    """Coefficients of css and of cdd in powers of (h / 2 tau)^2: Taylor series of the exact step that is symmetric about s = 0.
-
-    e is the Cayley vector of its second half, with e' = (w + e x w + e (e.w)) / 2, so that the whole has
-    2 (e1 - e2 e3, 0, e3 + e1 e2) / (1 - e1^2 + e2^2 - e3^2).
-    """
-    # On a symmetric body whose momentum lies across the axis both sides of K3 = c3 / (...) vanish; the limit is even in A3.
-    A3 = max(p.A3, 1e-8 * p.l)
-    nu = p.nu * tau
-    if p.A3 < A3 and p.J3 != p.J2:
-        nu = (1.0 / p.J1 - 1.0 / p.J3) * A3 * tau
+def half_step_series(p, A3, nu, tau):
+    """Taylor series of s, c, d and of the Cayley vector e of half a step, e' = (w + e x w + e (e.w)) / 2."""
     s, c, d, e, w = np.zeros(TERMS), np.zeros(TERMS), np.zeros(TERMS), np.zeros((3, TERMS)), np.zeros((3, TERMS))
     ew = np.zeros(TERMS)
     c[0], d[0] = 1.0, 1.0
@@ -215,6 +206,21 @@ def calibration_series(p, tau):
             j, k = (i + 1) % 3, (i + 2) % 3
             turn = multiply(e[j], w[k], n) - multiply(e[k], w[j], n)
             e[i, n + 1] = 0.5 * over * (w[i, n] + turn + multiply(e[i], ew, n))
+    return s, c, d, e
+
+
+@kernel
+def calibration_series(p, tau):
+    """Coefficients of css and of cdd in powers of (h / 2 tau)^2: Taylor series of the exact step that is symmetric about s = 0.
+
+    With the Cayley vector e of its second half, that of the whole is 2 (e1 - e2 e3, 0, e3 + e1 e2) / (1 - e1^2 + e2^2 - e3^2).
+    """
+    # On a symmetric body whose momentum lies across the axis both sides of K3 = c3 / (...) vanish; the limit is even in A3.
+    A3 = max(p.A3, 1e-8 * p.l)
+    nu = p.nu * tau
+    if p.A3 < A3 and p.J3 != p.J2:
+        nu = (1.0 / p.J1 - 1.0 / p.J3) * A3 * tau
+    s, c, d, e = half_step_series(p, A3, nu, tau)
     below, c1, c3 = np.zeros(TERMS), np.zeros(TERMS), np.zeros(TERMS)
     for n in range(TERMS):
         squares = multiply(e[1], e[1], n) - multiply(e[0], e[0], n) - multiply(e[2], e[2], n)
@@ -301,7 +307,7 @@ def march(model, coefficients, workspace):
     After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from c, so that energy and momentum
     cannot drift, and mc is not lost near the separatrix, where it is far below the round-off of L.
     """
-    p, step = model.polhode, coefficients
+    p, step = Polhode(*model.polhode), coefficients
     n_steps, every, q_out, L_out = workspace
     S, C, D = step.S, step.C, step.D
     m, mc = p.m, p.mc
@@ -343,7 +349,11 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps, 0, None, 0.0, False)
 
 
+MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+
+
 @kernel
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(Polhode(*loose[0]), loose[1]), Coefficients(*loose[2:9]), Workspace(*loose[9:])))
+    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
+    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))

@@ -19,7 +19,7 @@ import numpy as np
 
 from . import kernel, small
 from .fields import body_torque, energy, in_body
-from .protocol import Result, Workspace, loosen
+from .protocol import Result, Workspace, find_ends, loosen
 from .simd import LANES, four, fuse, join, lane, put, splat, spread
 from .vector import add, cross, dot, product, scale, times
 
@@ -186,7 +186,11 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * stages, corrections, n_steps * stages, defect, False)
 
 
+MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+
+
 @kernel
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(*loose[:6]), Coefficients(*loose[6:10]), Workspace(*loose[10:])))
+    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
+    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))

@@ -10,7 +10,8 @@ Where a step can fail, the constant `FAILURE` of the file says why.
 
 Python calls `enter(*model, *coefficients, *workspace)`, which is `march` with a plain tuple for a result: numba finds the class
 of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us for each; loose values cost
-nothing.
+nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few is an error when `enter` is
+compiled. Each file has its own: numba does not find the code of a closure over a compiled function in its cache again.
 """
 
 from __future__ import annotations
@@ -49,7 +50,13 @@ class Result(NamedTuple):
     elsewhere: bool
 
 
+def find_ends(model: type[NamedTuple], coefficients: type[NamedTuple]) -> tuple[int, int]:
+    """Return where a model and its coefficients end among the loose values: constants of the machine code of `enter`."""
+    end = len(model._fields)
+    return end, end + len(coefficients._fields)
+
+
 @small
 def loosen(result):
-    """The plain tuple of a result."""
-    return (result.done, result.stages, result.corrections, result.evaluations, result.size, result.elsewhere)
+    """The plain tuple of a result: all its fields, in their order."""
+    return result[:]

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 from . import kernel, small
 from .fields import body_torque, finite_torque
-from .protocol import Result, Workspace, loosen
+from .protocol import Result, Workspace, find_ends, loosen
 from .vector import accumulate, add, apply, cross, dot, inverse, product, scale, subtract, times
 
 FAILURE = "no continuous solution"
@@ -242,10 +242,14 @@ def march(model, coefficients, workspace):
         at, state = (step, stage + 1), (q, q_carry, L, L_carry)
 
 
+MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+
+
 @kernel
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
-    return loosen(march(Model(*loose[:5]), Coefficients(*loose[5:7]), Workspace(*loose[7:])))
+    model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
+    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
 
 
 @kernel

@@ -34,7 +34,7 @@ SAFETY = 0.5
 LARGEST_FACTOR = 30.0
 """Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
 ASYMPTOTIC = 0.2
-"""Difference of two runs, rad, from which on it says nothing about the error of either: angles end at pi."""
+"""Errors above this, rad, are saturated (angles end at pi) and are not used."""
 ATTEMPTS = 12
 STALLED = 0.7
 """Shorter steps have stopped helping when two in a row leave more than this share of the error before them."""

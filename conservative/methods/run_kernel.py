@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,17 +21,19 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     `start` is what its samples, in principal axes, are turned back with.
     """
-    enter, n, n_steps, every = kernel.enter, grid.n_samples, grid.n_steps, grid.every
+    n, n_steps, Result = grid.n_samples, grid.n_steps, kernels("protocol").Result
+    # Of the workspace only q and L are new in each run. Its count is checked by `enter`, that of the result by its class.
+    enter = partial(kernel.enter, *model, *coefficients, n_steps, grid.every)
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        # The fields of `conservative.kernels.protocol.Result`.
-        done, stages, corrections, evaluations, size, elsewhere = enter(*model, *coefficients, n_steps, every, q, L)
-        t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.kept(done), q, L)
+        result = Result(*enter(q, L))
+        done = result.done
+        t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.count_samples(done), q, L)
         if failure is None and done < n_steps:
-            kind = WrongBranch if elsewhere else NotConverged
-            failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
-        work = Counters(done, stages, corrections, evaluations)
+            kind = WrongBranch if result.elsewhere else NotConverged
+            failure = kind(done + 1, done * grid.dt, result.size, kernel.FAILURE)
+        work = Counters(done, result.stages, result.corrections, result.evaluations)
         return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
 
     return run

@@ -22,9 +22,9 @@ _DIFFERENCE = 1e-5
 _NEWTON_DIFFERENCE = 1e-7
 _AGREEMENT = 1e-4
 _ROUND_OFF = 8 * 2.0**-53
-GIVEN, ANSWER = 27, 90
-"""Numbers in a talk: what kernels ask about, the frame R_BP by rows and up to 18 of the state; and what they are told."""
-_Callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+N_INPUTS, N_OUTPUTS = 27, 90
+"""Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
+_CFunction = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class FunctionPotential(_Fields):
 
     @cached_property
     def _callback(self) -> Any:
-        return _Callback(_Answers(self))
+        return _CFunction(_Callback(self))
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of a C function, which lives as long as the potential, and the frame, row by row."""
@@ -137,45 +137,45 @@ def _size(scale: float | Size | None, gradient: Gradient) -> Size:
     return Size(max(float(np.linalg.norm(gradient.at(R))) for R in (_PROBE, *half_turns, *(half_turns @ _PROBE))) or 1.0)
 
 
-class _Answers:
-    """What kernels call with a kind of question and the address of a talk (see `conservative.kernels.function_field`).
+class _Callback:
+    """What kernels call with the kind of evaluation and the address of a buffer (see `conservative.kernels.function_field`).
 
-    Runs in several threads may ask at once: they share nothing, each thread has its own last answer.
+    Threads may call it at once: each has its own last inputs and outputs.
     """
 
     def __init__(self, potential: FunctionPotential) -> None:
         self.potential, self.last = potential, threading.local()
 
     def __call__(self, what: int, address: int) -> int:
-        talk = np.ctypeslib.as_array((ctypes.c_double * (GIVEN + ANSWER)).from_address(address))
-        question = bytes([what]) + talk[:GIVEN].tobytes()
+        buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
+        inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         try:
-            if question != getattr(self.last, "question", None):  # residual and tangent of one iteration ask the same
-                self.last.answer = self._answer(what, talk[:9].reshape(3, 3), talk[9:GIVEN])
-                self.last.question = question
+            if inputs != getattr(self.last, "inputs", None):  # residual and tangent of one iteration need the same
+                self.last.outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
+                self.last.inputs = inputs
         except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
             PotentialFailed.pending.cause = error
             return 1
-        talk[GIVEN : GIVEN + len(self.last.answer)] = self.last.answer
+        buffer[N_INPUTS : N_INPUTS + len(self.last.outputs)] = self.last.outputs
         return 0
 
-    def _answer(self, what: int, R_BP: Array, given: Array) -> Array:
-        answers = (_body_torque, _finite_torque, _finite_derivative, _energy)
-        return answers[what](self.potential, R_BP.copy(), given.copy())
+    def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
+        functions = (_body_torque, _finite_torque, _finite_derivative, _energy)
+        return functions[what](self.potential, R_BP.copy(), state.copy())
 
 
-def _energy(potential: FunctionPotential, R_BP: Array, given: Array) -> Array:
-    return np.array([potential.energy.at(_attitude(R_BP, given))])
+def _energy(potential: FunctionPotential, R_BP: Array, state: Array) -> Array:
+    return np.array([potential.energy.at(_attitude(R_BP, state))])
 
 
-def _body_torque(potential: FunctionPotential, R_BP: Array, given: Array) -> Array:
-    R = _attitude(R_BP, given)
+def _body_torque(potential: FunctionPotential, R_BP: Array, state: Array) -> Array:
+    R = _attitude(R_BP, state)
     return _moment(R, R, potential.gradient.at(R)) @ R_BP
 
 
-def _finite_torque(potential: FunctionPotential, R_BP: Array, given: Array) -> Array:
+def _finite_torque(potential: FunctionPotential, R_BP: Array, state: Array) -> Array:
     """Return the torque, and its derivative by a, column by column."""
-    R_0, a = _attitude(R_BP, given), given[4:7]
+    R_0, a = _attitude(R_BP, state), state[4:7]
     V_0 = potential.energy.at(R_0)
 
     def torque(a: Array) -> Array:
@@ -186,21 +186,21 @@ def _finite_torque(potential: FunctionPotential, R_BP: Array, given: Array) -> A
     return np.concatenate([found, _derivative(torque, a, found).T.ravel()])
 
 
-def _finite_derivative(potential: FunctionPotential, R_BP: Array, given: Array) -> Array:
+def _finite_derivative(potential: FunctionPotential, R_BP: Array, state: Array) -> Array:
     """Return V* and its derivative by q_1, both by columns of base vectors."""
-    R_0 = given[:9].reshape(3, 3).T @ R_BP.T
+    R_0 = state[:9].reshape(3, 3).T @ R_BP.T
     V_0 = potential.energy.at(R_0)
 
     def V_star(q_1: Array) -> Array:
         R_1 = q_1.reshape(3, 3).T @ R_BP.T
         return (potential.discrete_gradient(V_0, R_0, R_1) @ R_BP).T.ravel()
 
-    found = V_star(given[9:])
-    return np.concatenate([found, _derivative(V_star, given[9:], found).ravel()])
+    found = V_star(state[9:])
+    return np.concatenate([found, _derivative(V_star, state[9:], found).ravel()])
 
 
-def _attitude(R_BP: Array, given: Array) -> Array:
-    q = given[:4]
+def _attitude(R_BP: Array, state: Array) -> Array:
+    q = state[:4]
     return from_quaternion(q / np.sqrt(q @ q)) @ R_BP.T
 
 

@@ -103,7 +103,7 @@ def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
 def _shape(table: Table) -> MassDistribution:
     name = table.choice("shape", SHAPES)
     table.only(("shape", *keys_of(SHAPES[name]), *_PLACED))
-    return table.call(SHAPES[name]).turned(_attitude(table, "R_BS"))
+    return table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
 
 
 def _from_file(table: Table, kind: str) -> MassDistribution:

@@ -153,8 +153,8 @@ def read(path: Path) -> Table:
 def key_lines(source: str) -> dict[Key, int]:
     """Return the line, from 1, on which every key of a valid TOML text first stands.
 
-    `tomllib` does not tell. But a TOML text is a sequence of statements of one or more whole lines, each of which is valid by
-    itself and no proper beginning of which is. So the parser itself finds where they end, and what is in them.
+    `tomllib` does not report lines. A TOML file is a sequence of statements, and no proper prefix of a statement is valid TOML,
+    so growing the text line by line until it parses finds where each ends.
     """
     lines: dict[Key, int] = {}
     header: Key = ()

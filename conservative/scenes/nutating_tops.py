@@ -36,7 +36,7 @@ def nutating_top(t_end: float = DEFAULT_T_END) -> Scene:
     """
     steady = lagrange_top(t_end=t_end)
     rates = steady.w_WB_B0 + steady.body.inverse @ np.array(DEFAULT_DISTURBANCE)
-    return steady.renamed("nutating_top", w_WB_B0=rates, dt=DEFAULT_DT, source="Krenk & Nielsen, 5.2, disturbed")
+    return steady.rename("nutating_top", w_WB_B0=rates, dt=DEFAULT_DT, source="Krenk & Nielsen, 5.2, disturbed")
 
 
 def cusped_top(t_end: float = DEFAULT_T_END) -> Scene:
@@ -80,4 +80,4 @@ def _release(name: str, precession: float, t_end: float) -> Scene:
     """The top with the spin L3/J3 of the steady one, its tilt stationary, precessing at a rate of its own."""
     steady = lagrange_top(t_end=t_end)
     rates = (0.0, precession * math.sin(DEFAULT_TILT), steady.w_WB_B0[2])
-    return steady.renamed(name, w_WB_B0=rates, dt=DEFAULT_DT, source="Goldstein, Classical Mechanics, 5.7")
+    return steady.rename(name, w_WB_B0=rates, dt=DEFAULT_DT, source="Goldstein, Classical Mechanics, 5.7")

@@ -37,7 +37,7 @@ def near_separatrix(
     BadInput
         An argument is not finite, or t_end, s, is not above 0.
     """
-    return brick_flip(disturbance, spin, t_end).renamed("near_separatrix", source="Krenk & Nielsen, 5.1, disturbed less")
+    return brick_flip(disturbance, spin, t_end).rename("near_separatrix", source="Krenk & Nielsen, 5.1, disturbed less")
 
 
 def unstable_spin(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scene:
@@ -48,7 +48,7 @@ def unstable_spin(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> S
     BadInput
         An argument is not finite, or t_end, s, is not above 0.
     """
-    return brick_flip(0.0, spin, t_end).renamed("unstable_spin", source=SOURCE)
+    return brick_flip(0.0, spin, t_end).rename("unstable_spin", source=SOURCE)
 
 
 def separatrix(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scene:
@@ -63,7 +63,7 @@ def separatrix(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scen
     speed = finite_number("spin", spin, "a finite rate, rad/s")
     Wa = speed * math.sqrt(Jb * (Jb - Jc) / (Ja * (Ja - Jc)))
     Wc = speed * math.sqrt(Jb * (Ja - Jb) / (Jc * (Ja - Jc)))
-    return brick_flip(t_end=t_end).renamed("separatrix", w_WB_B0=(Wa, Wc, 0.0), source=SOURCE)
+    return brick_flip(t_end=t_end).rename("separatrix", w_WB_B0=(Wa, Wc, 0.0), source=SOURCE)
 
 
 def degenerate_separatrix(disturbance: float = 0.0, spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scene:

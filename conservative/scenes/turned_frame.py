@@ -36,7 +36,7 @@ def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
         field = UniformGravity(field.weight, F @ field.com_B)
     elif field is not None:
         raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
-    return scene.renamed(
+    return scene.rename(
         name, body=RigidBody(F @ scene.body.inertia @ F.T), R_WB0=scene.R_WB0 @ F.T, w_WB_B0=F @ scene.w_WB_B0, potential=field
     )
 
@@ -66,4 +66,4 @@ def turned_top(angle: float = DEFAULT_ANGLE, t_end: float | None = None) -> Scen
 def _turn(name: str, scene: Scene, angle: float, t_end: float | None) -> Scene:
     F = rotation_about(DEFAULT_AXIS, finite_number("angle", angle, "a finite angle, rad"))
     turned = in_body_frame(scene, F, name)
-    return turned if t_end is None else turned.renamed(name, t_end=t_end)
+    return turned if t_end is None else turned.rename(name, t_end=t_end)

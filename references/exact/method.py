@@ -29,7 +29,7 @@ from conservative.version import VERSION
 from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
-from .motion import Motion, in_blocks, steady_turn
+from .motion import ClosedForm, in_blocks, steady_turn
 from .start import Start
 
 
@@ -185,11 +185,11 @@ def _start(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike) -> Start:
     return Start(body, rotation("R_WB0", R_WB0), finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s"))
 
 
-def _free_motion(start: Start) -> Motion:
+def _free_motion(start: Start) -> ClosedForm:
     return steady_turn(start) if start.steady else free_motion(start)
 
 
-def _motion(start: Start, potential: Potential | None) -> Motion:
+def _motion(start: Start, potential: Potential | None) -> ClosedForm:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
         return _free_motion(start)
@@ -205,6 +205,6 @@ def _times(t: ArrayLike) -> Array:
     return finite_array("t", t, (shape,), "finite times (n,), s")
 
 
-def _evaluate(motion: Motion, times: Array) -> tuple[Array, Array]:
+def _evaluate(motion: ClosedForm, times: Array) -> tuple[Array, Array]:
     R_WB, w_WB_B = in_blocks(motion, times.ravel())
     return R_WB.reshape(*times.shape, 3, 3), w_WB_B.reshape(*times.shape, 3)

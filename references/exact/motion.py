@@ -14,7 +14,7 @@ from .digits import mp
 from .start import Start, as_array, from_halves, norm
 
 
-class Motion(Protocol):
+class ClosedForm(Protocol):
     """What evaluates: attitudes and rates at times."""
 
     def at(self, t: Array) -> tuple[Array, Array]:
@@ -25,7 +25,7 @@ _BLOCK = 16384
 """Samples evaluated together: what fits into a cache."""
 
 
-def in_blocks(motion: Motion, t: Array) -> tuple[Array, Array]:
+def in_blocks(motion: ClosedForm, t: Array) -> tuple[Array, Array]:
     """Return `R_WB` (n, 3, 3) and `w_WB_B` (n, 3) at any number of times."""
     R_WB, w_WB_B = np.empty((len(t), 3, 3)), np.empty((len(t), 3))
     for begin in range(0, len(t), _BLOCK):

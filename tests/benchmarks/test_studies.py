@@ -1,57 +1,25 @@
 import math
-from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import key
 from conservative.benchmarks.studies import step_ladder, studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
-from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
+from conservative.benchmarks.studies.study import Study
 from conservative.method import Grid, Role, grid_for
 from conservative.outcome import OutcomeKind
-from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth
 from conservative.registry import method
 
-TURN = rotation_about((0.3, -0.8, 0.5), 1.1)
-START = rotation_about((-0.2, 0.4, 0.9), 2.2)
-BODY = cv.RigidBody(TURN @ np.diag([1.7, 0.9, 2.3]) @ TURN.T)
-SCENE = cv.Scene("generic", BODY, START, (0.7, -1.3, 2.1), 2.0, dt=0.02)
+from .generic_study import SCENE, Broken, truth
+
 ABSENT = Missing("mujoco", "MuJoCo", "mujoco")
-
-
-@dataclass(frozen=True)
-class Broken(cv.Method):
-    """An engine whose runs end as `how` says."""
-
-    how: str
-    family: ClassVar[str] = "broken"
-    role: ClassVar[Role] = Role.ENGINE
-
-    @property
-    def order(self):
-        return 2
-
-    def unsupported(self, scene):
-        return "it cannot do anything" if self.how == "unsupported" else None
-
-    def prepare(self, scene, grid):
-        if self.how == "refuses":
-            raise cv.BadInput("dt", grid.dt, "a shorter step")
-        if self.how == "raises":
-            raise RuntimeError("planted")
-        start = np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None]
-        return lambda: cv.Trajectory(scene, *start, self.label, failure=cv.Diverged(0.0, "planted"))
-
-
 BROKEN = tuple(Broken(how) for how in ("unsupported", "refuses", "raises", "diverges"))
 KINDS = {
     "unsupported": OutcomeKind.UNSUPPORTED,
@@ -61,11 +29,6 @@ KINDS = {
 }
 CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "import_time")]
 """Studies with a row for every method, whatever comes of it."""
-
-
-@cache
-def truth(scene, grid):
-    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)
 
 
 def rows(name, *methods, quick=True, **settings):
@@ -184,7 +147,7 @@ def test_a_bug_of_our_own_is_not_an_outcome():
 @pytest.mark.parametrize("name", [*CROSSING, "sphere_curves", "import_time"])
 def test_progress_counts_up_to_the_whole(name):
     seen = []
-    study = Study(name, (SCENE, SCENE.renamed("again")), (cv.Reduced(),), quick=True, truth=truth)
+    study = Study(name, (SCENE, SCENE.rename("again")), (cv.Reduced(),), quick=True, truth=truth)
     list(studies.findings(study, lambda *call: seen.append(call)))
     done, total, texts = zip(*seen, strict=True)
     assert list(done) == sorted(done)
@@ -211,50 +174,3 @@ def test_steps_of_all_sizes_have_the_same_samples(name):
     assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
     assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
     assert isinstance(grids[0], Grid)
-
-
-def test_a_motion_is_found_once_by_the_studies_that_share_it():
-    asked = []
-
-    def find(scene, grid):
-        asked.append((scene, grid))
-        return truth(scene, grid)
-
-    truths = Truths(find)
-    for name in ("convergence", "work_precision"):
-        assert list(studies.rows(Study(name, (SCENE,), (cv.Reduced(), method("mujoco:Euler")), quick=True, truth=truths)))
-    assert asked == [(SCENE, step_ladder.samples(SCENE, cv.Reduced()))]
-    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=Truths(find))))
-    assert len(asked) == 2
-
-
-def test_the_studies_of_a_report_share_their_truths():
-    found = studies.cross_studies((SCENE,), (cv.Reduced(),))
-    assert [study.name for study in found] == list(studies.CROSSED)
-    assert len({id(study.truth) for study in found}) == 1
-    assert studies.cross_studies((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
-
-
-def test_truths_keep_a_bounded_number_of_motions():
-    asked = []
-    truths = Truths(lambda scene, grid: asked.append(grid))
-    grids = [Grid(0.01, n) for n in range(1, MOST_TRUTHS + 2)]
-    for grid in [*grids, grids[-1], grids[0]]:
-        truths(SCENE, grid)
-    assert asked == [*grids, grids[0]]  # the last is kept, the first had to go
-
-
-def test_preparation_converts_a_scene_that_other_studies_converted():
-    converted = []
-
-    @dataclass(frozen=True)
-    class Converting(Broken):
-        """A method that keeps what it makes of a scene with the scene."""
-
-        def prepare(self, scene, grid):
-            scene.derive(converted.append)
-            return cv.Reduced().prepare(scene, grid)
-
-    SCENE.derive(converted.append)
-    list(studies.rows(Study("speed", (SCENE,), (Converting("works"),), quick=True, truth=truth)))
-    assert converted == [SCENE, SCENE]

@@ -34,7 +34,7 @@ def drift(trajectory: cv.Trajectory) -> float:
 
 def nutating() -> cv.Scene:
     scene = cv.scenes.lagrange_top(t_end=2.0)
-    return scene.renamed("nutating", w_WB_B0=scene.w_WB_B0 + scene.body.inverse @ (0.003, 0.001, 0))
+    return scene.rename("nutating", w_WB_B0=scene.w_WB_B0 + scene.body.inverse @ (0.003, 0.001, 0))
 
 
 SCENES = {

@@ -39,7 +39,7 @@ def homotopy(scene: cv.Scene, h: float, parts: int = 300) -> np.ndarray:
 
 def heavy_body(seed: int) -> cv.Scene:
     """The random body in gravity strong enough to raise 1 rad/s to 3.4 within a second."""
-    return free_body(seed).renamed("heavy", potential=cv.UniformGravity(2.0, (0.5, -0.3, 0.8)))
+    return free_body(seed).rename("heavy", potential=cv.UniformGravity(2.0, (0.5, -0.3, 0.8)))
 
 
 def collocated(scene: cv.Scene, stages: int, h: float, parts: int = 200) -> np.ndarray | None:
@@ -74,7 +74,7 @@ LONG = [(1, 3.0, 29), (1, 4.0, 23), (2, 2.0, 25), (2, 4.0, 29), (3, 3.0, 25), (2
 
 
 @pytest.mark.parametrize(("stages", "h", "seed"), LONG)
-def test_collocation_stays_on_the_continuous_branch(stages: int, h: float, seed: int) -> None:
+def test_gauss_stays_on_the_continuous_branch(stages: int, h: float, seed: int) -> None:
     scene = heavy_body(seed)
     run = cv.Gauss(stages).run(scene, h, h)
     assert run.ok
@@ -93,7 +93,7 @@ def test_one_long_step_of_many_stages_is_near_the_truth() -> None:
     assert max(errors) < 2e-8  # measured 4e-9, where |w| dt ends at 3.4
 
 
-def test_collocation_says_where_its_branch_ends() -> None:
+def test_gauss_says_where_its_branch_ends() -> None:
     scene = heavy_body(25)
     assert collocated(scene, 2, 4.0) is None
     run = cv.Gauss(2).run(scene, 4.0, 12.0)
@@ -166,7 +166,7 @@ def test_large_steps_are_reversible() -> None:
     # A step that jumps to another branch is not found again backwards.
     scene = free_body(5, 1.0)
     there = cv.Reduced().run(scene, 2.5, 100.0)
-    back = cv.Reduced().run(scene.renamed("back", R_WB0=there.R_WB[-1], w_WB_B0=-there.w_WB_B[-1]), 2.5, 100.0)
+    back = cv.Reduced().run(scene.rename("back", R_WB0=there.R_WB[-1], w_WB_B0=-there.w_WB_B[-1]), 2.5, 100.0)
     assert np.abs(back.R_WB[-1] - scene.R_WB0).max() < 1e-12  # measured 9e-15
     assert np.abs(back.w_WB_B[-1] + scene.w_WB_B0).max() < 1e-12  # measured 5e-15
 

@@ -28,7 +28,7 @@ def test_grid_of_steps_and_samples(dt, t_end, every, n_steps, times):
 @pytest.mark.parametrize("done", range(8))
 def test_grid_counts_the_samples_of_a_run_that_stopped(done):
     grid = Grid(0.1, 7, 3)
-    assert grid.kept(done) == np.searchsorted(grid.steps, done, side="right")
+    assert grid.count_samples(done) == np.searchsorted(grid.steps, done, side="right")
 
 
 @pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10"])

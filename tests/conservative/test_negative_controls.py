@@ -60,7 +60,7 @@ def order(method, kind):
 def reversal(method, kind):
     """How far from the start a run forth and back ends, rad."""
     forth = run(method, kind)
-    back = forth.scene.renamed("back", R_WB0=_rotation(forth.R_WB[-1]), w_WB_B0=-forth.w_WB_B[-1])
+    back = forth.scene.rename("back", R_WB0=_rotation(forth.R_WB[-1]), w_WB_B0=-forth.w_WB_B[-1])
     return angle_between(forth.R_WB[0], run(method, kind, back).R_WB[-1])
 
 

@@ -119,7 +119,7 @@ def test_motion_is_of_order_two(potential):
 
 def test_a_body_at_rest_falls_in_every_field():
     for potential in POTENTIALS.values():
-        scene = scene_in(potential).renamed("at rest", w_WB_B0=(0, 0, 0))
+        scene = scene_in(potential).rename("at rest", w_WB_B0=(0, 0, 0))
         trajectory = cv.integrate(scene, 0.01, t_end=0.3)
         assert np.abs(trajectory.energy - trajectory.energy[0]).max() < 1e-14 * scene.energy_scale  # measured 1e-15
         assert np.linalg.norm(trajectory.w_WB_B[-1]) > 0.01

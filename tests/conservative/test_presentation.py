@@ -95,7 +95,7 @@ def test_scipy_rotations_go_in_wherever_an_attitude_does():
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(R0)
     scene = cv.Scene("x", cv.RigidBody(TENSOR), rotation, (0.5, -1.5, 2.5), 3.0)
     np.testing.assert_allclose(scene.R_WB0, R0, atol=1e-15)  # measured 1e-16
-    np.testing.assert_allclose(scene.renamed("y", R_WB0=rotation).R_WB0, R0, atol=1e-15)
+    np.testing.assert_allclose(scene.rename("y", R_WB0=rotation).R_WB0, R0, atol=1e-15)
     from conservative.references.exact.method import free_body
 
     given, same = free_body(scene.body, rotation, (0.5, -1.5, 2.5), [2.0]), free_body(scene.body, R0, (0.5, -1.5, 2.5), [2.0])

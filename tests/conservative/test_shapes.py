@@ -55,7 +55,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_turned_and_moved_shape_has_the_moments_of_its_points(name):
     build, cloud = CASES[name]
-    found = build(density=DENSITY).turned(R_BS).about(COM_B)
+    found = build(density=DENSITY).rotate(R_BS).about(COM_B)
     points_S, volume = cloud(*np.polynomial.legendre.leggauss(8))
     points, mass = points_S @ R_BS.T + COM_B, DENSITY * volume
     assert found.mass == pytest.approx(mass.sum(), rel=1e-14)  # measured 6e-16
@@ -82,7 +82,7 @@ def test_the_cone_on_its_tip_is_the_papers_top():
 
 
 def test_gravity_acts_at_the_centre_of_mass():
-    body = shapes.box((1, 2, 3), mass=1.7).turned(R_BS).about(COM_B)
+    body = shapes.box((1, 2, 3), mass=1.7).rotate(R_BS).about(COM_B)
     np.testing.assert_array_equal(body.gravity(3.7).com_B, COM_B)
     assert body.gravity(3.7).weight == pytest.approx(1.7 * 3.7, rel=1e-15)
 
@@ -98,7 +98,7 @@ BAD = {
     "zero mass": (lambda: shapes.box((1, 2, 3), mass=0), "mass", "0", "above 0, kg"),
     "text density": (lambda: shapes.box((1, 2, 3), density="iron"), "density", "'iron'", "kg/m^3"),
     "far away": (lambda: shapes.box((1, 2, 3), mass=1).about((0, 0, math.inf)), "com_B", "inf", "three finite numbers"),
-    "no rotation": (lambda: shapes.box((1, 2, 3), mass=1).turned(2 * np.eye(3)), "R_BS", "|R'R - 1| = 3", "rotation matrix"),
+    "no rotation": (lambda: shapes.box((1, 2, 3), mass=1).rotate(2 * np.eye(3)), "R_BS", "|R'R - 1| = 3", "rotation matrix"),
     "no acceleration": (lambda: shapes.box((1, 2, 3), mass=1).gravity(math.nan), "g", "nan", "m/s^2"),
 }
 
@@ -116,4 +116,4 @@ def test_bad_input_is_named(name):
 def test_a_scipy_rotation_turns_a_shape():
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(R_BS)
     shape = shapes.box((1, 2, 3), mass=1.7)
-    np.testing.assert_allclose(shape.turned(rotation).inertia, shape.turned(R_BS).inertia, atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(shape.rotate(rotation).inertia, shape.rotate(R_BS).inertia, atol=1e-14)  # measured 2e-16

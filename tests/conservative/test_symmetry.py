@@ -63,7 +63,7 @@ def states(trajectory):
 def turned_world(method, case):
     """The world turned, about the vertical where there is gravity."""
     W = rotation_about(case.axis if case.scene.free else UP, case.angle)
-    R, w = states(run(method, case.scene.renamed("turned", R_WB0=W @ case.scene.R_WB0)))
+    R, w = states(run(method, case.scene.rename("turned", R_WB0=W @ case.scene.R_WB0)))
     return states(run(method, case.scene)), (W.T @ R, w)
 
 
@@ -85,14 +85,14 @@ def permuted_axes(method, case):
 def reversed_time(method, case):
     """Forth, and back with the rates turned over."""
     forth = run(method, case.scene)
-    back = run(method, case.scene.renamed("back", R_WB0=forth.R_WB[-1], w_WB_B0=-forth.w_WB_B[-1]))
+    back = run(method, case.scene.rename("back", R_WB0=forth.R_WB[-1], w_WB_B0=-forth.w_WB_B[-1]))
     return states(forth), (back.R_WB[::-1], -back.w_WB_B[::-1])
 
 
 def scaled_time(method, case):
     """Everything `factor` times as fast, gravity its square as strong, the step as much shorter."""
     f, field = case.factor, case.scene.potential
-    faster = case.scene.renamed(
+    faster = case.scene.rename(
         "faster",
         w_WB_B0=f * case.scene.w_WB_B0,
         t_end=case.scene.t_end / f,
@@ -105,7 +105,7 @@ def scaled_time(method, case):
 def scaled_mass(method, case):
     """Everything `mass` times as heavy."""
     m, field = case.mass, case.scene.potential
-    heavier = case.scene.renamed(
+    heavier = case.scene.rename(
         "heavier",
         body=cv.RigidBody(m * case.scene.body.inertia),
         potential=field and cv.UniformGravity(m * field.weight, field.com_B),
@@ -117,7 +117,7 @@ def split_run(method, case):
     """Two runs, the second from where the first ended."""
     whole, n = run(method, case.scene), STEPS // 2
     first = run(method, case.scene, steps=n)
-    second = run(method, case.scene.renamed("rest", R_WB0=first.R_WB[-1], w_WB_B0=first.w_WB_B[-1]), steps=n)
+    second = run(method, case.scene.rename("rest", R_WB0=first.R_WB[-1], w_WB_B0=first.w_WB_B[-1]), steps=n)
     R = np.concatenate([first.R_WB, second.R_WB[1:]])
     return states(whole), (R, np.concatenate([first.w_WB_B, second.w_WB_B[1:]]))
 

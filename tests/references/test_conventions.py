@@ -40,7 +40,7 @@ def test_an_engine_agrees_with_truth(method, bound, generic):
 def test_a_run_starts_afresh_each_time_and_samples_do_not_change_it(method, top, heavy):
     run = method.prepare(top, Grid(0.05, 40))
     first = run()
-    other = method.prepare(top.renamed("other", w_WB_B0=(0.1, 0.2, 0.3)), Grid(0.05, 3))()
+    other = method.prepare(top.rename("other", w_WB_B0=(0.1, 0.2, 0.3)), Grid(0.05, 3))()
     second = run()
     np.testing.assert_array_equal(first.R_WB, second.R_WB)
     np.testing.assert_array_equal(first.w_WB_B, second.w_WB_B)

@@ -83,7 +83,7 @@ class Unknown:
 
 
 def test_a_potential_without_expressions_is_unsupported_and_named(heavy):
-    reason = Precise().unsupported(heavy.renamed("unknown", potential=Unknown()))
+    reason = Precise().unsupported(heavy.rename("unknown", potential=Unknown()))
     assert "Unknown" in reason
     assert "FIELDS" in reason
 

@@ -83,12 +83,12 @@ def test_lean_takes_the_form_with_the_fewest_products(free, heavy, top, spun):
     assert chosen(heavy) == "body"
     assert chosen(spun) == "non_spinning"
     assert chosen(cv.scenes.lagrange_top()) == "axis_and_angle"
-    hanging = top.renamed("hanging", potential=cv.UniformGravity(-30.0, top.potential.com_B))
+    hanging = top.rename("hanging", potential=cv.UniformGravity(-30.0, top.potential.com_B))
     assert chosen(hanging) == "axis_and_angle"
     assert chosen(top) == "non_spinning"  # it comes within 0.52 of both poles
     over_both_poles = cv.Scene("swing", cv.RigidBody((2, 2, 1)), np.eye(3), (5, 0, 0), 1.0, cv.UniformGravity(3, (0, 0, 1)))
     assert chosen(over_both_poles) == "non_spinning"
-    at_rest = free.renamed("rest", w_WB_B0=(0, 0, 0))
+    at_rest = free.rename("rest", w_WB_B0=(0, 0, 0))
     assert chosen(at_rest) == "body"
 
 

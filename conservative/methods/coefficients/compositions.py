@@ -32,8 +32,7 @@ class Composition:
     ------
     BadInput
         The order is not even, or the lengths do not satisfy sum w = 1 and, below the order, sum w^k = 0 for odd k > 1: what the
-        composition of motions in one dimension asks for (Hairer, Lubich & Wanner 2006, III.3). What more the order asks for
-        is not checked here but by the observed order, in the tests.
+        composition of motions in one dimension asks for (Hairer, Lubich & Wanner 2006, III.3). Tests observe the order itself.
     """
 
     name: str
@@ -44,9 +43,10 @@ class Composition:
     def __post_init__(self) -> None:
         if self.order < 2 or self.order % 2:
             raise BadInput("order", self.order, "an even number of 2 or more")
+        weights = self.weights
         for power in range(1, self.order, 2):
             wanted = 1 if power == 1 else 0
-            off: Fraction = abs(sum((w**power for w in self.weights), start=Fraction(-wanted)))
+            off: Fraction = abs(sum((w**power for w in weights), start=Fraction(-wanted)))
             if off > DIGITS:
                 got = f"{self.name} with sum w^{power} off by {float(off):.3g}"
                 raise BadInput("half", got, f"lengths whose sum of powers {power} is {wanted}")

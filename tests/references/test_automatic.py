@@ -1,4 +1,4 @@
-"""The chooser's honesty: what it promises against what an independent truth says, over random bodies and starts."""
+"""The automatic choice is honest: what it promises against what an independent truth says, over random bodies and starts."""
 
 import warnings
 
@@ -58,7 +58,7 @@ def test_true_errors_are_within_ten_times_what_was_asked_for():
     assert len(worse) <= 0.02 * SCENES, worse  # measured 0 of 200, and no true error above 3 times the target
 
 
-def test_a_chooser_that_trusts_too_much_is_caught(monkeypatch):
+def test_a_choice_that_trusts_too_much_is_caught(monkeypatch):
     """The negative control of the test above: estimates that are far too small."""
 
     monkeypatch.setattr(automatic, "_convergence_factor", lambda method: 1e9)

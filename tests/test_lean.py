@@ -1,0 +1,93 @@
+"""Without an extra the package installs, integrates, and says which extra has what is asked for."""
+
+from importlib.metadata import packages_distributions
+
+import pytest
+
+from .environments import LEAN, run_python
+
+REFUSE = """
+import sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if path is None and name in refused:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+refused = set(sys.argv.pop(1).split(","))
+sys.meta_path.insert(0, Refuse())
+"""
+LOOK = """
+import importlib.util
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = lambda name, package=None: None if name in refused else find_spec(name, package)
+"""
+"""For code that only looks whether a package is there."""
+
+
+def others():
+    """Packages of this environment that a lean one does not have, under the names they are imported by."""
+    lean = {*LEAN, "llvmlite", "conservative-rotation"}
+    return ",".join(
+        name for name, packages in packages_distributions().items() if not lean & {each.lower() for each in packages}
+    )
+
+
+LEAN_RUN = """
+import conservative as cv
+assert cv.integrate(cv.scenes.brick_flip(), dt=0.01).outcome.ok
+from conservative import registry
+registry.method("exact"), registry.method("scipy")
+"""
+SHOWN = """
+import conservative as cv
+cv.integrate(cv.scenes.brick_flip(), dt=0.01, t_end=0.1).to_pandas()
+"""
+COMMAND = """
+sys.argv[0] = "conservative"
+from conservative.reports.cli.launch import launch
+launch()
+"""
+
+
+def test_a_lean_environment_integrates():
+    code, _, error = run_python(REFUSE + LEAN_RUN, others())
+    assert code == 0, error
+
+
+def test_what_a_lean_environment_lacks_is_refused():
+    code, _, error = run_python(REFUSE + "import pandas", others())
+    assert code == 1
+    assert "No module named 'pandas'" in error
+
+
+def test_a_table_names_its_extra():
+    code, _, error = run_python(REFUSE + LOOK + SHOWN, others())
+    assert code == 1
+    assert "Trajectory.to_pandas: got an environment without pandas" in error.splitlines()[-1]
+    assert "pip install 'conservative-rotation[report]'" in error.splitlines()[-1]
+
+
+COMMANDS = [
+    ("", "click", "report"),
+    ("list", "rich", "report"),
+    ("run brick_flip", "rich", "report"),
+    ("report --quick", "altair", "report"),
+    ("recommend brick_flip", "vl_convert", "report"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "without", "extra"), COMMANDS, ids=[row[0] or "conservative" for row in COMMANDS])
+def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, extra):
+    code, out, error = run_python(REFUSE + LOOK + COMMAND, without, *arguments.split())
+    assert (code, out) == (2, "")
+    assert len(error.splitlines()) == 1
+    what = " ".join(["conservative", *arguments.split()[:1]])
+    assert f"{what}: got an environment without {without}" in error
+    assert f"pip install 'conservative-rotation[{extra}]'" in error
+
+
+def test_the_gate_needs_no_table_library():
+    gate = "import conservative.benchmarks.suite.test_speed, conservative.reports.cli.gate, conservative.reports.cli.main"
+    code, _, error = run_python(REFUSE + gate, "pandas,altair,vl_convert,jinja2,rich,mujoco,pinocchio")
+    assert code == 0, error

@@ -1,0 +1,96 @@
+"""No file but a method's own knows the method by its name or class, but for those listed here with what they know and why."""
+
+import ast
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+from conservative import registry
+
+from .environments import ROOT
+from .test_house import sources
+
+ALLOWED = {
+    "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped", "the public names"),
+    "conservative/entry_points.py": ("reduced", "the default of every option that names a method"),
+    "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
+    "conservative/integration.py": ("reduced", "the default of `integrate`"),
+    "conservative/methods/moser_veselov.py": ("exact", "one of its orders"),
+    "conservative/methods/reduced.py": ("convected mujoco", "goals of its speed, and the paper's form that it agrees with"),
+    "conservative/methods/substepped.py": ("reduced", "the default that it divides"),
+    "references/engines/model_files.py": ("mujoco pinocchio", "formats of files, each read by the package that defines it"),
+    "references/heyoka_equations/forms.py": ("heyoka", "the package whose expressions it writes"),
+    "references/precise.py": ("heyoka", "the package that it runs on"),
+    "references/truth.py": ("exact precise scipy", "which truth a scene has, by the table at its top"),
+    "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
+    "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
+    "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
+    "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
+    "reports/documentation/readme_pictures.py": (
+        "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy",
+        "what the pages picture",
+    ),
+    "reports/run/provenance.py": ("heyoka mujoco scipy", "packages whose versions a report names"),
+}
+"""Names that a file has beside those of its own methods, no more and no fewer, and why."""
+PATHS = [path.relative_to(ROOT).as_posix() for path in sources(ROOT)]
+
+
+def names_of_its_own(path):
+    """Return the names of the methods that a file has the class of."""
+    families = registry.list_families().items()
+    return {name for name, family in families if Path(inspect.getfile(family)).resolve() == ROOT / path}
+
+
+def names_of_methods(source):
+    """Return the names of registered methods that a source has, or has the class of, in texts or imports; not in docstrings."""
+    families = registry.list_families()
+    classes = {family.__name__: name for name, family in families.items()}
+    tree = ast.parse(source)
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            found |= families.keys() & {re.split(r"[:\s=]", node.value)[0]}
+        else:
+            found |= {classes[name] for name in identifiers(node) if name in classes}
+    return found
+
+
+def identifiers(node):
+    """Return the names that a node of a syntax tree refers to or imports."""
+    if isinstance(node, ast.ImportFrom | ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.id] if isinstance(node, ast.Name) else [node.attr] if isinstance(node, ast.Attribute) else []
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_no_method_is_known_by_name(path):
+    found = names_of_methods((ROOT / path).read_text(encoding="utf-8")) - names_of_its_own(path)
+    assert found == set(ALLOWED.get(path, ("",))[0].split())
+
+
+def test_what_is_allowed_is_a_file():
+    assert ALLOWED.keys() <= set(PATHS)
+
+
+def test_a_method_may_name_itself():
+    assert names_of_its_own("conservative/methods/gauss.py") == {"gauss"}
+    assert names_of_its_own("reports/tables/scene.py") == set()
+
+
+BREACHES = {
+    "COLOURS = {'reduced': BLUE}": {"reduced"},
+    "rows = table['method'].str.startswith('mujoco')": {"mujoco"},
+    "GOALS = ('mujoco:RK4', 100)": {"mujoco"},
+    "from .gauss import Gauss": {"gauss"},
+    "if isinstance(method, methods.Projected): pass": {"projected"},
+    "'''reduced, in prose'''\nexact = reduced = 1": set(),
+}
+
+
+@pytest.mark.parametrize("source", BREACHES)
+def test_a_name_is_found(source):
+    assert names_of_methods(source) == BREACHES[source]
