@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate, pairwise
 
 from conservative.benchmarks.studies import selection, studies
@@ -34,9 +35,6 @@ QUICK = 0.3
 class Plan:
     """What a report is made of.
 
-    `studies` is what is measured, in this order; the hard cases only where nobody asked for less. Studies of the same scenes
-    and methods share their truths.
-
     Raises
     ------
     BadInput
@@ -51,15 +49,20 @@ class Plan:
     skip_missing: bool = False
     png: bool = False
     hard: bool = False
-    studies: tuple[Study, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.skip_missing:
             for method in self.methods:
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
+
+    @cached_property
+    def studies(self) -> tuple[Study, ...]:
+        """What is measured, in this order; the hard cases only where nobody asked for less.
+
+        Studies of the same scenes and methods share their truths.
+        """
         crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing)
-        every = (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
-        object.__setattr__(self, "studies", every)
+        return (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
 
     @property
     def names(self) -> tuple[str, ...]:
