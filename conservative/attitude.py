@@ -99,9 +99,13 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
     return from_quaternion(np.concatenate([[np.cos(half)], np.sin(half) * n]))
 
 
-def axes_about(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,); of e_z no rotation at all."""
-    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3]
+def axes_about(axis: Array, beside: int | None = None) -> Array:
+    """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,).
+
+    The first column is at right angles to the coordinate axis number `beside`, which must not be along `axis`; by default it is
+    the one with which e_z gives no rotation at all.
+    """
+    other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3 if beside is None else beside]
     first = np.cross(other, axis)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(axis, first), axis], axis=1)
