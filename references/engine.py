@@ -120,7 +120,7 @@ def symmetric_axes(scene: Scene) -> Axes | None:
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
-    # Not the axes that our kernels take: heyoka's tolerance is relative to the state, so others move its errors by some per cent.
+    # Not the axes of our kernels: heyoka's tolerance is relative to the state, and others move its errors by some per cent.
     R_BF = axes_about(axis, beside=int(np.argmin(np.abs(axis))))
     return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 
