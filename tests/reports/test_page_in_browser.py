@@ -170,12 +170,16 @@ def test_texts_sort_too(opened):
     assert all(found[k] == found[k - 1] or found[k] not in found[:k] for k in range(1, len(found)))  # equal ones together
 
 
+def load_axe(opened):
+    axe = Path(find_spec("axe_core_python").submodule_search_locations[0]) / "axe.min.js"
+    opened.execute_script(axe.read_text(encoding="utf-8"))
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_serious_violation(opened, scheme):
     opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
     wait(opened, f"return document.documentElement.dataset.drawn === '{scheme}'")
-    axe = Path(find_spec("axe_core_python").submodule_search_locations[0]) / "axe.min.js"
-    opened.execute_script(axe.read_text(encoding="utf-8"))
+    load_axe(opened)
     opened.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true })")
     # What is inside a chart is a picture (role="img") with a name; its thousands of marks would take a minute.
     found = opened.execute_async_script("axe.run({exclude: [['.chart svg']]}).then(arguments[0])")
@@ -188,6 +192,7 @@ def test_axe_finds_no_serious_violation(opened, scheme):
 
 def test_a_control_that_is_bad_is_found_by_axe(opened):
     """The check before this one can fail: a button without a name is a critical violation."""
+    load_axe(opened)
     opened.execute_script("document.body.insertAdjacentHTML('beforeend', '<button id=nameless></button>')")
     found = opened.execute_async_script("axe.run('#nameless').then(arguments[0])")
     opened.execute_script("document.getElementById('nameless').remove()")
