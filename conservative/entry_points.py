@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .shapes import MassDistribution
 
 METHODS, SCENES, BODY_FILES = "conservative.methods", "conservative.scenes", "conservative.body_files"
+ENGINES = "conservative.engines"
 """Groups of entry points; `conservative.registry` says what stands in each."""
 DEFAULT_METHOD = "reduced"
 """Name of the method where nobody names one: that of `Reduced()`, which is the default of `integrate`."""

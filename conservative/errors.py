@@ -123,6 +123,7 @@ class AccuracyNotReached(UserWarning):
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka"),
+        "environments": ("uv", "platformdirs"),
         "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }

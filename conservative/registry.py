@@ -9,7 +9,11 @@
     [project.entry-points."conservative.body_files"]
     my_format = "my_package.my_file:body_from_my_format"    # a function of a path and a name, returning a MassDistribution
 
-A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`.
+    [project.entry-points."conservative.engines"]
+    my_engine = "my_package.my_engine:MyEngine"         # a class derived from conservative.references' EngineMethod
+
+A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`. An engine
+that runs in an environment of its own is named alike, `exudyn:RK44`, with its version if need be: `mujoco@3.6.0:RK4`.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from .entry_points import METHODS, SCENES, list_entries, load_entry
+from .entry_points import ENGINES, METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
@@ -32,6 +36,24 @@ def list_scenes() -> tuple[str, ...]:
 def list_methods() -> tuple[str, ...]:
     """Return the names of all registered methods, in their order; none is imported."""
     return tuple(list_entries(METHODS))
+
+
+def list_engines() -> tuple[str, ...]:
+    """Return the names of all engines that run in environments of their own, in their order; none is imported."""
+    return tuple(list_entries(ENGINES))
+
+
+def engine(name: str) -> Any:
+    """Return the class of an engine that runs in an environment of its own.
+
+    Raises
+    ------
+    BadInput
+        The name is unknown.
+    NotLoadable
+        It is registered, but importing what is registered fails.
+    """
+    return load_entry(ENGINES, "engine", name)
 
 
 def scene(text: str) -> Scene:
@@ -67,11 +89,23 @@ def method(text: str) -> Method:
         The engine is not installed.
     """
     name, settings = _split(text)
-    family: type[Method] = load_entry(METHODS, "method", name)
+    family = _load_method(name)
     if getattr(family, "family", None) != name:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
     return family(**_arguments(f"method {name}", family, settings))
+
+
+def _load_method(name: str) -> type[Method]:
+    """Return the class that runs in this process, or in an environment: where a version is named, or there is no other."""
+    base, _, version = name.partition("@")
+    if name in list_entries(METHODS) or base not in list_entries(ENGINES):
+        known = [*list_entries(METHODS), *list_entries(ENGINES)]
+        if base not in list_entries(METHODS):
+            raise BadInput("method", repr(name), nearest(name, known))
+        found: type[Method] = load_entry(METHODS, "method", name)
+        return found
+    return engine(base).at(version) if version else engine(base)
 
 
 def list_families() -> dict[str, type[Method]]:

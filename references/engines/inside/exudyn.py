@@ -1,0 +1,63 @@
+"""Exudyn in its environment. Source: its documentation, Solvers: explicit and implicit time integration; CreateRigidBody."""
+
+import numpy as np
+
+EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "VelocityVerlet")
+
+
+def prepare(given):
+    """Return a run of one free rigid body on the node that Exudyn's Lie group integrators take."""
+    import exudyn as exu
+    from exudyn.utilities import RigidBodyInertia, SensorBody
+
+    mbs = exu.SystemContainer().AddSystem()
+    body = mbs.CreateRigidBody(
+        inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
+        nodeType=exu.NodeType.RotationRotationVector,  # with Euler parameters the explicit integrators raise
+        referenceRotationMatrix=_matrix(given.q0),
+        initialAngularVelocity=_matrix(given.q0) @ given.w0,  # world axes
+        gravity=[0, 0, 0],
+    )
+    outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
+    sampled = len(given.steps) > 2
+    sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
+    mbs.Assemble()
+    settings, solver = _settings(exu, given), getattr(exu.DynamicSolverType, given.integrator)
+    start = _matrix(given.q0).ravel(), np.array(given.w0)
+
+    def run():
+        mbs.SolveDynamic(settings, solverType=solver)
+        end = [np.array(mbs.GetObjectOutputBody(body, output, [0, 0, 0])).ravel() for output in outputs]
+        between = [mbs.GetSensorStoredData(sensor)[1:-1, 1:] for sensor in sensors] or [np.empty((0, 9)), np.empty((0, 3))]
+        R, w = (np.vstack(parts) for parts in zip(start, between, end))
+        return {"R": R.reshape(-1, 3, 3), "w": w}
+
+    return run
+
+
+def _settings(exu, given):
+    settings = exu.SimulationSettings()
+    settings.solutionSettings.writeSolutionToFile = False
+    settings.solutionSettings.sensorsWritePeriod = given.steps[1] * given.dt
+    time = settings.timeIntegration
+    time.numberOfSteps, time.endTime, time.verboseMode = given.n_steps, given.n_steps * given.dt, 0
+    time.automaticStepSize = False  # fixed steps with DOPRI5, too
+    if given.integrator in EXPLICIT:
+        time.explicitIntegration.useLieGroupIntegration = True
+        time.explicitIntegration.computeEndOfStepAccelerations = False
+    else:
+        time.newton.useModifiedNewton = False
+        time.newton.relativeTolerance, time.newton.absoluteTolerance = 1e-12, 1e-14
+        time.newton.numericalDifferentiation.minimumCoordinateSize = 1
+    return settings
+
+
+def _matrix(q):
+    s, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)],
+            [2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)],
+            [2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

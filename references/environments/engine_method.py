@@ -1,0 +1,231 @@
+"""A method whose engine runs in an environment: what every adapter shares, and how scenes and samples travel."""
+
+from __future__ import annotations
+
+import inspect
+import weakref
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter_ns
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from conservative import registry
+from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.errors import IntegrationFailed, Unsupported
+from conservative.method import Grid, Method, Role, Run
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory
+
+from ..engine import Axes, mass_model, mass_model_reason, principal_axes
+from .catalogue import Distribution
+from .client import Worker
+from .environment import Environment, find_environment
+from .failures import EngineCrashed
+from .workers import worker_of
+
+
+class EngineMethod(Method):
+    """An engine in an environment of its own.
+
+    A subclass is a frozen dataclass of the engine's settings, which are plain values. What runs in the environment is the file
+    `inside/FAMILY.py` beside its own, with a function `prepare(given)`; `describe` says what `given` has.
+
+    Attributes
+    ----------
+    distribution
+        What is installed for the engine.
+    version
+        Version of the engine; empty for the newest that is installed. `at` makes the class of another one.
+    precision
+        Of its numbers: "f64" or "f32".
+    variables
+        Variables of the worker's process.
+    """
+
+    role: ClassVar[Role] = Role.ENGINE
+    distribution: ClassVar[Distribution]
+    version: ClassVar[str] = ""
+    precision: ClassVar[str] = "f64"
+    variables: ClassVar[Mapping[str, str]] = MappingProxyType({})
+
+    def __post_init__(self) -> None:
+        """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
+        self.environment  # noqa: B018 - for its exception
+
+    @classmethod
+    def at(cls, version: str) -> type[EngineMethod]:
+        """Return the class of a version, whose family is `exudyn@1.13.6`."""
+        return _class_at(cls, version)
+
+    @property
+    def environment(self) -> Environment:
+        """Where it runs. Raises `MissingEnvironment` where that is not installed."""
+        return find_environment(self.engine, self.version)
+
+    @property
+    def engine(self) -> str:
+        """The engine's name, without a version."""
+        return self.family.partition("@")[0]
+
+    @property
+    def label(self) -> str:
+        precision = "" if self.precision == "f64" else f",{self.precision}"
+        return f"{self.engine}=={self.environment.version}/{self.setting}{precision}"
+
+    @property
+    @abstractmethod
+    def setting(self) -> str:
+        """The settings as the label has them."""
+
+    def unsupported(self, scene: Scene) -> str | None:
+        if scene.potential is not None:
+            return f"its adapter has free bodies, not {type(scene.potential).__name__}"
+        return mass_model_reason(scene)
+
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        environment, axes = self.environment, principal_axes(scene)
+        given = {"adapter": str(_inside(type(self))), **describe(axes, grid), **self._settings()}
+        run = WorkerRun(worker_of(environment, self.variables), given, Samples(axes, grid, self.label))
+        try:
+            run.prepare()
+        except NotImplementedError as error:
+            raise Unsupported("method", self.name, f"what {self.label} has: {error}") from None
+        except IntegrationFailed:
+            return run  # which fails again when it is called, and then says so in its trajectory
+        return run
+
+    def _settings(self) -> dict[str, Any]:
+        value: Any = self
+        return {field.name: getattr(self, field.name) for field in fields(value)}
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
+        return registry.method, (self.name,)
+
+
+@lru_cache(maxsize=256)
+def _class_at(cls: type[EngineMethod], version: str) -> type[EngineMethod]:
+    if cls.version:
+        return _class_at(cls.__mro__[1], version)
+    names = {"version": version, "family": f"{cls.family}@{version}", "__module__": cls.__module__, "__doc__": cls.__doc__}
+    return type(cls.__name__, (cls,), names)
+
+
+@lru_cache(maxsize=64)
+def _inside(cls: type[EngineMethod]) -> Path:
+    return Path(inspect.getfile(cls)).resolve().parent / "inside" / f"{cls.family.partition('@')[0]}.py"
+
+
+def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
+    """Return a scene and a grid as the plain numbers that an adapter is given, all in SI units.
+
+    `moments` (3,) about the fixed point or the centre of mass, `q0` (4,) the attitude of the principal axes F in the world,
+    scalar first, and `w0` (3,) the rates in F; `mass`, `com` (3,) in F, downward `gravity`, `moments_com` (3,) about the centre
+    of mass and `q_com` (4,), their axes in F; `free`, whether nothing holds the body; `dt`, `n_steps`, and `steps` (n,), the
+    numbers of steps after which the state is kept.
+    """
+    mass = mass_model(axes)
+    assert mass is not None  # `unsupported` has seen to it
+    return {
+        "moments": axes.J,
+        "q0": axes.q0,
+        "w0": axes.w0,
+        "mass": mass.mass,
+        "com": mass.com,
+        "gravity": mass.gravity,
+        "moments_com": mass.body.moments,
+        "q_com": to_quaternion(mass.body.R_BP),
+        "free": axes.scene.free,
+        "dt": grid.dt,
+        "n_steps": grid.n_steps,
+        "steps": grid.steps.astype(int),
+    }
+
+
+class Samples:
+    """Makes a trajectory of what a worker hands over: attitudes `q` (n, 4), scalar first, or `R` (n, 3, 3), and rates `w`."""
+
+    def __init__(self, axes: Axes, grid: Grid, label: str) -> None:
+        self.axes, self.grid, self.label = axes, grid, label
+
+    def trajectory(self, found: Mapping[str, Any]) -> Trajectory:
+        """Return the samples in body axes.
+
+        Raises
+        ------
+        EngineCrashed
+            They are not what the grid asks for.
+        """
+        R_WF = from_quaternion(found["q"]) if "q" in found else found["R"]
+        n = self.grid.n_samples
+        if R_WF.shape != (n, 3, 3) or found["w"].shape != (n, 3):
+            raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {found['w'].shape}, not {n} samples")
+        work = Counters(found.get("steps", self.grid.n_steps), evaluations=found.get("evaluations"))
+        reason = found.get("reason") or "the state is not finite"
+        return self.axes.trajectory(self.grid, self.label, _as_floats(R_WF), _as_floats(found["w"]), work, reason)
+
+    def failure(self, failure: IntegrationFailed) -> Trajectory:
+        """Return the trajectory without samples of a run whose engine did not answer."""
+        nothing = np.empty((0, 3))
+        return Trajectory(
+            self.axes.scene, np.empty(0), np.empty((0, 3, 3)), nothing, self.label, Counters(0), failure
+        )
+
+
+def _as_floats(values: Array) -> Array:
+    return np.asarray(values, float)
+
+
+class WorkerRun:
+    """A run in a worker. Calling it gives the trajectory; `wall_time` is how long calls last, the way to the worker left out."""
+
+    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Samples) -> None:
+        self._worker, self._given, self._samples = worker, given, samples
+        self._number, self._start = 0, 0
+        self._found: Mapping[str, Any] = {}
+
+    def __call__(self) -> Trajectory:
+        try:
+            self._found = self._ask("run")
+            return self._samples.trajectory(self._found)
+        except IntegrationFailed as failure:
+            return self._samples.failure(failure)
+
+    def wall_time(self, calls: int) -> float:
+        """Return the wall time of so many calls, s: of the engine, in a loop in its process, and of making trajectories here.
+
+        Raises
+        ------
+        EngineCrashed, EngineTimeout
+            The engine did not survive, or did not answer in time.
+        """
+        found = self._found or self._ask("run")
+        inside = float(self._ask("time", calls=calls)["seconds"])
+        start = perf_counter_ns()
+        for _ in range(calls):
+            self._samples.trajectory(found)
+        return inside + (perf_counter_ns() - start) * 1e-9
+
+    def prepare(self) -> None:
+        """Have the worker prepare the run, once in its life.
+
+        Raises
+        ------
+        EngineCrashed, EngineTimeout
+            The engine did not survive, or did not answer in time.
+        NotImplementedError
+            The engine does not have what is asked for.
+        """
+        if self._start == 0 or self._start != self._worker.starts or self._worker.pid is None:
+            self._number = self._worker.ask("prepare", **self._given)["run"]
+            self._start = self._worker.starts
+            weakref.finalize(self, self._worker.forget, self._start, self._number).atexit = False
+
+    def _ask(self, do: str, **values: Any) -> dict[str, Any]:
+        self.prepare()
+        return self._worker.ask(do, run=self._number, **values)

@@ -1,0 +1,126 @@
+"""Environments that are there: where they lie, what was recorded of each, and which one a name means.
+
+    FOLDER/exudyn/1.13.6/         a virtual environment
+    FOLDER/exudyn/1.13.6/record.json, lock.txt
+    FOLDER/temporary/             what is being made, and what engines write; `doctor` clears what is left there
+
+FOLDER is `engines` in the user's cache folder of this package, as platformdirs knows it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from conservative.errors import require_extra
+
+from .failures import MissingEnvironment
+
+RECORD, LOCK = "record.json", "lock.txt"
+"""What is written last into an environment, and the versions of all that is in it, with their hashes."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """An environment of an engine.
+
+    Attributes
+    ----------
+    engine, version
+        Its name here, such as `bsk`, and its version.
+    folder
+        Where it lies.
+    python
+        Version of its Python.
+    packages
+        All that is installed in it, as `name==version`.
+    """
+
+    engine: str
+    version: str
+    folder: Path
+    python: str
+    packages: tuple[str, ...]
+
+    @property
+    def interpreter(self) -> Path:
+        """Its Python."""
+        return interpreter_of(self.folder)
+
+    def write(self) -> None:
+        """Write the record, which makes a folder an environment."""
+        record = {name: value for name, value in asdict(self).items() if name != "folder"}
+        (self.folder / RECORD).write_text(json.dumps(record, indent=2), encoding="utf-8")
+
+
+def interpreter_of(folder: Path) -> Path:
+    """Return the Python of a virtual environment."""
+    return folder / "bin" / "python"
+
+
+def folder_of_all() -> Path:
+    """Return the folder of all environments; it need not be there.
+
+    Raises
+    ------
+    MissingExtra
+        platformdirs, of the extra `environments`, is not installed.
+    """
+    require_extra("engines in environments", "environments", "platformdirs")
+    from platformdirs import user_cache_path
+
+    return user_cache_path("conservative-rotation") / "engines"
+
+
+def temporary_folder() -> Path:
+    """Return the folder of what does not last; it is made where it is not there."""
+    folder = folder_of_all() / "temporary"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def read_environment(folder: Path) -> Environment | None:
+    """Return the environment in a folder; None where there is none, or none that is whole."""
+    try:
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        found = Environment(record["engine"], record["version"], folder, record["python"], tuple(record["packages"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return found if (found.engine, found.version) == (folder.parent.name, folder.name) else None
+
+
+def folders() -> Iterator[Path]:
+    """Yield the folder of each environment, be it whole or not."""
+    yield from (path for path in sorted(folder_of_all().glob("*/*")) if path.parent.name != "temporary" and path.is_dir())
+
+
+def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
+    """Return the environments of an engine, or all, that are whole: by name, older versions first."""
+    found = [environment for folder in folders() if (environment := read_environment(folder))]
+    mine = [environment for environment in found if engine in (None, environment.engine)]
+    return tuple(sorted(mine, key=lambda each: (each.engine, version_key(each.version))))
+
+
+def find_environment(engine: str, version: str = "") -> Environment:
+    """Return the environment of a version of an engine, by default of the newest one that is installed.
+
+    Raises
+    ------
+    MissingEnvironment
+        There is none.
+    """
+    found = list_environments(engine)
+    matching = [environment for environment in found if version in ("", environment.version)]
+    if not matching:
+        raise MissingEnvironment(engine, version, tuple(environment.version for environment in found))
+    return matching[-1]
+
+
+def version_key(version: str) -> tuple[tuple[int, int, str], ...]:
+    """Return what sorts versions: numbers by value, and 4.0.0rc1 before 4.0.0."""
+    parts = re.findall(r"\d+|[a-z]+", version.lower().partition("+")[0])
+    keys = [(1, int(part), "") if part.isdigit() else (2 if part == "post" else -1, 0, part) for part in parts]
+    return (*keys, (0, 0, ""))

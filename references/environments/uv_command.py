@@ -1,0 +1,124 @@
+"""uv, which makes environments: how it is run, and what its errors mean. Source: uv's reference, environment variables.
+
+It takes packages from where pip takes them: what pip's configuration says of indexes and folders is handed on, unless uv has a
+configuration of its own. It downloads no Python and keeps its own cache beside the environments.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+from conservative.errors import BadInput, require_extra
+
+from .environment import folder_of_all, temporary_folder
+
+_FROM_PIP = {
+    "index-url": "UV_DEFAULT_INDEX",
+    "extra-index-url": "UV_INDEX",
+    "find-links": "UV_FIND_LINKS",
+    "cert": "SSL_CERT_FILE",
+}
+_OF_UV = ("UV_DEFAULT_INDEX", "UV_INDEX", "UV_INDEX_URL", "UV_EXTRA_INDEX_URL", "UV_FIND_LINKS", "UV_NO_INDEX")
+
+
+class UvFailed(RuntimeError):
+    """uv ended with an error. Attribute: `words`, what it printed."""
+
+    def __init__(self, words: str) -> None:
+        self.words = re.sub(r"(?<=://)[^/@\s]+@", "", words)  # an index may have a password in its address
+        super().__init__(self.summary)
+
+    def says(self, *texts: str) -> bool:
+        """Return whether one of some texts is in what it printed."""
+        return any(text in self.words for text in texts)
+
+    @property
+    def no_wheel(self) -> bool:
+        """Whether there are files of that version, but no wheel for this Python and system."""
+        return self.says("no wheels with a matching", "has no usable wheels", "have no usable wheels", "Requires-Python") or (
+            re.search(r"depends on Python|does not satisfy Python", self.words) is not None
+        )
+
+    @property
+    def summary(self) -> str:
+        """What it says, in a line."""
+        lines = [line.strip() for line in self.words.splitlines() if line.strip()]
+        errors = [line for line in lines if line.startswith(("error:", "cause:", "×", "╰─▶"))] or lines[-1:]
+        return " ".join(errors[-1].split())[:300] if errors else "uv ended with an error"
+
+
+@lru_cache(maxsize=1)
+def _program() -> str:
+    require_extra("conservative engines", "environments", "uv", "platformdirs")
+    from uv import find_uv_bin
+
+    return find_uv_bin()
+
+
+def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -> str:
+    """Return what a command of uv prints.
+
+    Raises
+    ------
+    UvFailed
+        It ends with an error.
+    BadInput
+        There is no room on the disk.
+    """
+    done = subprocess.run(
+        [_program(), *map(str, arguments)],
+        input=stdin,
+        stdin=subprocess.DEVNULL if stdin is None else None,
+        cwd=temporary_folder(),  # where no project's configuration applies
+        env=_variables() | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == 0:
+        return done.stdout
+    failure = UvFailed(done.stderr)
+    if failure.says("No space left on device", "os error 28"):
+        raise BadInput("engines", f"{folder_of_all()} on a disk without room", "a cache folder with room, or `engines remove`")
+    raise failure
+
+
+def _variables() -> dict[str, str]:
+    """Return the variables that uv runs with."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    cache = {} if "UV_CACHE_DIR" in kept else {"UV_CACHE_DIR": str(folder_of_all().parent / "uv")}
+    always = {"UV_PYTHON_DOWNLOADS": "never", "UV_NO_PROGRESS": "1", "NO_COLOR": "1"}
+    return (_from_pip() if not set(_OF_UV) & set(kept) else {}) | kept | cache | always
+
+
+@lru_cache(maxsize=1)
+def _from_pip() -> dict[str, str]:
+    """Return what pip's configuration says, as uv's variables; with several indexes the best version counts, as with pip."""
+    found = {_FROM_PIP[key]: value for key, value in _pip_settings().items() if key in _FROM_PIP}
+    if "UV_FIND_LINKS" in found:
+        found["UV_FIND_LINKS"] = ",".join(found["UV_FIND_LINKS"].split())
+    return found | ({"UV_INDEX_STRATEGY": "unsafe-best-match"} if "UV_INDEX" in found else {})
+
+
+def _pip_settings() -> dict[str, str]:
+    """Return pip's settings by their names; those of variables count more than those of files."""
+    pip = [sys.executable, "-m", "pip"] if _has_pip() else [shutil.which("pip") or ""]
+    if not pip[0]:
+        return {}
+    done = subprocess.run([*pip, "config", "list"], capture_output=True, text=True, check=False, timeout=60)
+    lines = re.findall(r"^(\S+)\.([\w-]+)='(.*)'$", done.stdout, re.MULTILINE)
+    ranks = {"global": 0, "install": 1, ":env:": 2}
+    wanted = sorted((ranks[section], key, value) for section, key, value in lines if section in ranks)
+    return {key: value for _, key, value in wanted}
+
+
+def _has_pip() -> bool:
+    from importlib.util import find_spec
+
+    return find_spec("pip") is not None
