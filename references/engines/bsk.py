@@ -1,0 +1,65 @@
+"""Basilisk: its integrators on one free spacecraft hub. Source: its documentation, spacecraft and svIntegrators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice, finite_number
+from conservative.errors import BadInput
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+ORDERS = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
+
+
+@dataclass(frozen=True)
+class Basilisk(EngineMethod):
+    """Basilisk with one of its integrators, in its own loop (`ExecuteSimulation`).
+
+    A simulation cannot be started twice, so that making it is part of a call. Attitudes are modified Rodrigues parameters.
+
+    Parameters
+    ----------
+    integrator
+        "Euler", "RK2", "RK4", which is Basilisk's default, "RKF45" or "RKF78"; the latter two choose their own steps.
+    tol
+        Their absolute and relative tolerance, above 0 and below 1.
+
+    Raises
+    ------
+    BadInput
+        The integrator is unknown, or the tolerance out of range.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    integrator: str = "RK4"
+    tol: float = 1e-12
+
+    family: ClassVar[str] = "bsk"
+    distribution: ClassVar[Distribution] = Distribution("bsk", "Basilisk.simulation.spacecraft", oldest="2.8")
+
+    def __post_init__(self) -> None:
+        choice("integrator", self.integrator, tuple(ORDERS))
+        if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
+            raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
+        super().__post_init__()
+
+    @property
+    def setting(self) -> str:
+        return self.integrator + (f",tol={self.tol:g}" if self.order is None else "")
+
+    @property
+    def order(self) -> int | None:
+        return ORDERS[self.integrator]
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("RK2"), cls("RK4"), cls("RKF78")
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls("RK4"), cls("RKF78")

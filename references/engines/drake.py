@@ -1,0 +1,67 @@
+"""Drake: its discrete plant and its integrators on one free body. Source: its documentation, Simulator and IntegratorBase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice, finite_number
+from conservative.errors import BadInput
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+ORDERS = {
+    **{"discrete": 1, "explicit_euler": 1, "semi_explicit_euler": 1, "implicit_euler": 1, "velocity_implicit_euler": 1},
+    **{"runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3, "radau1": 1, "radau3": 3},
+}
+
+
+@dataclass(frozen=True)
+class Drake(EngineMethod):
+    """Drake with its discrete plant, or with one of its integrators, in its own loop (`Simulator.AdvanceTo`).
+
+    Parameters
+    ----------
+    integrator
+        "discrete" (the plant's own update), or one that Drake has for a continuous plant, such as "runge_kutta5".
+    accuracy
+        Relative accuracy, above 0 to 1, to which it chooses its own steps of at most dt; 0 for fixed steps of dt.
+
+    Raises
+    ------
+    BadInput
+        The integrator is unknown, or the accuracy out of range.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    integrator: str = "runge_kutta5"
+    accuracy: float = 0.0
+
+    family: ClassVar[str] = "drake"
+    distribution: ClassVar[Distribution] = Distribution("drake", "pydrake.all", oldest="1.40")
+
+    def __post_init__(self) -> None:
+        choice("integrator", self.integrator, tuple(ORDERS))
+        allowed = "a number above 0 up to 1, or 0 for fixed steps"
+        if not 0 <= finite_number("accuracy", self.accuracy, allowed) <= 1:
+            raise BadInput("accuracy", repr(self.accuracy), allowed)
+        super().__post_init__()
+
+    @property
+    def setting(self) -> str:
+        return self.integrator + (f",accuracy={self.accuracy:g}" if self.accuracy else "")
+
+    @property
+    def order(self) -> int | None:
+        return None if self.accuracy else ORDERS[self.integrator]
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return cls("discrete"), cls("runge_kutta3"), cls("runge_kutta5"), cls("runge_kutta3", 1e-10)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return cls("discrete"), cls("runge_kutta5")

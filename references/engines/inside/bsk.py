@@ -1,0 +1,53 @@
+"""Basilisk in its environment. Source: its documentation, module spacecraft; integrators (svIntegrators)."""
+
+import numpy as np
+
+ADAPTIVE = ("RKF45", "RKF78")
+
+
+def prepare(given):
+    """Return a run of one spacecraft hub in Basilisk's own loop; a simulation is made anew for each run."""
+
+    def run():
+        simulation, craft, recorder = _build(given)
+        simulation.ExecuteSimulation()
+        end = craft.scStateOutMsg.read()
+        sigma, w = np.array(recorder.sigma_BN), np.array(recorder.omega_BN_B)
+        q = _quaternion(np.vstack([sigma[: len(given.steps) - 1], [end.sigma_BN]]))
+        return {"q": q, "w": np.vstack([w[: len(given.steps) - 1], [end.omega_BN_B]])}
+
+    return run
+
+
+def _build(given):
+    from Basilisk.simulation import spacecraft, svIntegrators
+    from Basilisk.utilities import SimulationBaseClass
+
+    step = round(given.dt * 1e9)  # Basilisk counts nanoseconds
+    if abs(step * 1e-9 / given.dt - 1) > 1e-9:
+        raise NotImplementedError(f"Basilisk's time is in whole nanoseconds, which dt = {given.dt:g} s is not")
+    simulation = SimulationBaseClass.SimBaseClass()
+    simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", step))
+    craft = spacecraft.Spacecraft()
+    craft.ModelTag = "craft"
+    hub = craft.hub
+    hub.mHub, hub.r_BcB_B, hub.IHubPntBc_B = given.mass, [[0.0], [0.0], [0.0]], np.diag(given.moments).tolist()
+    hub.r_CN_NInit = hub.v_CN_NInit = [[0.0], [0.0], [0.0]]
+    hub.sigma_BNInit = (given.q0[1:, None] / (1 + given.q0[0])).tolist()
+    hub.omega_BN_BInit = given.w0[:, None].tolist()
+    simulation.AddModelToTask("task", craft)
+    integrator = getattr(svIntegrators, f"svIntegrator{given.integrator}")(craft)
+    craft.setIntegrator(integrator)
+    if given.integrator in ADAPTIVE:
+        integrator.absTol = integrator.relTol = given.tol
+    recorder = craft.scStateOutMsg.recorder(step * int(given.steps[1]))
+    simulation.AddModelToTask("task", recorder)
+    simulation.InitializeSimulation()
+    simulation.ConfigureStopTime(given.n_steps * step)
+    return simulation, craft, recorder
+
+
+def _quaternion(sigma):
+    """Return quaternions (n, 4), scalar first, of modified Rodrigues parameters (n, 3), be they those of the shadow set or not."""
+    square = np.sum(sigma**2, axis=1, keepdims=True)
+    return np.hstack([1 - square, 2 * sigma]) / (1 + square)

@@ -1,0 +1,119 @@
+"""MuJoCo, in this process or in its environment. Source: its documentation, Computation; Programming, mj_step and rollout."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+# All that MuJoCo computes in a step and one body without contacts, actuators, springs or sensors has no use for. Bits that a
+# version does not have are skipped. Autoreset would silently start a diverged run afresh.
+SWITCHED_OFF = (
+    *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
+    *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND", "MULTICCD"),
+)
+# Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
+ROLLOUT_UP_TO = 8
+
+
+def prepare(given):
+    """Return a run on a free joint, or on a ball joint at the fixed point, in MuJoCo's own loop."""
+    import mujoco as mj
+
+    mj.set_mju_user_warning(lambda message: None)  # they go into a file otherwise; they are read from the data instead
+    return prepare_with(mj, given)
+
+
+def prepare_with(mj, given):
+    """Return a run with a module `mujoco` that is there."""
+    model = _model(mj, given)
+    data = mj.MjData(model)
+    place = SimpleNamespace(mj=mj, model=model, data=data, start=_start(mj, model, data, given))
+    march = _roll_out if np.diff(given.steps).max() <= ROLLOUT_UP_TO else _step_to_samples
+    evaluations = given.n_steps * (4 if given.integrator == "RK4" else 1)
+
+    def run():
+        q, w, reason = march(place, given)
+        return {"q": q, "w": w, "reason": reason, "evaluations": evaluations}
+
+    return run
+
+
+def _model(mj, given):
+    """Return the compiled model: one body, its inertia about the centre of mass in that inertia's own principal axes."""
+    spec = mj.MjSpec()
+    spec.option.timestep = given.dt
+    spec.option.integrator = _integrator(mj, given.integrator)
+    spec.option.gravity = (0, 0, -given.gravity)
+    spec.option.disableflags = _switched_off(mj, "GRAVITY" if given.gravity == 0 else "")
+    body = spec.worldbody.add_body(name="body", explicitinertial=True, mass=given.mass, ipos=given.com)
+    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
+    moments = given.moments_com
+    body.inertia = np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
+    body.iquat = given.q_com  # scalar first
+    body.add_joint(type=mj.mjtJoint.mjJNT_FREE if given.free else mj.mjtJoint.mjJNT_BALL)
+    return spec.compile()
+
+
+def _integrator(mj, name):
+    found = getattr(mj.mjtIntegrator, f"mjINT_{name.upper()}", None)
+    if found is None:
+        has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
+        raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {name}, but {', '.join(has)}")
+    return found
+
+
+def _switched_off(mj, *more):
+    return sum(int(getattr(mj.mjtDisableBit, f"mjDSBL_{name}", 0)) for name in (*SWITCHED_OFF, *more))
+
+
+def _start(mj, model, data, given):
+    """Return MuJoCo's state vector (time, qpos, qvel) at the start.
+
+    qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
+    joint as for the ball joint (the free joint's translation, ahead of them, is zero).
+    """
+    mj.mj_resetData(model, data)
+    data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0
+    state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
+    mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)
+    return state
+
+
+def _roll_out(place, given):
+    """Return quaternions, rates and a reason from one call that stores every step."""
+    from mujoco.rollout import rollout
+
+    place.mj.mj_resetData(place.model, place.data)
+    states = np.empty((1, given.n_steps, len(place.start)))
+    rollout(place.model, place.data, place.start[None], nstep=given.n_steps, state=states)
+    states = np.concatenate([place.start[None], states[0]])
+    reason = _warning(place.mj, place.data)
+    if reason:
+        # The rollout fills what it could not compute with the last state it had, whose time then stands still.
+        states[1:][np.diff(states[:, 0]) <= 0] = np.nan
+    states = states[given.steps]
+    nq = 1 + place.model.nq
+    return states[:, nq - 4 : nq], states[:, nq + place.model.nv - 3 : nq + place.model.nv], reason
+
+
+def _step_to_samples(place, given):
+    """Return quaternions, rates and a reason, stepping from sample to sample inside the engine."""
+    mj, model, data = place.mj, place.model, place.data
+    mj.mj_resetData(model, data)
+    mj.mj_setState(model, data, place.start, mj.mjtState.mjSTATE_FULLPHYSICS)
+    q, w = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
+    q[0], w[0] = data.qpos[-4:], data.qvel[-3:]
+    for sample, n_steps in enumerate(np.diff(given.steps), start=1):
+        mj.mj_step(model, data, int(n_steps))
+        reason = _warning(mj, data)
+        if reason:
+            return q, w, reason
+        q[sample], w[sample] = data.qpos[-4:], data.qvel[-3:]
+    return q, w, ""
+
+
+def _warning(mj, data):
+    """Return the engine's own word for a state that it found bad, "" if it found none."""
+    for kind in ("BADQPOS", "BADQVEL", "BADQACC"):
+        if data.warning[int(getattr(mj.mjtWarning, f"mjWARN_{kind}"))].number:
+            return f"MuJoCo warned of {kind}"
+    return ""
