@@ -51,5 +51,12 @@ def _choose(drake, simulator, given):
     integrator = simulator.get_mutable_integrator()
     if given.accuracy:
         integrator.set_target_accuracy(given.accuracy)
-    elif integrator.supports_error_estimation():
+    else:
+        _fix_steps(integrator)
+
+
+def _fix_steps(integrator):
+    try:
         integrator.set_fixed_step_mode(True)
+    except RuntimeError:  # one without error estimates, whose steps are fixed
+        return

@@ -7,7 +7,7 @@ def prepare(given):
     """Return a run of one free rigid body without colliders; Rapier has no loop of its own."""
     import rapier3d as rp
 
-    place = rp.Rotation3(*map(float, given.q0))  # scalar first
+    place = rp.Rotation3(*map(float, given.q0)).scaled_axis
     spin = tuple(map(float, _turn(given.q0, given.w0)))
     mass = rp.MassProperties((0.0, 0.0, 0.0), float(given.mass), tuple(map(float, given.moments)), rp.Rotation3(1, 0, 0, 0))
 
@@ -20,7 +20,7 @@ def prepare(given):
         body = body.gyroscopic_forces(True)
         if not given.as_installed:
             body = body.can_sleep(False).allow_fast_rotation(True)
-        return world, world.add_body(body.build())
+        return world, world.rigid_bodies[world.add_body(body.build())]
 
     def run():
         world, body = build()
