@@ -98,14 +98,17 @@ def method(text: str) -> Method:
 
 def _load_method(name: str) -> type[Method]:
     """Return the class that runs in this process, or in an environment: where a version is named, or there is no other."""
-    base, _, version = name.partition("@")
-    if name in list_entries(METHODS) or base not in list_entries(ENGINES):
-        known = [*list_entries(METHODS), *list_entries(ENGINES)]
-        if base not in list_entries(METHODS):
-            raise BadInput("method", repr(name), nearest(name, known))
-        found: type[Method] = load_entry(METHODS, "method", name)
-        return found
-    return engine(base).at(version) if version else engine(base)
+    base, at, version = name.partition("@")
+    engines = list_entries(ENGINES)
+    known = set(engines) if at else {*engines, *list_entries(METHODS)}
+    if base not in known or bool(at) != bool(version):
+        raise BadInput("method", repr(name), nearest(base, known) + (", with @ and a version" if at else ""))
+    found: type[Method]
+    if at:
+        found = engine(base).at(version)
+    else:
+        found = load_entry(METHODS if name in list_entries(METHODS) else ENGINES, "method", name)
+    return found
 
 
 def list_families() -> dict[str, type[Method]]:

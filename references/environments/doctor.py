@@ -13,7 +13,7 @@ from conservative.errors import BadInput
 
 from .catalogue import distribution_of
 from .environment import LOCK, Environment, folder_of_all, folders, read_environment
-from .install import clear_temporary, drop, freeze, import_trouble, install, make
+from .install import clear_leftovers, drop, freeze, import_trouble, install, make
 from .lock import Lock, Source
 from .uv_command import UvFailed
 
@@ -39,7 +39,7 @@ class Finding:
 
 def examine(mend: bool = True, source: Source | None = None) -> Iterator[Finding]:
     """Yield a finding for each environment. With `mend`, those in trouble are made anew, or removed where they cannot be."""
-    for name in clear_temporary():
+    for name in clear_leftovers():
         yield Finding(name, "left by a process that ended in the middle", "removed")
     for folder in folders():
         name = f"{folder.parent.name}=={folder.name}"

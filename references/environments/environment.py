@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from conservative.errors import require_extra
+from conservative.files import write_text
 
 from .failures import MissingEnvironment
 
@@ -53,7 +54,7 @@ class Environment:
     def write(self) -> None:
         """Write the record, which makes a folder an environment."""
         record = {name: value for name, value in asdict(self).items() if name != "folder"}
-        (self.folder / RECORD).write_text(json.dumps(record, indent=2), encoding="utf-8")
+        write_text(self.folder / RECORD, json.dumps(record, indent=2), "engines")
 
 
 def interpreter_of(folder: Path) -> Path:
@@ -94,7 +95,8 @@ def read_environment(folder: Path) -> Environment | None:
 
 def folders() -> Iterator[Path]:
     """Yield the folder of each environment, be it whole or not."""
-    yield from (path for path in sorted(folder_of_all().glob("*/*")) if path.parent.name != "temporary" and path.is_dir())
+    found = (path for path in sorted(folder_of_all().glob("*/*")) if path.parent.name != "temporary" and path.is_dir())
+    yield from (path for path in found if not path.name.startswith("."))
 
 
 def list_environments(engine: str | None = None) -> tuple[Environment, ...]:

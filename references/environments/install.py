@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import platform
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
+from conservative.files import leftovers, temporary
+from conservative.files import remove as remove_tree
 
 from .catalogue import Distribution, distribution_of
 from .environment import (
@@ -61,12 +60,17 @@ def install(requirement: str, source: Source | None = None) -> Installation:
     source = source or Source()
     engine, version = split_requirement(requirement)
     distribution = distribution_of(engine)
-    clear_temporary()
+    clear_leftovers()
     lock = resolve(distribution, version, source)
     folder = folder_of_all() / engine / lock.version
     there = read_environment(folder)
     environment = there or make(engine, lock, folder, source)
     return Installation(environment, there is None, import_trouble(environment, distribution))
+
+
+def check(requirement: str) -> None:
+    """Check that a requirement can be read and its engine is known. Raise `BadInput` if not."""
+    distribution_of(split_requirement(requirement)[0])
 
 
 def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
@@ -77,29 +81,24 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
     BadInput
         A package cannot be had, or there is no room on the disk.
     """
-    with _scratch(engine) as scratch:
-        try:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with temporary(folder, _make_folder) as (scratch, _):
             _fill(scratch, lock, source)
-            environment = _describe(engine, lock, scratch)
-        except UvFailed as failure:
-            raise BadInput("engine", f"{engine}=={lock.version}", f"what uv can install ({failure.summary})") from None
-        except OSError as error:
-            raise BadInput("engines", f"{scratch}: {error.strerror}", "a cache folder that can be written, with room") from None
-        environment.write()
-        _replace(folder, scratch)
+            Environment(engine, lock.version, scratch, _python_of(scratch), freeze(scratch)).write()
+            _replace(folder, scratch)
+    except UvFailed as failure:
+        raise BadInput("engine", f"{engine}=={lock.version}", f"what uv can install ({failure.summary})") from None
+    except OSError as error:
+        raise BadInput("engines", f"{folder}: {error.strerror}", "a cache folder that can be written, with room") from None
     found = read_environment(folder)
     assert found is not None
     return found
 
 
-@contextmanager
-def _scratch(engine: str) -> Iterator[Path]:
-    """Yield a folder that goes with the block, unless it has another name by then; its own name says whose it is."""
-    folder = Path(tempfile.mkdtemp(prefix=f"{engine}-{os.getpid()}-", dir=temporary_folder()))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+def _make_folder(path: Path) -> int:
+    path.mkdir()
+    return os.open(path, os.O_RDONLY)
 
 
 def _fill(folder: Path, lock: Lock, source: Source) -> None:
@@ -107,10 +106,6 @@ def _fill(folder: Path, lock: Lock, source: Source) -> None:
     run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
     options = ("--quiet", "--require-hashes", "--python", interpreter_of(folder))
     run_uv("pip", "sync", *options, *source.options, folder / LOCK)
-
-
-def _describe(engine: str, lock: Lock, folder: Path) -> Environment:
-    return Environment(engine, lock.version, folder, _python_of(folder), freeze(folder))
 
 
 def freeze(folder: Path) -> tuple[str, ...]:
@@ -124,16 +119,15 @@ def _python_of(folder: Path) -> str:
 
 
 def _replace(folder: Path, scratch: Path) -> None:
-    """Give a folder its name; what has that name goes."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    """Give a folder its name, when all of it is on the disk; what has that name goes."""
+    os.sync()
     if folder.exists():
-        folder.rename(scratch.with_name(f"{scratch.name}-old"))
+        drop(folder)
     try:
         scratch.rename(folder)
     except OSError:  # another process was faster
         if read_environment(folder) is None:
             raise
-    shutil.rmtree(scratch.with_name(f"{scratch.name}-old"), ignore_errors=True)
 
 
 def import_trouble(environment: Environment, distribution: Distribution) -> str:
@@ -165,29 +159,33 @@ def remove(requirement: str) -> tuple[Environment, ...]:
 
 
 def drop(folder: Path) -> None:
-    """Remove a folder at once: under another name first, so that nothing half removed is ever used."""
+    """Remove a folder: under another name first, so that nothing half removed is ever used."""
     away = Path(tempfile.mkdtemp(prefix=f"removed-{os.getpid()}-", dir=temporary_folder()))
     folder.rename(away / folder.name)
-    shutil.rmtree(away, ignore_errors=True)
+    remove_tree(away)
 
 
-def clear_temporary() -> list[str]:
-    """Remove what processes have left in the temporary folder that are no more; return their names."""
-    left = [path for path in sorted(temporary_folder().iterdir()) if not _alive(path.name)]
+def clear_leftovers() -> list[str]:
+    """Remove what processes have left that were ended in the middle; return the names."""
+    left = [path for path in _leftovers() if path.exists()]
     for path in left:
-        shutil.rmtree(path, ignore_errors=True)
+        remove_tree(path)
     return [path.name for path in left]
 
 
+def _leftovers() -> Iterator[Path]:
+    for path in folder_of_all().glob("*/.*-*"):
+        yield from leftovers(path.with_name(path.name[1:].rpartition("-")[0]))
+    yield from (path for path in sorted(temporary_folder().iterdir()) if not _alive(path.name))
+
+
 def _alive(name: str) -> bool:
-    """Return whether the process is there whose number a name has before its last part."""
-    number = name.removesuffix("-old").rpartition("-")[0].rpartition("-")[2]
-    if not number.isdigit() or platform.system() == "Windows":
-        return False
+    """Return whether the process is there whose number a name such as `work-123-abc` has."""
+    number = name.split("-")[1] if name.count("-") >= 2 else ""
     try:
         os.kill(int(number), 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, ValueError):
         return False
-    except PermissionError:
+    except PermissionError:  # somebody else's process
         return True
     return True

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ..terminal.interrupts import Terminated, interruptible, notes
+from .engines import engines
 from .gate import gate
 from .list import list_all
 from .new import new
@@ -79,5 +80,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new):
+for command in (report, run, list_all, recommend, gate, new, engines):
     main.add_command(command)
