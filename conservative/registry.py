@@ -105,7 +105,7 @@ def _load_method(name: str) -> type[Method]:
         raise BadInput("method", repr(name), nearest(base, known) + (", with @ and a version" if at else ""))
     found: type[Method]
     if at:
-        found = engine(base).at(version)
+        found = engine(base).at_version(version)
     else:
         found = load_entry(METHODS if name in list_entries(METHODS) else ENGINES, "method", name)
     return found

@@ -8,7 +8,6 @@ an engine's loop would share the interpreter with.
 from __future__ import annotations
 
 import os
-import select
 import shutil
 import subprocess
 import tempfile
@@ -22,6 +21,7 @@ from typing import IO, Any
 
 from . import worker as program
 from .failures import EngineCrashed, EngineTimeout, describe_exit
+from .pipes import read_exactly, write_all
 
 TIME_LIMIT = 600.0
 """Time, s, after which a run that nobody has set another limit for is ended."""
@@ -60,7 +60,9 @@ class Worker:
     Attributes: `starts`, how often it was started.
     """
 
-    def __init__(self, python: Path, home: Path, work: Path, variables: Mapping[str, str] | None = None, memory: int = 0) -> None:
+    def __init__(
+        self, python: Path, home: Path, work: Path, variables: Mapping[str, str] | None = None, memory: int = 0
+    ) -> None:
         self._python, self._home, self._variables = python, home, dict(variables or {})
         self._folder, self._memory = work, memory or _memory()
         self._process: subprocess.Popen[bytes] | None = None
@@ -118,9 +120,11 @@ class Worker:
     def _exchange(self, request: bytes, limit: float) -> dict[str, Any]:
         deadline = monotonic() + limit
         process = self._running()
+        assert process.stdin is not None and process.stdout is not None
+        stdin, stdout = process.stdin, process.stdout
         try:
-            _write(process, request, deadline)
-            return program.unpack(lambda count: _read(process, count, deadline))
+            write_all(stdin, request, deadline)
+            return program.unpack(lambda count: read_exactly(stdout, count, deadline))
         except TimeoutError:
             self._end(at_once=True)
             raise EngineTimeout(limit) from None
@@ -215,36 +219,6 @@ def _stop(process: subprocess.Popen[bytes], at_once: bool) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-
-
-def _wait(descriptor: int, event: int, deadline: float) -> None:
-    """Wait until a pipe can be read or written, or its other end is gone."""
-    poll = select.poll()
-    poll.register(descriptor, event)
-    while not poll.poll(max(0.0, deadline - monotonic()) * 1000):
-        if monotonic() >= deadline:
-            raise TimeoutError
-
-
-def _read(process: subprocess.Popen[bytes], count: int, deadline: float) -> bytes:
-    assert process.stdout is not None
-    descriptor, parts = process.stdout.fileno(), []
-    while count:
-        _wait(descriptor, select.POLLIN, deadline)
-        part = os.read(descriptor, min(count, 1 << 20))
-        if not part:
-            raise EOFError
-        parts.append(part)
-        count -= len(part)
-    return b"".join(parts)
-
-
-def _write(process: subprocess.Popen[bytes], data: bytes, deadline: float) -> None:
-    assert process.stdin is not None
-    descriptor, rest = process.stdin.fileno(), memoryview(data)
-    while rest:
-        _wait(descriptor, select.POLLOUT, deadline)
-        rest = rest[os.write(descriptor, rest[: select.PIPE_BUF]) :]
 
 
 def _memory() -> int:

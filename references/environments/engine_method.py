@@ -41,7 +41,7 @@ class EngineMethod(Method):
     distribution
         What is installed for the engine.
     version
-        Version of the engine; empty for the newest that is installed. `at` makes the class of another one.
+        Version of the engine; empty for the newest that is installed. `at_version` makes the class of another one.
     precision
         Of its numbers: "f64" or "f32".
     variables
@@ -59,7 +59,7 @@ class EngineMethod(Method):
         self.environment  # noqa: B018 - for its exception
 
     @classmethod
-    def at(cls, version: str) -> type[EngineMethod]:
+    def at_version(cls, version: str) -> type[EngineMethod]:
         """Return the class of a version, whose family is `exudyn@1.13.6`."""
         return _class_at(cls, version)
 
@@ -90,7 +90,7 @@ class EngineMethod(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         environment, axes = self.environment, principal_axes(scene)
-        given = {"adapter": str(_inside(type(self))), **describe(axes, grid), **self._settings()}
+        given = {"adapter": str(_inside(type(self))), "settings": self._settings(), **describe(axes, grid)}
         run = WorkerRun(worker_of(environment, self.variables), given, Samples(axes, grid, self.label))
         try:
             run.prepare()
@@ -172,9 +172,7 @@ class Samples:
     def failure(self, failure: IntegrationFailed) -> Trajectory:
         """Return the trajectory without samples of a run whose engine did not answer."""
         nothing = np.empty((0, 3))
-        return Trajectory(
-            self.axes.scene, np.empty(0), np.empty((0, 3, 3)), nothing, self.label, Counters(0), failure
-        )
+        return Trajectory(self.axes.scene, np.empty(0), np.empty((0, 3, 3)), nothing, self.label, Counters(0), failure)
 
 
 def _as_floats(values: Array) -> Array:

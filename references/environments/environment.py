@@ -10,7 +10,6 @@ FOLDER is `engines` in the user's cache folder of this package, as platformdirs 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from conservative.errors import require_extra
 from conservative.files import write_text
 
 from .failures import MissingEnvironment
+from .versions import version_key
 
 RECORD, LOCK = "record.json", "lock.txt"
 """What is written last into an environment, and the versions of all that is in it, with their hashes."""
@@ -119,10 +119,3 @@ def find_environment(engine: str, version: str = "") -> Environment:
     if not matching:
         raise MissingEnvironment(engine, version, tuple(environment.version for environment in found))
     return matching[-1]
-
-
-def version_key(version: str) -> tuple[tuple[int, int, str], ...]:
-    """Return what sorts versions: numbers by value, and 4.0.0rc1 before 4.0.0."""
-    parts = re.findall(r"\d+|[a-z]+", version.lower().partition("+")[0])
-    keys = [(1, int(part), "") if part.isdigit() else (2 if part == "post" else -1, 0, part) for part in parts]
-    return (*keys, (0, 0, ""))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from difflib import get_close_matches
 
 from conservative.errors import IntegrationFailed, MissingEngine
 from conservative.outcome import Outcome, OutcomeKind
@@ -44,12 +43,3 @@ def describe_exit(code: int, last_words: str) -> str:
     how = f"exit code {code}" if code >= 0 else f"signal {-code}"
     name = "" if code >= 0 else f" ({signal.Signals(-code).name})" if -code in set(signal.Signals) else ""
     return f"{how}{name}" + (f": {last_words}" if last_words else "")
-
-
-def describe_versions(version: str, known: list[str]) -> str:
-    """Return what to say is allowed instead of a version that does not exist: the nearest one first."""
-    if not known:
-        return "a version that exists"
-    close = get_close_matches(version, known, n=1, cutoff=0.4)
-    listing = ", ".join(known[:20]) + (f" and {len(known) - 20} older ones" if len(known) > 20 else "")
-    return (f"{close[0]} (nearest), or " if close else "") + f"one of {listing}"

@@ -13,8 +13,8 @@ from pathlib import Path
 from conservative.errors import BadInput
 
 from .catalogue import Distribution
-from .failures import describe_versions
 from .uv_command import UvFailed, run_uv
+from .versions import describe_versions
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
 _VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
@@ -147,7 +147,9 @@ def _as_bad_input(package: str, version: str, failure: UvFailed, source: Source)
     if failure.says("there is no version of", "there are no versions of"):
         return BadInput("version", repr(wanted), describe_versions(version, list_versions(package, source)))
     if failure.says("Failed to fetch", "error sending request", "network was disabled"):
-        return BadInput("engines", f"no answer for {wanted!r} from where packages come from", "a network, or --find-links FOLDER")
+        return BadInput(
+            "engines", f"no answer for {wanted!r} from where packages come from", "a network, or --find-links FOLDER"
+        )
     if failure.says("was not found in"):
         place = "the package index" if source.find_links is None else str(source.find_links)
         return BadInput("engine", repr(wanted), f"a package that {place} has")

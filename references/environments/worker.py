@@ -100,9 +100,9 @@ class Adapters:
         importlib.import_module(module)
         return {"python": sys.version.split()[0]}
 
-    def prepare(self, adapter: str, **given: Any) -> Message:
-        """Prepare a run."""
-        run = self._load(adapter).prepare(SimpleNamespace(**given))
+    def prepare(self, adapter: str, settings: Message, **numbers: Any) -> Message:
+        """Prepare a run of a scene, which is numbers, with settings of the engine."""
+        run = self._load(adapter).prepare(SimpleNamespace(**numbers, **settings))
         self._count += 1
         self._runs[self._count] = run
         return {"run": self._count}

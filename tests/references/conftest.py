@@ -1,7 +1,12 @@
+import importlib
+
 import pytest
 
 import conservative as cv
+from conservative import deferred_imports
 from conservative.attitude import rotation_about
+
+from .trial_engine import Trial
 
 # Nothing special about any of these: turned body and world axes, an inertia with off-diagonal terms, a weight that is not 1.
 R_BP = rotation_about((1, 2, 3), 0.7)
@@ -35,3 +40,18 @@ def spun():
 def generic(request):
     """Return each of the four scenes above."""
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def trial_registered(tmp_path, monkeypatch):
+    """Register the engine of the tests, as a package that is installed does."""
+    info = tmp_path / "trial_engine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: trial_engine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{deferred_imports.ENGINES}]\ntrial = {Trial.__module__}:Trial\n")
+    with monkeypatch.context() as patch:
+        patch.syspath_prepend(tmp_path)
+        importlib.invalidate_caches()
+        deferred_imports.list_entries.cache_clear()
+        yield
+    deferred_imports.list_entries.cache_clear()

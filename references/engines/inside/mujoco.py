@@ -8,7 +8,18 @@ import numpy as np
 # version does not have are skipped. Autoreset would silently start a diverged run afresh.
 SWITCHED_OFF = (
     *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
-    *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND", "MULTICCD"),
+    *(
+        "FILTERPARENT",
+        "ACTUATION",
+        "REFSAFE",
+        "SENSOR",
+        "MIDPHASE",
+        "EULERDAMP",
+        "AUTORESET",
+        "NATIVECCD",
+        "ISLAND",
+        "MULTICCD",
+    ),
 )
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
 ROLLOUT_UP_TO = 8

@@ -1,0 +1,273 @@
+"""An engine in another process: what it finds, and everything that it can do wrong, which becomes an outcome and no more."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.benchmarks.studies.case import Case, Failure, attempt
+from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
+from conservative.method import grid_for
+from conservative.outcome import OutcomeKind
+from conservative.references.environments import environment, worker, workers
+from conservative.references.environments.client import Worker, time_limit
+from conservative.references.environments.failures import EngineCrashed, EngineTimeout
+
+from .trial_engine import Trial, make_environment
+
+SCENE = cv.scenes.brick_flip(t_end=0.5)
+DT = 0.01
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """A cache folder with an environment of the trial engine."""
+    cache = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        make_environment(environment.folder_of_all())
+    return cache
+
+
+@pytest.fixture(autouse=True)
+def folder(cache, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+    return environment.folder_of_all()
+
+
+def run(do, at="run", limit=60.0):
+    with time_limit(limit):
+        return cv.integrate(SCENE, DT, method=Trial(do, at), on_failure="return")
+
+
+def test_it_integrates_and_comes_back_in_body_axes():
+    truth = cv.integrate(SCENE, DT, method=registry.method("exact"))
+    found = run("integrate")
+    assert found.ok
+    assert found.label == "trial==1.0/integrate"
+    assert np.abs(found.R_WB - truth.R_WB).max() < 1e-6
+    assert np.abs(found.w_WB_B - truth.w_WB_B).max() < 1e-5
+    assert (found.counters.steps, found.counters.evaluations) == (50, 200)
+
+
+def test_samples_are_those_of_the_grid():
+    every = cv.integrate(SCENE, DT, method=Trial(), sample_every=7)
+    assert np.array_equal(every.R_WB, run("integrate").R_WB[[0, 7, 14, 21, 28, 35, 42, 49, 50]])
+
+
+CRASHES = {
+    "segfault": "signal 11 (SIGSEGV)",
+    "abort": "signal 6 (SIGABRT)",
+    "exit": "exit code 3",
+    "sys_exit": "SystemExit",
+    "raise": "KeyError: 'no such key'",
+    "babble": "an answer that cannot be read",
+    "import": "signal 11 (SIGSEGV)",
+    "shape": "it returned attitudes (50, 3, 3)",
+}
+
+
+@pytest.mark.parametrize("at", ["prepare", "run"])
+@pytest.mark.parametrize("do", CRASHES)
+def test_a_crash_is_an_outcome_and_the_next_run_a_fresh_start(do, at):
+    if do == "shape" and at == "prepare":
+        at = "run"
+    before = run("integrate")
+    found = run(do, at)
+    assert found.outcome.kind is OutcomeKind.CRASHED
+    assert found.outcome.reason.startswith(CRASHES[do])
+    assert len(found) == 0
+    assert np.array_equal(run("integrate").R_WB, before.R_WB)
+
+
+@pytest.mark.parametrize("do", ["hang", "spin", "lock"])
+def test_an_engine_that_hangs_is_ended_after_its_limit(do):
+    start = time.monotonic()
+    found = run(do, limit=0.5)
+    assert time.monotonic() - start < 60
+    assert str(found.outcome) == "timeout (after 0.5 s)"
+    assert run("integrate").ok
+
+
+def test_what_it_prints_disturbs_nothing(capfd):
+    assert run("print").ok
+    assert run("print", "prepare").ok
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_flood_of_output_ends_at_a_limit(folder):
+    run("flood")
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
+    assert max(sizes) <= worker.LARGEST_FILE
+
+
+def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
+    place = environment.read_environment(folder / "trial" / "1.0")
+    small = Worker(place.interpreter, folder / "home", environment.temporary_folder(), memory=1 << 29)
+    given = {"adapter": str(Path(__file__).parent / "inside" / "trial.py"), "settings": {"at": "prepare", "do": "allocate"}}
+    with pytest.raises(EngineCrashed, match="MemoryError|signal 9"):
+        small.ask("prepare", **given)
+    small.close()
+
+
+def test_what_it_writes_goes_with_it(folder):
+    assert run("leave").ok
+    workers.close_workers()
+    assert not list(folder.rglob("left_behind"))
+    assert not list(environment.temporary_folder().iterdir())
+
+
+def test_one_failure_harms_no_other_run():
+    grid = grid_for(SCENE, DT)
+    whole = Trial().prepare(SCENE, grid)
+    before = whole()
+    assert not Trial("segfault").prepare(SCENE, grid)().ok
+    assert np.array_equal(whole().R_WB, before.R_WB)  # prepared before the crash, and prepared again without being asked
+
+
+def test_what_an_engine_does_not_have_is_unsupported():
+    with pytest.raises(Unsupported, match="this version turns no bodies"):
+        Trial("refuse", "prepare").prepare(SCENE, grid_for(SCENE, DT))
+
+
+def test_studies_see_outcomes():
+    for do, kind in (("segfault", OutcomeKind.CRASHED), ("refuse", OutcomeKind.UNSUPPORTED), ("nan", OutcomeKind.DIVERGED)):
+        found = attempt(Case("test", SCENE, Trial(do, "prepare" if do == "refuse" else "run"), grid_for(SCENE, DT)))
+        assert isinstance(found, Failure)
+        assert found.outcome.kind is kind
+
+
+def test_integrate_raises_what_failed():
+    with pytest.raises(IntegrationFailed, match="signal 11"):
+        cv.integrate(SCENE, DT, method=Trial("segfault"))
+
+
+def test_a_process_that_is_killed_while_it_runs_is_a_crash():
+    run("integrate")
+    process = workers.worker_of(Trial().environment).pid
+    threading.Timer(0.3, os.kill, (process, signal.SIGKILL)).start()
+    assert str(run("hang").outcome) == "crashed (signal 9 (SIGKILL))"
+    assert run("integrate").ok
+
+
+def test_time_is_taken_inside():
+    timed = Trial().prepare(SCENE, grid_for(SCENE, DT))
+    assert timed.wall_time(1) > 0
+    assert timed.wall_time(20) > 3 * timed.wall_time(1)
+
+
+def test_a_timed_run_that_crashes_says_so():
+    timed = Trial("abort").prepare(SCENE, grid_for(SCENE, DT))
+    with pytest.raises(EngineCrashed, match="signal 6"):
+        timed.wall_time(3)
+
+
+def test_runs_in_threads_do_not_mix():
+    scenes = [cv.scenes.brick_flip(t_end=end) for end in (0.1, 0.2, 0.3, 0.4)]
+    found = {}
+    jobs = [threading.Thread(target=lambda s=s: found.update({s.t_end: len(Trial().run(s, DT))})) for s in scenes]
+    for job in jobs:
+        job.start()
+    for job in jobs:
+        job.join()
+    assert found == {0.1: 11, 0.2: 21, 0.3: 31, 0.4: 41}
+
+
+def _in_child(queue):
+    queue.put((workers.worker_of(Trial().environment).pid, len(run("integrate"))))
+
+
+def test_a_forked_process_has_a_worker_of_its_own():
+    run("integrate")
+    mine = workers.worker_of(Trial().environment)
+    starts = mine.starts
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=_in_child, args=(queue,))
+    child.start()
+    assert queue.get(timeout=60) == (None, 51)
+    child.join(60)
+    assert run("integrate").ok
+    assert mine.starts == starts
+
+
+def test_a_worker_ends_with_who_started_it(folder):
+    code = (
+        "import os, sys, threading, time\n"
+        "from pathlib import Path\n"
+        "from conservative.references.environments.client import Worker\n"
+        f"worker = Worker(Path({str(folder / 'trial/1.0/bin/python')!r}), Path(sys.argv[1]), Path(sys.argv[1]))\n"
+        f"given = dict(adapter={str(Path(__file__).parent / 'inside/trial.py')!r}, settings=dict(at='prepare', do='spin'))\n"
+        "worker.ask('check', module='os')\n"
+        "threading.Thread(target=worker.ask, args=('prepare',), kwargs=given, daemon=True).start()\n"
+        "time.sleep(0.5); print(worker.pid, flush=True); os._exit(0)\n"
+    )
+    from ..environments import run_python
+
+    status, out, errors = run_python(code, str(folder / "elsewhere"))
+    assert status == 0 or not errors, errors
+    assert _ends(int(out))
+
+
+def _ends(process):
+    for _ in range(600):
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def test_a_name_with_a_version_is_read_back(trial_registered):
+    for text in ("trial", "trial:segfault", "trial@1.0", "trial@1.0:do=print,at=prepare"):
+        method = registry.method(text)
+        assert registry.method(method.name) == method
+        assert pickle.loads(pickle.dumps(method)) == method
+    assert registry.method("trial@1.0").label == "trial==1.0/integrate"
+
+
+def test_a_version_that_is_not_installed_is_missing(trial_registered):
+    with pytest.raises(MissingEngine, match=r"'trial==2.0'.*installed are 1.0.*conservative engines install trial==2.0"):
+        registry.method("trial@2.0")
+
+
+def test_an_unknown_name_names_the_nearest(trial_registered):
+    with pytest.raises(cv.BadInput, match="'trial' \\(nearest\\)"):
+        registry.method("trail:segfault")
+    with pytest.raises(cv.BadInput, match="with @ and a version"):
+        registry.method("reduced@1.0")
+
+
+def test_messages_survive_the_way():
+    message = {"a": np.arange(6.0).reshape(2, 3), "b": [1, 2.5, None, "ä"], "c": np.float64(1) / 3, "d": np.empty((0, 3))}
+    data = memoryview(worker.pack(message))
+    found = worker.unpack(iter_bytes(data))
+    assert np.array_equal(found.pop("a"), message["a"])
+    assert found.pop("d").shape == (0, 3)
+    assert found == {"b": message["b"], "c": 1 / 3}
+
+
+def iter_bytes(data):
+    place = 0
+
+    def read(count):
+        nonlocal place
+        place += count
+        return bytes(data[place - count : place])
+
+    return read
+
+
+def test_a_timeout_names_its_limit():
+    assert "without an answer after 3 s" in str(EngineTimeout(3.0))

@@ -1,0 +1,47 @@
+"""The engine of the tests: our side of it, and an environment for it that is made of this one in no time."""
+
+import json
+import sys
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy
+
+from conservative.references.environments.catalogue import Distribution
+from conservative.references.environments.engine_method import EngineMethod
+
+from ..environments import Environment
+
+VERSION = "1.0"
+
+
+@dataclass(frozen=True)
+class Trial(EngineMethod):
+    """What it does on purpose, and whether in `prepare` or in `run`."""
+
+    do: str = "integrate"
+    at: str = "run"
+
+    family: ClassVar[str] = "trial"
+    distribution: ClassVar[Distribution] = Distribution("trial", "numpy")
+
+    @property
+    def setting(self):
+        return self.do
+
+    @property
+    def order(self):
+        return 4
+
+
+def make_environment(folder, version=VERSION):
+    """Make an environment of the trial engine in a folder of all environments."""
+    place = folder / "trial" / version
+    place.parent.mkdir(parents=True, exist_ok=True)
+    Environment.create(place)
+    (site,) = place.glob("lib/python*/site-packages")
+    (site / "dies_at_import.py").write_text("import os\nos.kill(os.getpid(), 11)\n")
+    packages = [f"numpy=={numpy.__version__}"]
+    record = {"engine": "trial", "version": version, "python": sys.version.split()[0], "packages": packages}
+    (place / "record.json").write_text(json.dumps(record))
+    return place
