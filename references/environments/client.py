@@ -120,8 +120,9 @@ class Worker:
     def _exchange(self, request: bytes, limit: float) -> dict[str, Any]:
         deadline = monotonic() + limit
         process = self._running()
-        assert process.stdin is not None and process.stdout is not None
         stdin, stdout = process.stdin, process.stdout
+        assert stdin is not None
+        assert stdout is not None
         try:
             write_all(stdin, request, deadline)
             return program.unpack(lambda count: read_exactly(stdout, count, deadline))
@@ -149,7 +150,7 @@ class Worker:
     def _start(self) -> subprocess.Popen[bytes]:
         self._home.mkdir(parents=True, exist_ok=True)
         self._work = Path(tempfile.mkdtemp(prefix=f"work-{os.getpid()}-", dir=self._folder))
-        self._output = tempfile.TemporaryFile(dir=self._work)
+        self._output = tempfile.TemporaryFile(dir=self._work)  # noqa: SIM115 - closed with the process
         inherited, self._life = os.pipe()
         try:
             return subprocess.Popen(

@@ -180,7 +180,7 @@ def _as_floats(values: Array) -> Array:
 
 
 class WorkerRun:
-    """A run in a worker. Calling it gives the trajectory; `wall_time` is how long calls last, the way to the worker left out."""
+    """A run in a worker. Calling it gives the trajectory; `wall_time` tells how long calls last, without the way to the worker."""
 
     def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Samples) -> None:
         self._worker, self._given, self._samples = worker, given, samples

@@ -114,7 +114,7 @@ def freeze(folder: Path) -> tuple[str, ...]:
 
 
 def _python_of(folder: Path) -> str:
-    ask = [interpreter_of(folder), "-I", "-c", "import platform; print(platform.python_version())"]
+    ask = [str(interpreter_of(folder)), "-I", "-c", "import platform; print(platform.python_version())"]
     return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
 
 

@@ -43,7 +43,7 @@ class Unreadable(Exception):
 
 def pack(message: Message) -> bytes:
     """Return a message as bytes; values that are NumPy arrays travel as they are, everything else as JSON."""
-    arrays = {name: value for name, value in message.items() if hasattr(value, "tobytes") and getattr(value, "shape", ())}
+    arrays = {name: value for name, value in message.items() if hasattr(value, "tobytes") and value.shape}
     kinds = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
     values = {name: value for name, value in message.items() if name not in arrays}
     header = json.dumps({**values, "arrays": kinds}, default=_plain).encode()

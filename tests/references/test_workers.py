@@ -113,7 +113,7 @@ def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
     place = environment.read_environment(folder / "trial" / "1.0")
     small = Worker(place.interpreter, folder / "home", environment.temporary_folder(), memory=1 << 29)
     given = {"adapter": str(Path(__file__).parent / "inside" / "trial.py"), "settings": {"at": "prepare", "do": "allocate"}}
-    with pytest.raises(EngineCrashed, match="MemoryError|signal 9"):
+    with pytest.raises(EngineCrashed, match=r"MemoryError|signal 9"):
         small.ask("prepare", **given)
     small.close()
 

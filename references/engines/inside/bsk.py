@@ -48,6 +48,6 @@ def _build(given):
 
 
 def _quaternion(sigma):
-    """Return quaternions (n, 4), scalar first, of modified Rodrigues parameters (n, 3), be they those of the shadow set or not."""
+    """Return quaternions (n, 4), scalar first, of modified Rodrigues parameters (n, 3), of the shadow set or not."""
     square = np.sum(sigma**2, axis=1, keepdims=True)
     return np.hstack([1 - square, 2 * sigma]) / (1 + square)

@@ -29,7 +29,7 @@ def prepare(given):
         mbs.SolveDynamic(settings, solverType=solver)
         end = [np.array(mbs.GetObjectOutputBody(body, output, [0, 0, 0])).ravel() for output in outputs]
         between = [mbs.GetSensorStoredData(sensor)[1:-1, 1:] for sensor in sensors] or [np.empty((0, 9)), np.empty((0, 3))]
-        R, w = (np.vstack(parts) for parts in zip(start, between, end))
+        R, w = (np.vstack(parts) for parts in zip(start, between, end, strict=True))
         return {"R": R.reshape(-1, 3, 3), "w": w}
 
     return run

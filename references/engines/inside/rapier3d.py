@@ -32,7 +32,7 @@ def prepare(given):
             turn, rate = body.rotation, body.angvel
             q[sample] = turn.w, turn.i, turn.j, turn.k
             w[sample] = rate.x, rate.y, rate.z
-        w[1:] = [_turn(q_ * (1, -1, -1, -1), w_) for q_, w_ in zip(q[1:], w[1:])]
+        w[1:] = [_turn(q_ * (1, -1, -1, -1), w_) for q_, w_ in zip(q[1:], w[1:], strict=True)]
         return {"q": q, "w": w}
 
     return run
