@@ -1,4 +1,7 @@
-"""Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip."""
+"""Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip.
+
+Those of real engines run with `pytest --engines exudyn,mujoco==3.6.0`, which installs what is not installed.
+"""
 
 import os
 import tarfile
@@ -11,14 +14,22 @@ from .environments import ROOT, build
 def pytest_addoption(parser):
     parser.addoption("--browser", action="store_true", help="Also run the tests that need chromium and its driver.")
 
+    parser.addoption("--engines", metavar="NAME[==VERSION],...", default="", help="Also run the tests of these engines.")
+
 
 def pytest_configure(config):
+    config.addinivalue_line("markers", "engine(name): needs an engine in an environment; runs with --engines name")
     config.addinivalue_line("markers", "browser: needs chromium; runs with --browser")
     for name in [name for name in os.environ if name.startswith("PYTEST_XDIST")]:
         del os.environ[name]  # a pytest that a test starts is no worker, and pytest-benchmark would take it for one
 
 
 def pytest_collection_modifyitems(config, items):
+    engines = set(filter(None, config.getoption("--engines").split(",")))
+    for item in items:
+        marker = item.get_closest_marker("engine")
+        if marker and not {marker.args[0], marker.args[0].partition("==")[0]} & engines:
+            item.add_marker(pytest.mark.skip(reason=f"needs {marker.args[0]}: runs with --engines {marker.args[0]}"))
     if config.getoption("--browser"):
         return
     for item in items:

@@ -45,7 +45,10 @@ def without_collector() -> Iterator[None]:
 
 
 def wall_time(run: Callable[[], Any], calls: int = 1) -> float:
-    """Return the wall time of `calls` calls, s."""
+    """Return the wall time of `calls` calls, s. A run that takes its own time, as one in another process does, tells it."""
+    own: Callable[[int], float] | None = getattr(run, "wall_time", None)
+    if own is not None:
+        return own(calls)
     start = perf_counter_ns()
     for _ in range(calls):
         run()

@@ -12,8 +12,7 @@ from conservative.scene import Scene
 from ..engine import gravity_or_free, mass_model_reason
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
-
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+from .mujoco import INTEGRATORS
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import subprocess
 import sys
@@ -52,7 +53,8 @@ def trouble_of(folder: Path) -> str:
     environment = read_environment(folder)
     if environment is None:
         return "it has no record that can be read"
-    return _python_trouble(environment) or _package_trouble(environment) or _import_trouble(environment)
+    checks = (_python_trouble, _package_trouble, _file_trouble, _import_trouble)
+    return next(filter(None, (check(environment) for check in checks)), "")
 
 
 def _python_trouble(environment: Environment) -> str:
@@ -71,6 +73,17 @@ def _package_trouble(environment: Environment) -> str:
     missing, foreign = set(environment.packages) - found, found - set(environment.packages)
     texts = [f"without {', '.join(sorted(missing))}"] * bool(missing) + [f"with {', '.join(sorted(foreign))}"] * bool(foreign)
     return " and ".join(texts)
+
+
+def _file_trouble(environment: Environment) -> str:
+    """Return which file is gone, or has another size than the list of its package says."""
+    for listing in environment.folder.glob("lib/python*/site-packages/*.dist-info/RECORD"):
+        with listing.open(encoding="utf-8", newline="") as file:
+            for name, _, size in csv.reader(file):
+                path = listing.parent.parent / name
+                if size and (not path.is_file() or path.stat().st_size != int(size)):
+                    return f"{name} is gone, or changed"
+    return ""
 
 
 def _import_trouble(environment: Environment) -> str:

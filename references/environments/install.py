@@ -119,8 +119,7 @@ def _python_of(folder: Path) -> str:
 
 
 def _replace(folder: Path, scratch: Path) -> None:
-    """Give a folder its name, when all of it is on the disk; what has that name goes."""
-    os.sync()
+    """Give a folder its name; what has that name goes."""
     if folder.exists():
         drop(folder)
     try:

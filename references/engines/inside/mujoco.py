@@ -38,7 +38,7 @@ def prepare_with(mj, given):
     model = _model(mj, given)
     data = mj.MjData(model)
     place = SimpleNamespace(mj=mj, model=model, data=data, start=_start(mj, model, data, given))
-    march = _roll_out if np.diff(given.steps).max() <= ROLLOUT_UP_TO else _step_to_samples
+    march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
     evaluations = given.n_steps * (4 if given.integrator == "RK4" else 1)
 
     def run():

@@ -1,0 +1,265 @@
+"""Environments are made whole or not at all, found broken, and mended: all from a folder of wheels, without a network."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.errors import MissingEngine
+from conservative.references.environments import doctor, environment, install, uv_command, versions
+from conservative.references.environments.lock import Source, split_requirement
+
+from ..environments import ROOT, variables
+from .local_wheels import write_numpy, write_sdist, write_wheel
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheels")
+    for version in ("1.0", "1.10", "1.9"):
+        write_wheel(folder, version)
+    write_numpy(folder)
+    return folder
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch, trial_registered):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return environment.folder_of_all()
+
+
+def installed(wheels, name="trial"):
+    return install.install(name, Source(wheels))
+
+
+def everything(folder):
+    """Return all files below a folder, but what uv keeps for itself and what Python compiles."""
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file() or path.is_symlink()}
+    return {name for name in names if "__pycache__" not in name}
+
+
+def test_the_newest_version_is_installed_with_numpy_and_recorded(cache, wheels):
+    done = installed(wheels)
+    found = done.environment
+    assert (found.engine, found.version, done.new, done.trouble) == ("trial", "1.10", True, "")
+    assert [package.partition("==")[0] for package in found.packages] == ["numpy", "trial"]
+    assert environment.list_environments() == (found,)
+    lock = (found.folder / environment.LOCK).read_text()
+    assert "trial==1.10" in lock
+    assert "--hash=sha256:" in lock
+
+
+def test_what_is_there_is_not_made_again(cache, wheels):
+    before = installed(wheels, "trial==1.9").environment
+    stamp = (before.folder / environment.RECORD).stat().st_mtime_ns
+    assert not installed(wheels, "trial==1.9").new
+    assert (before.folder / environment.RECORD).stat().st_mtime_ns == stamp
+
+
+def test_versions_live_side_by_side_and_go_one_by_one(cache, wheels):
+    for version in ("1.0", "1.10", "1.9"):
+        installed(wheels, f"trial=={version}")
+    assert [found.version for found in environment.list_environments("trial")] == ["1.0", "1.9", "1.10"]
+    assert registry.method("trial").label == "trial==1.10/integrate"
+    assert [found.version for found in install.remove("trial==1.10")] == ["1.10"]
+    assert registry.method("trial").label == "trial==1.9/integrate"
+    assert len(install.remove("trial")) == 2
+    with pytest.raises(MissingEngine, match="conservative engines install trial"):
+        registry.method("trial")
+    with pytest.raises(MissingEngine):
+        install.remove("trial")
+
+
+def test_an_engine_integrates_where_it_was_installed(cache, wheels):
+    installed(wheels)
+    assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial@1.10")).ok
+
+
+def test_nothing_is_written_elsewhere(cache, wheels, tmp_path):
+    before = everything(tmp_path) | everything(wheels)
+    installed(wheels)
+    outside = everything(tmp_path) | everything(wheels)
+    assert {name for name in outside - before if not name.startswith("cache/conservative-rotation/")} == set()
+
+
+BAD = [
+    "trial; rm -rf /",
+    "trial==1.0 && true",
+    "$(id)",
+    "../trial",
+    "",
+    "trial==",
+    "trial=1",
+    "-r",
+    "trial==1.0;x",
+    "a b",
+    "trial>1",
+]
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_name_with_anything_odd_in_it_is_refused(text):
+    with pytest.raises(cv.BadInput, match="NAME or NAME==VERSION"):
+        split_requirement(text)
+
+
+def test_an_unknown_engine_names_the_nearest(cache):
+    with pytest.raises(cv.BadInput, match=r"'trail'; allowed: 'trial' \(nearest\)"):
+        install.install("trail")
+
+
+def test_an_unknown_version_names_those_that_exist(cache, wheels, monkeypatch):
+    monkeypatch.setattr("conservative.references.environments.lock.list_versions", lambda *_: ["1.10", "1.9", "1.0"])
+    with pytest.raises(cv.BadInput, match=r"'trial==1.9.5'; allowed: 1.9 \(nearest\), or one of 1.10, 1.9, 1.0"):
+        installed(wheels, "trial==1.9.5")
+    assert versions.describe_versions("0.1", ["1.0", "2.0"]).startswith("1.0 (nearest)")
+
+
+def test_a_version_for_other_pythons_alone_is_refused(cache, tmp_path):
+    write_wheel(tmp_path, "2.0", "cp27-cp27m-any")
+    write_numpy(tmp_path)
+    with pytest.raises(cv.BadInput, match=r"'trial==2.0', which has no wheel for Python 3\.\d+.*--allow-build"):
+        installed(tmp_path, "trial==2.0")
+
+
+def test_no_code_of_a_package_runs_unless_allowed(cache, tmp_path):
+    marker = tmp_path / "it_ran"
+    write_sdist(tmp_path, marker)
+    write_numpy(tmp_path)
+    with pytest.raises(cv.BadInput, match="--allow-build"):
+        installed(tmp_path, "trial==3.0")
+    assert not marker.exists()
+
+
+def test_no_network_is_said(cache, monkeypatch):
+    monkeypatch.setenv("UV_DEFAULT_INDEX", "https://127.0.0.1:9/simple")
+    monkeypatch.setenv("UV_HTTP_RETRIES", "0")
+    with pytest.raises(
+        cv.BadInput, match="no answer for 'trial' from where packages come from; allowed: a network, or --find-links FOLDER"
+    ):
+        install.install("trial")
+
+
+def test_what_uv_says_has_no_password():
+    failure = uv_command.UvFailed("error: Failed to fetch: https://me:secret@somewhere/simple/x/")
+    assert "secret" not in str(failure)
+
+
+def test_an_engine_that_cannot_be_imported_is_said(cache, tmp_path):
+    write_wheel(tmp_path, "4.0", code="import os\nos.abort()\n")
+    write_numpy(tmp_path)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry.engine("trial").distribution.__class__, "module", "trial", raising=False)
+        done = installed(tmp_path, "trial==4.0")
+    assert done.environment.version == "4.0"
+
+
+# --------------------------------------------------------------------------------------------------- broken, and mended again
+
+
+def no_numpy(folder):
+    (path,) = folder.glob("lib/python*/site-packages/numpy/__init__.py")
+    path.unlink()
+
+
+def other_version(folder):
+    (path,) = folder.glob("lib/python*/site-packages/trial-1.10.dist-info/METADATA")
+    path.parent.rename(path.parent.with_name("trial-7.0.dist-info"))
+
+
+BREAKS = {
+    "Python gone": lambda folder: (folder / "bin" / "python").unlink(),
+    "record cut short": lambda folder: (folder / environment.RECORD).write_text('{"engine": "tri'),
+    "record gone": lambda folder: (folder / environment.RECORD).unlink(),
+    "record of another": lambda folder: (folder / environment.RECORD).write_text(json.dumps({"engine": "x"})),
+    "lock and record gone": lambda folder: [(folder / name).unlink() for name in (environment.LOCK, environment.RECORD)],
+    "NumPy broken": no_numpy,
+    "package gone": lambda folder: [shutil.rmtree(path) for path in folder.glob("lib/python*/site-packages/trial-*")],
+    "other version": other_version,
+    "everything gone": lambda folder: [shutil.rmtree(path) for path in folder.iterdir() if path.is_dir()],
+}
+
+
+def test_the_doctor_finds_and_mends(cache, wheels):
+    folder = installed(wheels).environment.folder
+    source = Source(wheels)
+    for name, broken in BREAKS.items():
+        assert doctor.trouble_of(folder) == ""
+        broken(folder)
+        assert doctor.trouble_of(folder), name
+        (mended,) = doctor.examine(True, source)
+        assert (mended.name, mended.remedy) == ("trial==1.10", "made anew"), name
+    assert [finding.trouble for finding in doctor.examine(False, source)] == [""]
+    assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial")).ok
+
+
+def test_what_cannot_be_mended_is_removed(cache, wheels, tmp_path):
+    installed(wheels)
+    no_numpy(environment.find_environment("trial").folder)
+    (finding,) = doctor.examine(True, Source(tmp_path))
+    assert finding.remedy.startswith("removed, as it cannot be made anew")
+    assert environment.list_environments() == ()
+
+
+# -------------------------------------------------------------------------------------------------------- ended in the middle
+
+INSTALL = (
+    "import sys; from pathlib import Path\n"
+    "from conservative.references.environments.install import install\n"
+    "from conservative.references.environments.lock import Source\n"
+    "print('start', flush=True); install('trial', Source(Path(sys.argv[1]))); print('whole', flush=True)"
+)
+
+
+def start_install(wheels):
+    command = [sys.executable, "-c", INSTALL, str(wheels)]
+    path = os.pathsep.join([str(ROOT), *sys.path])
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=variables(PYTHONPATH=path),
+        text=True,
+        start_new_session=True,
+    )
+
+
+def test_a_kill_leaves_nothing_half_installed(cache, wheels):
+    start = time.monotonic()
+    process = start_install(wheels)
+    assert process.communicate(timeout=120)[0] == "start\nwhole\n"
+    duration, whole = time.monotonic() - start, 0
+    for part in (0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
+        install.remove("trial")
+        process = start_install(wheels)
+        time.sleep(part * duration)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        for found in environment.list_environments():
+            assert doctor.trouble_of(found.folder) == ""
+            whole += 1
+        assert installed(wheels).trouble == ""
+        assert [path.name for path in (cache / "trial").iterdir()] == ["1.10"]
+    assert whole < 6
+
+
+def test_a_full_disk_leaves_nothing_and_is_said(wheels, tmp_path, monkeypatch, trial_registered):
+    small = tmp_path / "small"
+    small.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "none", small], capture_output=True, check=False).returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    try:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(small))
+        with pytest.raises(cv.BadInput, match=r"room"):
+            installed(wheels)
+        assert environment.list_environments() == ()
+        assert not list(environment.folder_of_all().glob("trial/*"))
+    finally:
+        subprocess.run(["umount", small], check=True)
