@@ -9,7 +9,7 @@ import pandas as pd
 
 def display_name(family: str, version: str, setting: str) -> str:
     """Return what to call a method: `mujoco 4.0.0 RK4`; ours without the version, which the end of the report has."""
-    return " ".join(filter(None, (family, version, setting)))
+    return " ".join(filter(None, (family, "" if "@" in family else version, setting)))
 
 
 def with_names(rows: pd.DataFrame) -> pd.DataFrame:

@@ -10,7 +10,6 @@ from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter_ns
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 from conservative import registry
@@ -41,15 +40,12 @@ class EngineMethod(Method):
         Version of the engine; empty for the newest that is installed. `at_version` makes the class of another one.
     precision
         Of its numbers: "f64" or "f32".
-    variables
-        Variables of the worker's process.
     """
 
     role: ClassVar[Role] = Role.ENGINE
     distribution: ClassVar[Distribution]
     version: ClassVar[str] = ""
     precision: ClassVar[str] = "f64"
-    variables: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
         """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
@@ -74,6 +70,11 @@ class EngineMethod(Method):
     def label(self) -> str:
         precision = "" if self.precision == "f64" else f",{self.precision}"
         return f"{self.engine}=={self.environment.version}/{self.setting}{precision}"
+
+    @property
+    def variables(self) -> Mapping[str, str]:
+        """Variables of the process that it runs in; runs with other ones have another process."""
+        return {}
 
     @property
     @abstractmethod

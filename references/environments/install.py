@@ -27,7 +27,7 @@ from .environment import (
 from .failures import EngineCrashed, EngineTimeout
 from .lock import Lock, Source, resolve, split_requirement
 from .uv_command import UvFailed, run_uv
-from .workers import worker_of
+from .workers import close_workers, worker_of
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def remove(requirement: str) -> tuple[Environment, ...]:
     found = list_environments(engine) if not version else ()
     found = found or (find_environment(engine, version),)
     for environment in found:
-        worker_of(environment).close()
+        close_workers(environment)
         drop(environment.folder)
     return found
 

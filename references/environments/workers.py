@@ -10,13 +10,16 @@ from threading import Lock
 from .client import Worker
 from .environment import Environment, temporary_folder
 
-_workers: dict[tuple[str, int], Worker] = {}
+_workers: dict[tuple[tuple[object, ...], int], Worker] = {}
 _lock = Lock()
 
 
 def worker_of(environment: Environment, variables: Mapping[str, str] | None = None) -> Worker:
-    """Return the worker of an environment. A forked process has workers of its own: two cannot share a pipe."""
-    key = str(environment.folder), os.getpid()
+    """Return the worker of an environment whose process has some variables beside ours.
+
+    A forked process has workers of its own, as two cannot share a pipe.
+    """
+    key = (str(environment.folder), *sorted((variables or {}).items())), os.getpid()
     with _lock:
         if key not in _workers:
             home = environment.folder / "home"
@@ -25,8 +28,8 @@ def worker_of(environment: Environment, variables: Mapping[str, str] | None = No
 
 
 @atexit.register
-def close_workers() -> None:
-    """End all workers of this process; each is started again when it is asked."""
-    for (_, process), worker in list(_workers.items()):
-        if process == os.getpid():
+def close_workers(environment: Environment | None = None) -> None:
+    """End the workers of an environment, by default all of this process; each is started again when it is asked."""
+    for ((folder, *_), process), worker in list(_workers.items()):
+        if process == os.getpid() and (environment is None or folder == str(environment.folder)):
             worker.close()

@@ -31,6 +31,13 @@ ROWS = {
     ("drake", "runge_kutta3"): (3.0, 2e-4, 3e-4, None),
     ("drake", "runge_kutta5"): (1.1e-4, 7e-9, 1e-8, 5),
     ("drake", "runge_kutta3,1e-10"): (1e-6, None, None, None),
+    ("dart", ""): ENERGY_GROWS,
+    ("pybullet", ""): ENERGY_GROWS,
+    ("pybullet", "maximal"): ENERGY_DECAYS,
+    ("pybullet", "as_installed=true"): (None, -0.94, None, None),
+    ("mjx", "Euler"): ENERGY_GROWS,
+    ("mjx", "RK4"): (1.6e-3, -2e-8, 2e-5, 2),
+    ("mjx", "RK4,f32"): (None, None, None, None),
     ("rapier3d", ""): (3.8e-2, 4e-4, 6e-3, None),
 }
 END = from_quaternion(np.array([0.674588396035547, -0.00844525823572897, 0.02003759177423751, 0.7378737483224409]))
@@ -55,7 +62,9 @@ def test_an_adapter_finds_what_a_plain_script_finds(engine, setting, figures):
     assert order is None or abs(np.log2(wrong[0] / wrong[1]) - order) < 0.3
 
 
-@pytest.mark.parametrize("engine", [pytest.param(each, marks=pytest.mark.engine(each)) for each in ("exudyn", "bsk", "drake")])
+@pytest.mark.parametrize(
+    "engine", [pytest.param(each, marks=pytest.mark.engine(each)) for each in ("exudyn", "bsk", "drake", "mjx")]
+)
 def test_samples_and_a_turned_start_are_those_of_the_grid(engine):
     scene = cv.scenes.turned_brick(t_end=0.5)
     install(engine)

@@ -1,0 +1,64 @@
+"""MJX: MuJoCo's integrators in JAX, on one free body. Source: MuJoCo's documentation, MJX."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+INTEGRATORS = ("Euler", "RK4", "implicitfast")
+
+
+@dataclass(frozen=True)
+class MJX(EngineMethod):
+    """MJX on a free joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+
+    Switched off: contacts and constraints.
+
+    Parameters
+    ----------
+    integrator
+        "Euler", "RK4" or "implicitfast".
+    precision
+        "f64" (JAX's `x64`) or "f32", which is JAX's default.
+
+    Raises
+    ------
+    BadInput
+        The integrator or the precision is unknown.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    integrator: str = "RK4"
+    precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
+
+    family: ClassVar[str] = "mjx"
+    distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
+
+    def __post_init__(self) -> None:
+        choice("integrator", self.integrator, INTEGRATORS)
+        choice("precision", self.precision, ("f64", "f32"))
+        super().__post_init__()
+
+    @property
+    def variables(self) -> Mapping[str, str]:
+        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
+
+    @property
+    def setting(self) -> str:
+        return self.integrator
+
+    @property
+    def order(self) -> int:
+        return 4 if self.integrator == "RK4" else 1
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return cls("Euler"), cls("implicitfast"), cls("RK4"), cls("RK4", "f32")
