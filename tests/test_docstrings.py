@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ def test_everything_in_all_is_walked():
 
 # --------------------------------------------------------------------------------------------------------------- the sources
 
+NO_FORMULAS = re.compile(r"\.(scenes|environments)\.")
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
     "conservative.declarations": "values",
@@ -58,7 +60,9 @@ def modules_with_formulas():
     yield from (
         name
         for name in public_modules()
-        if name not in WITHOUT_FORMULAS and ".scenes." not in name and not hasattr(importlib.import_module(name), "__path__")
+        if name not in WITHOUT_FORMULAS
+        and not NO_FORMULAS.search(name)
+        and not hasattr(importlib.import_module(name), "__path__")
     )
 
 

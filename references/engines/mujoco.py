@@ -79,6 +79,7 @@ class MuJoCo(Method):
         return gravity_or_free(scene) or mass_model_reason(scene)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
+        """Compile MuJoCo's model. Raises `Unsupported` for an integrator that this version does not have."""
         mj = load("mujoco", "mujoco", "MuJoCo")
         axes = principal_axes(scene)
         samples = Samples(axes, grid, self.label)

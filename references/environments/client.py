@@ -33,7 +33,7 @@ _limit: ContextVar[float] = ContextVar("limit", default=TIME_LIMIT)
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Give every request within the block so many s."""
+    """Give every request within the block so much time, in s."""
     token = _limit.set(seconds)
     try:
         yield

@@ -87,6 +87,7 @@ class EngineMethod(Method):
         return mass_model_reason(scene)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
+        """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
         environment, axes = self.environment, principal_axes(scene)
         given = {"adapter": str(_inside(type(self))), "settings": self._settings(), **describe(axes, grid)}
         run = WorkerRun(worker_of(environment, self.variables), given, Samples(axes, grid, self.label))

@@ -18,7 +18,7 @@ def _wait(descriptor: int, event: int, deadline: float) -> None:
 
 
 def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
-    """Return so many bytes. Raises EOFError where there are no more, and TimeoutError."""
+    """Return so many bytes until a deadline, in s. Raises EOFError where there are no more, and TimeoutError."""
     descriptor, parts = pipe.fileno(), []
     while count:
         _wait(descriptor, select.POLLIN, deadline)
@@ -31,7 +31,7 @@ def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
 
 
 def write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
-    """Write bytes. Raises BrokenPipeError where nobody reads them, and TimeoutError."""
+    """Write bytes until a deadline, in s. Raises BrokenPipeError where nobody reads them, and TimeoutError."""
     descriptor, rest = pipe.fileno(), memoryview(data)
     while rest:
         _wait(descriptor, select.POLLOUT, deadline)

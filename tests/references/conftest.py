@@ -5,8 +5,10 @@ import pytest
 import conservative as cv
 from conservative import deferred_imports
 from conservative.attitude import rotation_about
+from conservative.references.environments import environment
 
-from .trial_engine import Trial
+from .local_wheels import write_numpy, write_wheel
+from .trial_engine import Trial, make_environment
 
 # Nothing special about any of these: turned body and world axes, an inertia with off-diagonal terms, a weight that is not 1.
 R_BP = rotation_about((1, 2, 3), 0.7)
@@ -55,3 +57,37 @@ def trial_registered(tmp_path, monkeypatch):
         deferred_imports.list_entries.cache_clear()
         yield
     deferred_imports.list_entries.cache_clear()
+
+
+@pytest.fixture(scope="session")
+def trial_home(tmp_path_factory):
+    """A user's cache folder with an environment of the trial engine."""
+    home = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(home))
+        make_environment(environment.folder_of_all())
+    return home
+
+
+@pytest.fixture
+def trial_cache(trial_home, monkeypatch):
+    """The folder of all environments, of which the trial engine has one."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(trial_home))
+    return environment.folder_of_all()
+
+
+@pytest.fixture(scope="session")
+def wheels(tmp_path_factory):
+    """A folder of wheels of NumPy and of three versions of the trial engine's package."""
+    folder = tmp_path_factory.mktemp("wheels")
+    for version in ("1.0", "1.10", "1.9"):
+        write_wheel(folder, version)
+    write_numpy(folder)
+    return folder
+
+
+@pytest.fixture
+def no_environments(tmp_path, monkeypatch, trial_registered):
+    """The folder of all environments, of which there are none."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return environment.folder_of_all()

@@ -2,7 +2,6 @@
 
 import multiprocessing
 import os
-import pickle
 import signal
 import threading
 import time
@@ -14,33 +13,23 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.studies.case import Case, Failure, attempt
-from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
+from conservative.errors import IntegrationFailed, Unsupported
 from conservative.method import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.environments import environment, worker, workers
 from conservative.references.environments.client import Worker, time_limit
 from conservative.references.environments.failures import EngineCrashed, EngineTimeout
 
-from .trial_engine import Trial, make_environment
+from .trial_engine import Trial
 
 SCENE = cv.scenes.brick_flip(t_end=0.5)
 DT = 0.01
 
 
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    """A cache folder with an environment of the trial engine."""
-    cache = tmp_path_factory.mktemp("cache")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(cache))
-        make_environment(environment.folder_of_all())
-    return cache
-
-
 @pytest.fixture(autouse=True)
-def folder(cache, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
-    return environment.folder_of_all()
+def folder(trial_cache):
+    """The folder of all environments."""
+    return trial_cache
 
 
 def run(do, at="run", limit=60.0):
@@ -227,26 +216,6 @@ def _ends(process):
             return True
         time.sleep(0.1)
     return False
-
-
-def test_a_name_with_a_version_is_read_back(trial_registered):
-    for text in ("trial", "trial:segfault", "trial@1.0", "trial@1.0:do=print,at=prepare"):
-        method = registry.method(text)
-        assert registry.method(method.name) == method
-        assert pickle.loads(pickle.dumps(method)) == method
-    assert registry.method("trial@1.0").label == "trial==1.0/integrate"
-
-
-def test_a_version_that_is_not_installed_is_missing(trial_registered):
-    with pytest.raises(MissingEngine, match=r"'trial==2.0'.*installed are 1.0.*conservative engines install trial==2.0"):
-        registry.method("trial@2.0")
-
-
-def test_an_unknown_name_names_the_nearest(trial_registered):
-    with pytest.raises(cv.BadInput, match="'trial' \\(nearest\\)"):
-        registry.method("trail:segfault")
-    with pytest.raises(cv.BadInput, match="with @ and a version"):
-        registry.method("reduced@1.0")
 
 
 def test_messages_survive_the_way():
