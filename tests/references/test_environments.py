@@ -1,6 +1,5 @@
 """Environments are made whole or not at all, found broken, and mended: all from a folder of wheels, without a network."""
 
-
 import pytest
 
 import conservative as cv

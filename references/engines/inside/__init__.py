@@ -1,7 +1,8 @@
 """What runs in the environments of engines: a file for each, which imports NumPy and the engine, and nothing of ours.
 
-`prepare(given)` builds the engine's model from the plain numbers that `conservative.references.environments.engine_method`
+`prepare(given)` builds the engine's model from the plain numbers that `conservative.references.environments.plain_numbers`
 describes, and from the settings; it returns a run. A run starts afresh each time it is called and returns attitudes, `q`
-(n, 4), scalar first, or `R` (n, 3, 3), and rates `w` (n, 3), rad/s, all of the principal axes F, at `given.steps`.
+(n, 4), scalar first, or `R` (n, 3, 3), of the principal axes F, and rates, `w` (n, 3) in F or `w_W` in the world, rad/s, at
+`given.steps`.
 `NotImplementedError` with a reason says that this version of the engine does not have what is asked for.
 """

@@ -35,13 +35,7 @@ def _build(dart, given):
     body.setInertia(dart.dynamics.Inertia(given.mass, np.zeros(3), np.diag(given.moments)))
     world.addSkeleton(skeleton)
     place = dart.math.Isometry3()
-    place.set_rotation(_matrix(given.q0))
+    place.set_rotation(given.R0)
     joint.setPositions(dart.dynamics.FreeJoint.convertToPositions(place))
     joint.setVelocities(np.concatenate([given.w0, np.zeros(3)]))  # spatial velocity in body axes
     return world, joint, body
-
-
-def _matrix(q):
-    s, u = q[0], q[1:]
-    cross = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
-    return np.eye(3) + 2 * (s * cross + cross @ cross)

@@ -11,7 +11,7 @@ def prepare(given):
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
     pose = drake.RigidTransform(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)), np.zeros(3))
-    spin = drake.SpatialVelocity(pose.rotation().matrix() @ given.w0, np.zeros(3))
+    spin = drake.SpatialVelocity(given.w0_W, np.zeros(3))
     times = given.steps * given.dt
 
     def run():
@@ -23,8 +23,8 @@ def prepare(given):
         for sample, time in enumerate(times.tolist()):
             simulator.AdvanceTo(time)
             R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
-            w[sample] = R[sample].T @ plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
-        return {"R": R, "w": w}
+            w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
+        return {"R": R, "w_W": w}
 
     return run
 

@@ -14,8 +14,8 @@ def prepare(given):
     body = mbs.CreateRigidBody(
         inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
         nodeType=exu.NodeType.RotationRotationVector,  # with Euler parameters the explicit integrators raise
-        referenceRotationMatrix=_matrix(given.q0),
-        initialAngularVelocity=_matrix(given.q0) @ given.w0,  # world axes
+        referenceRotationMatrix=given.R0,
+        initialAngularVelocity=given.w0_W,
         gravity=[0, 0, 0],
     )
     outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
@@ -23,7 +23,7 @@ def prepare(given):
     sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
     mbs.Assemble()
     settings, solver = _settings(exu, given), getattr(exu.DynamicSolverType, given.integrator)
-    start = _matrix(given.q0).ravel(), np.array(given.w0)
+    start = given.R0.ravel(), given.w0
 
     def run():
         mbs.SolveDynamic(settings, solverType=solver)
@@ -50,14 +50,3 @@ def _settings(exu, given):
         time.newton.relativeTolerance, time.newton.absoluteTolerance = 1e-12, 1e-14
         time.newton.numericalDifferentiation.minimumCoordinateSize = 1
     return settings
-
-
-def _matrix(q):
-    s, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)],
-            [2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)],
-            [2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

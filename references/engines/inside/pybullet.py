@@ -22,7 +22,7 @@ def prepare(given):
         bullet.changeDynamics(body, -1, localInertiaDiagonal=given.moments.tolist(), physicsClientId=client)
         if not given.as_installed:
             _switch_off(bullet, body, client)
-        bullet.resetBaseVelocity(body, [0, 0, 0], _turn(given.q0, given.w0).tolist(), physicsClientId=client)
+        bullet.resetBaseVelocity(body, [0, 0, 0], given.w0_W.tolist(), physicsClientId=client)
         return body
 
     def run():
@@ -33,7 +33,7 @@ def prepare(given):
                 bullet.stepSimulation(client)
             x, y, z, s = bullet.getBasePositionAndOrientation(body, client)[1]
             q[sample], w[sample] = (s, x, y, z), bullet.getBaseVelocity(body, client)[1]
-        return {"q": q, "w": np.array([_turn(q_ * (1, -1, -1, -1), w_) for q_, w_ in zip(q, w, strict=True)])}
+        return {"q": q, "w_W": w}
 
     return run
 
@@ -43,9 +43,3 @@ def _switch_off(bullet, body, client):
     awake = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
     nothing = {"linearDamping": 0, "angularDamping": 0, "maxJointVelocity": 1e6}
     bullet.changeDynamics(body, -1, **nothing, activationState=awake, physicsClientId=client)
-
-
-def _turn(q, v):
-    """Return a vector turned by a quaternion, scalar first."""
-    s, u = q[0], q[1:]
-    return v + 2 * np.cross(u, np.cross(u, v) + s * v)

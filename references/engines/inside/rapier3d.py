@@ -8,7 +8,7 @@ def prepare(given):
     import rapier3d as rp
 
     place = rp.Rotation3(*map(float, given.q0)).scaled_axis
-    spin = tuple(map(float, _turn(given.q0, given.w0)))
+    spin = tuple(map(float, given.w0_W))
     mass = rp.MassProperties((0.0, 0.0, 0.0), float(given.mass), tuple(map(float, given.moments)), rp.Rotation3(1, 0, 0, 0))
 
     def build():
@@ -25,20 +25,13 @@ def prepare(given):
     def run():
         world, body = build()
         q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        q[0], w[0] = given.q0, given.w0
+        q[0], w[0] = given.q0, given.w0_W
         for sample, n_steps in enumerate(np.diff(given.steps).tolist(), start=1):
             for _ in range(n_steps):
                 world.step()
             turn, rate = body.rotation, body.angvel
             q[sample] = turn.w, turn.i, turn.j, turn.k
             w[sample] = rate.x, rate.y, rate.z
-        w[1:] = [_turn(q_ * (1, -1, -1, -1), w_) for q_, w_ in zip(q[1:], w[1:], strict=True)]
-        return {"q": q, "w": w}
+        return {"q": q, "w_W": w}
 
     return run
-
-
-def _turn(q, v):
-    """Return a vector turned by a quaternion, scalar first."""
-    s, u = q[0], q[1:]
-    return v + 2 * np.cross(u, np.cross(u, v) + s * v)
