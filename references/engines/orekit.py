@@ -1,0 +1,31 @@
+"""Orekit: the exact solution of the free body in Java. Source: its API reference, attitudes.TorqueFree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+
+@dataclass(frozen=True)
+class Orekit(EngineMethod):
+    """Orekit's `TorqueFree`: Jacobi's elliptic functions, evaluated at each sample. It needs a Java runtime on the machine.
+
+    Raises
+    ------
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    family: ClassVar[str] = "orekit"
+    distribution: ClassVar[Distribution] = Distribution("orekit-jpype", "orekit_jpype", oldest="13")
+
+    @property
+    def setting(self) -> str:
+        return "TorqueFree"
+
+    @property
+    def order(self) -> None:
+        return None
