@@ -107,6 +107,11 @@ class Worker:
         process = self._process
         return None if process is None or process.poll() is not None else process.pid
 
+    @property
+    def busy(self) -> bool:
+        """Whether it is being asked."""
+        return self._lock.locked()
+
     def _disown(self) -> None:
         """Leave the process to who has started it, if that is not this process: a fork has a copy of both pipes."""
         if self._owner != os.getpid():

@@ -1,6 +1,7 @@
 """MuJoCo, in this process or in its environment. Source: its documentation, Computation; Programming, mj_step and rollout."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def prepare(given):
     return prepare_with(mj, given)
 
 
-def prepare_with(mj, given):
+def prepare_with(mj: Any, given: Any) -> Any:
     """Return a run with a module `mujoco` that is there."""
     model = _model(mj, given)
     data = mj.MjData(model)
