@@ -77,7 +77,9 @@ class Findings:
         return self.wrong.total() + self.raised.total()
 
     def __str__(self) -> str:
-        rows = (f"{name:40} {n:8} runs {self.wrong[name]:6} wrong {self.raised[name]:6} raised" for name, n in self.runs.items())
+        rows = (
+            f"{name:40} {n:8} runs {self.wrong[name]:6} wrong {self.raised[name]:6} raised" for name, n in self.runs.items()
+        )
         total = f"{self.runs.total()} runs in {THREADS} threads: {self.wrong.total()} wrong, {self.raised.total()} raised"
         return "\n".join((*sorted(rows), *self.messages[:10], total))
 
