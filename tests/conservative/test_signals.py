@@ -16,7 +16,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.lazy_kernels import kernels
-from conservative.method import Grid
+from conservative.method import Grid, Run
 from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
 
@@ -94,6 +94,12 @@ def test_a_handler_that_raises_nothing_changes_nothing(monkeypatch: pytest.Monke
     assert states(found) == states(long_run(10**6))
 
 
+def repeat(run: Run) -> None:
+    """Make so many runs that an alarm falls into one."""
+    for _ in range(1000):
+        run()
+
+
 def test_samples_without_end_are_interrupted_too() -> None:
     """A run of few steps a sample: the most time goes into bringing the samples into body axes."""
 
@@ -103,8 +109,7 @@ def test_samples_without_end_are_interrupted_too() -> None:
     run = cv.MoserVeselov().prepare(cv.scenes.brick_flip(), Grid(1e-6, 3 * 10**5))
     reference = states(run())
     with pytest.raises(Stop), alarms(0.002, stop):
-        for _ in range(1000):
-            run()
+        repeat(run)
     assert states(run()) == reference
 
 
@@ -155,7 +160,7 @@ def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, m
 @pytest.mark.parametrize("name", sorted({family.kernel for family in registry.list_families().values() if family.kernel}))
 def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Kernel:
-        PAUSE, FAILURE, pauses = kernels(name).PAUSE, "", []  # noqa: RUF012
+        PAUSE, FAILURE, pauses = kernels(name).PAUSE, "", []
 
         def enter(self, n_steps: int, every: int, pause: int, q: np.ndarray, L: np.ndarray) -> tuple[object, ...]:
             self.pauses.append(pause)
