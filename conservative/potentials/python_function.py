@@ -6,7 +6,6 @@ import ctypes
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ _AGREEMENT = 1e-4
 _ROUND_OFF = 8 * 2.0**-53
 N_INPUTS, N_OUTPUTS = 27, 90
 """Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
-_CFunction = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,16 +103,13 @@ class FunctionPotential(_Fields):
             return gradient
         return gradient + lacking / np.sum(step * step) * step
 
-    @cached_property
-    def _callback(self) -> Any:
-        return _CFunction(_Callback(self))
-
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the address of a C function, which lives as long as the potential, and the frame, row by row."""
+        """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
         from ..kernels.function_field import Function
 
-        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
-        return Function(address, *(triple(row) for row in R_BP))
+        # Atomic: of threads that come here at once, each gets the one that stays.
+        callback = self.__dict__.setdefault("_callback", _Callback(self))
+        return Function(id(callback), *(triple(row) for row in R_BP))
 
 
 def _check_gradient(energy: Energy, gradient: Gradient) -> None:
@@ -146,18 +141,23 @@ class _Callback:
     def __init__(self, potential: FunctionPotential) -> None:
         self.potential, self.last = potential, threading.local()
 
-    def __call__(self, what: int, address: int) -> int:
+    def __call__(self, what: int, address: int) -> None:
         buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
+        known, outputs = getattr(self.last, "pair", (b"", buffer))
+        if inputs != known:  # residual and tangent of one iteration need the same
+            outputs = self._try(what, buffer)
+            self.last.pair = inputs, outputs  # at once: an interrupt may come anywhere
+        buffer[N_INPUTS : N_INPUTS + len(outputs)] = outputs
+
+    def _try(self, what: int, buffer: Array) -> Array:
         try:
-            if inputs != getattr(self.last, "inputs", None):  # residual and tangent of one iteration need the same
-                self.last.outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
-                self.last.inputs = inputs
-        except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
+            return self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
+        except PotentialFailed:
+            raise
+        except Exception as error:
             PotentialFailed.pending.cause = error
-            return 1
-        buffer[N_INPUTS : N_INPUTS + len(self.last.outputs)] = self.last.outputs
-        return 0
+            raise PotentialFailed from error
 
     def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
         functions = (_body_torque, _finite_torque, _finite_derivative, _energy)

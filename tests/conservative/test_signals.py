@@ -113,6 +113,28 @@ def test_samples_without_end_are_interrupted_too() -> None:
     assert states(run()) == reference
 
 
+def quartic() -> cv.FunctionPotential:
+    hook = np.array([0.0, 0.1, 0.4])
+    return cv.FunctionPotential(
+        lambda R: float((R[2] @ hook) ** 4), lambda R: np.outer((0, 0, 1), 4 * (R[2] @ hook) ** 3 * hook)
+    )
+
+
+def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
+    """Signals come before, during and after the Python functions; what follows is not spoiled by a half-finished evaluation."""
+
+    def stop(*_: object) -> None:
+        raise Stop
+
+    scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic())
+    short, long = (cv.Reduced().prepare(scene, Grid(1e-6, n, n)) for n in (5, 10**6))
+    reference = states(short())
+    for k in range(20):
+        with pytest.raises(Stop), alarms(0.01 + 1e-4 * k, stop):
+            long()
+        assert states(short()) == reference
+
+
 def test_a_time_limit_in_another_thread_is_kept() -> None:
     """The run is let go on: a thread that is a daemon ends with its process."""
     started = threading.Event()
