@@ -15,7 +15,7 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.lazy_kernels import kernels
+from conservative.deferred_imports import kernels
 from conservative.method import Grid, Run
 from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
