@@ -50,8 +50,8 @@ LONG_RUNS = (
 
 
 def test_an_interrupt_ends_runs_of_a_billion_steps() -> None:
-    """The signals come from another thread, which therefore runs while the kernel does. What is compiled here counts for no hang."""
-    for scene, method in LONG_RUNS:
+    """The signals come from another thread, which therefore runs while the kernel does."""
+    for scene, method in LONG_RUNS:  # compiled here, it counts for no hang
         cv.integrate(registry.scene(scene), 1e-9, registry.method(method), 2e-8)
     runs = [f"{scene} {method}" for scene, method in LONG_RUNS]
     command = [sys.executable, "-P", "-c", INTERRUPT, *runs]
