@@ -106,7 +106,7 @@ def _reduce(value: Any) -> Any:
 
 
 @cache
-def _names_kept(kind: type) -> frozenset[str]:
+def _names_kept(kind: Any) -> frozenset[str]:
     """Return the names of the cached properties of a class."""
     return frozenset(name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property))
 
@@ -117,7 +117,7 @@ def _close_array(array: Array) -> Array:
 
 
 def _make_value(kind: type, state: dict[str, Any]) -> Any:
-    value = kind.__new__(kind)
+    value = object.__new__(kind)
     vars(value).update(state)
     return value
 

@@ -1,8 +1,8 @@
 """Work in a process of its own, which is ended when the work takes too long or ends the process itself.
 
-Neither a thread nor a signal can end work for certain: an engine may keep the interpreter to itself for ever. A process can always
-be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script is not run
-again; it stays for the next piece of work, so that imports and compiled code are paid for once.
+Neither a thread nor a signal can end work for certain: an engine may keep the interpreter to itself for ever. A process can
+always be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script is
+not run again; it stays for the next piece of work, so that imports and compiled code are paid for once.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class TimeLimitExceeded(TimeoutError):
 
 
 class WorkerDied(RuntimeError):
-    """A piece of work ended the process that it ran in, such as by a segmentation fault. Attribute: `status`, negative a signal."""
+    """A piece of work ended its process, such as by a segmentation fault. Attribute: `status`, negative for a signal."""
 
     def __init__(self, status: int) -> None:
         self.status = status

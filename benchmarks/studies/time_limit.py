@@ -1,4 +1,4 @@
-"""A limit on how long one run may take, so that no engine holds up a study: what goes on beyond it is ended, and is an outcome."""
+"""A limit on how long one run may take, so that no engine holds up a study: what goes on beyond it is ended."""
 
 from __future__ import annotations
 
@@ -50,6 +50,20 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Succ
     if isinstance(done, Failure) and done.outcome.kind is OutcomeKind.MISSING:
         return attempt(case, skip_missing)
     return replace(done, run=_prepare_later(case)) if isinstance(done, Success) else done
+
+
+def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Return the outcome of a case whose run is to be timed in this process.
+
+    A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_within`.
+    """
+    tried = None if is_known_to_end(case.method) else attempt_within(limit, case, skip_missing)
+    return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
+
+
+def is_known_to_end(method: Method) -> bool:
+    """Whether the run of a method ends: of ours, and of engines that take a known number of steps and that we know."""
+    return is_bounded(method) or (_is_ours(method) and method.order is not None)
 
 
 def is_bounded(method: Method) -> bool:
