@@ -1,8 +1,8 @@
 """Work in a process of its own, which is ended when the work takes too long or ends the process itself.
 
 Neither a thread nor a signal can end work for certain: an engine may keep the interpreter to itself for ever. A process can
-always be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script is
-not run again; it stays for the next piece of work, so that imports and compiled code are paid for once.
+always be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script
+is not run again; it stays for the next piece of work, so that imports and compiled code are paid for once.
 """
 
 from __future__ import annotations
