@@ -111,9 +111,9 @@ def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
 
 def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
     adaptive = tolerance_setting(probes[0].method) is not None
-    while (
-        len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target and not (at_round_off(probes) or was_ended(probes[-1]))
-    ):
+    while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target:
+        if at_round_off(probes) or was_ended(probes[-1]):
+            break
         finer = (_tighten_tolerance if adaptive else _shorten_step)(conditions, probes, aim(probes[-1]))
         if finer is None:
             break
