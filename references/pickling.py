@@ -1,7 +1,7 @@
 """Values as bytes for another process: functions and classes of scripts and notebooks too, and frozen values as they were.
 
 What a cached property keeps stays behind, as compiled code and addresses mean nothing elsewhere, and an array that is closed to
-writing stays closed, because compiled code for it is another one.
+writing stays closed, because compiled code for it is another one. Source: our own.
 """
 
 from __future__ import annotations

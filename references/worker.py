@@ -2,7 +2,7 @@
 
 Neither a thread nor a signal can end work for certain: an engine may keep the interpreter to itself for ever. A process can
 always be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script
-is not run again; it stays for the next piece of work, so that imports and compiled code are paid for once.
+is not run again; it stays for the next piece of work, so that imports and compiled code are paid for once. Source: our own.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ class Worker:
             raise
 
     def answer(self, limit: float, message: bytes) -> tuple[str, bytes]:
-        """Return what the process answers to a message within `limit` s; see `serve`.
+        """Return what the process answers to a message within `limit`, in s; see `serve`.
 
         Raises
         ------

@@ -31,7 +31,7 @@ DEPENDENT = (
 
 
 def question(*methods):
-    return Question(registry.scene("brick_flip"), 1e-6, 6.0, methods, (), 1.0, 1.0)
+    return Question(registry.scene("brick_flip"), 1e-6, 6.0, methods, (), 1.0, time_limit=15.0)
 
 
 def test_a_recommendation_survives_engines_that_hang_or_end_their_process():
