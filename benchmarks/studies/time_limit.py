@@ -23,10 +23,15 @@ _ended: WeakKeyDictionary[Scene, dict[Method, tuple[float, int]]] = WeakKeyDicti
 
 
 def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Return the outcome of a case that may take `limit` s of wall time, if it is not known to end; see `attempt_apart`."""
+    return (attempt if is_known_to_end(case.method) else partial(attempt_apart, limit))(case, skip_missing)
+
+
+def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
     """Return the outcome of a case that may take `limit` s of wall time; see `attempt`.
 
-    What may go on for ever, or end the process that it is in, runs in another process, which is ended after the limit. The
-    trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called.
+    What is not our own may go on for ever, or end the process that it is in: it runs in another one, which is ended after the
+    limit. The trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called.
 
     Raises
     ------
@@ -55,9 +60,9 @@ def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Succ
 def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
     """Return the outcome of a case whose run is to be timed in this process.
 
-    A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_within`.
+    A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
     """
-    tried = None if is_known_to_end(case.method) else attempt_within(limit, case, skip_missing)
+    tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
     return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
 
 

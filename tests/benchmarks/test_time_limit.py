@@ -14,7 +14,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import studies, study
 from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
 from conservative.benchmarks.studies.study import Study
-from conservative.benchmarks.studies.time_limit import attempt_here, attempt_within
+from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
 from conservative.method import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
@@ -42,7 +42,7 @@ def copy_of(scene):
 @pytest.mark.parametrize("name", ["scipy", "mujoco:RK4", "heyoka", "pinocchio"])
 def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
     case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
-    here, there = attempt(case), attempt_within(60.0, case)
+    here, there = attempt(case), attempt_apart(60.0, case)
     if isinstance(here, Failure):
         assert here == there
         return
@@ -55,18 +55,18 @@ def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
 
 
 @pytest.mark.parametrize(
-    ("how", "kind", "reason"),
+    ("how", "limit", "kind", "reason"),
     [
-        ("hang", OutcomeKind.TIMEOUT, "ended after 0.5 s"),
-        ("exit", OutcomeKind.CRASHED, "its process ended with status 3"),
-        ("abort", OutcomeKind.CRASHED, "signal 6"),
+        ("hang", 0.5, OutcomeKind.TIMEOUT, "ended after 0.5 s"),
+        ("exit", 60.0, OutcomeKind.CRASHED, "its process ended with status 3"),
+        ("abort", 60.0, OutcomeKind.CRASHED, "signal 6"),
     ],
 )
 @pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
-def test_what_an_engine_does_to_its_process_is_an_outcome(how, kind, reason, attempt_so):
+def test_what_an_engine_does_to_its_process_is_an_outcome(how, limit, kind, reason, attempt_so):
     worker.end_idle()
     before = threading.enumerate()
-    done = attempt_so(0.5, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
+    done = attempt_so(limit, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
     assert (done.outcome.kind, done.outcome.reason) == (kind, reason)
     assert threading.enumerate() == before
     assert psutil.Process().children(recursive=True) == []
