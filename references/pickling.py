@@ -99,7 +99,8 @@ def _reduce(value: Any) -> Any:
         return _close_array, (value.copy(order="K"),)
     if isinstance(value, BaseException):
         return _make_exception, (type(value), value.args, vars(value))
-    kept = _names_kept(type(value))
+    kind: Any = type(value)
+    kept = _names_kept(kind)
     if not kept.isdisjoint(getattr(value, "__dict__", ())):
         return _make_value, (type(value), {name: part for name, part in vars(value).items() if name not in kept})
     return NotImplemented
@@ -117,7 +118,7 @@ def _close_array(array: Array) -> Array:
 
 
 def _make_value(kind: type, state: dict[str, Any]) -> Any:
-    value = object.__new__(kind)
+    value: Any = object.__new__(kind)
     vars(value).update(state)
     return value
 
