@@ -119,6 +119,17 @@ def test_mistakes_end_in_one_clear_line(arguments, parts, tmp_path, monkeypatch)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("command", [("report", "--quick"), ("recommend", "brick_flip")])
+def test_a_limit_on_time_is_an_option_of_what_runs_engines(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "--time-limit" in conservative(command[0], "--help").stdout
+    done = conservative(*command, "--time-limit", "0")
+    assert done.exit_code == 2
+    assert one_line(done.stderr)
+    assert "time_limit: got 0.0; allowed: a finite duration above 0, s" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("arguments", [["run"], ["run", "brick_flip", "--dt", "fast"], ["nonsense"], ["list", "--xml"]])
 def test_usage_errors_exit_with_2(arguments):
     done = conservative(*arguments)
