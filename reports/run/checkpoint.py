@@ -19,8 +19,9 @@ from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
-from conservative.files import text_file
+from conservative.files import remove_leftovers, write_text
 
+from ..terminal.supervision import tell
 from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms
@@ -67,12 +68,13 @@ class Checkpoint:
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
         self.results[name] = StudyResult(rows, lines, self.process)
-        with text_file(self.path, "out") as stream:
-            stream.write(_content(self))
+        write_text(self.path, _content(self), "out")
+        tell(self.summary)
 
     def remove(self) -> None:
         """Remove the file: the report is written."""
         self.path.unlink(missing_ok=True)
+        remove_leftovers(self.path)
 
     @property
     def summary(self) -> str:
