@@ -28,7 +28,6 @@ except ImportError:  # not POSIX: no locks, and nothing is known to be left over
     fcntl = None
 
 _PLACES: Counter[Path] = Counter()
-"""The places that are being written, and by how many."""
 _LISTENERS: list[Callable[[list[Path]], None]] = []
 
 

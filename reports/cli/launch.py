@@ -1,17 +1,16 @@
 """What the script `conservative` runs: the command line, or one line that says what to install for it.
 
-Little is imported before the command is supervised: until then, Ctrl-C ends Python as it ends any of its programs.
+Nothing is imported at the top: until signals wait, Ctrl-C ends Python as it ends all of its programs, by a traceback.
 """
-
-from __future__ import annotations
-
-import sys
-
-from ..terminal.supervision import supervise
 
 
 def launch() -> None:
     """Run the command line; exit with 2 where click, which it is made with, is not installed."""
+    _let_signals_wait()
+    import sys
+
+    from ..terminal.supervision import supervise
+
     supervise()
     from conservative.errors import MissingExtra, require_extra
 
@@ -23,3 +22,11 @@ def launch() -> None:
     from .main import main
 
     main()
+
+
+def _let_signals_wait() -> None:
+    """Keep signals for the process that supervises this one. Of `_signal`, which is built in, `signal` takes 5 ms to import."""
+    import _signal  # type: ignore[import-not-found]
+
+    if hasattr(_signal, "pthread_sigmask"):
+        _signal.pthread_sigmask(_signal.SIG_BLOCK, (_signal.SIGINT, _signal.SIGTERM))

@@ -84,7 +84,7 @@ def supervise() -> None:
     stops = {number for number in EXIT_CODES if signal.getsignal(number) != signal.SIG_IGN}  # nohup, and sh's &, ignore some
     waited = {*stops, signal.SIGTSTP, signal.SIGCHLD}
     signal.signal(signal.SIGCHLD, lambda number, frame: None)  # where it is ignored, a child leaves no exit code
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
     shared, (ours, theirs) = Board(), os.pipe()
     child = os.fork()
     if child:
@@ -95,7 +95,7 @@ def supervise() -> None:
     for number in (*stops, signal.SIGCHLD):
         signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the group is in the background of its terminal, and writes there
-    signal.pthread_sigmask(signal.SIG_SETMASK, before - stops)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {*EXIT_CODES, *waited})
     _listen(shared)
 
 
