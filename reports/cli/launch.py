@@ -12,6 +12,7 @@ def launch() -> None:
     from ..terminal.supervision import supervise
 
     supervise()
+    _buffer_output()
     from conservative.errors import MissingExtra, require_extra
 
     try:
@@ -30,3 +31,18 @@ def _let_signals_wait() -> None:
 
     if hasattr(_signal, "pthread_sigmask"):
         _signal.pthread_sigmask(_signal.SIG_BLOCK, (_signal.SIGINT, _signal.SIGTERM))
+
+
+def _buffer_output() -> None:
+    """Put a buffer on stdout where PYTHONUNBUFFERED takes it away: without, Python loses what a full disk has no room for."""
+    import io
+    import sys
+
+    raw = getattr(sys.stdout, "buffer", None)
+    if isinstance(raw, io.RawIOBase):
+        sys.stdout = io.TextIOWrapper(
+            io.BufferedWriter(raw),
+            encoding=sys.stdout.encoding,
+            errors=sys.stdout.errors,
+            line_buffering=sys.stdout.isatty(),
+        )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -63,12 +63,13 @@ class Checkpoint:
     results: dict[str, StudyResult] = field(default_factory=dict)
 
     def keep(self, name: str, findings: Iterable[Finding]) -> None:
-        """Keep what a study finds, in the file as well; what an earlier report left there goes."""
+        """Keep what a study finds, in the file as well; what an earlier report left there goes. Raise `NotWritten` of it."""
         every = list(findings)
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
-        self.results[name] = StudyResult(rows, lines, self.process)
-        write_text(self.path, _content(self), "out")
+        result = StudyResult(rows, lines, self.process)
+        write_text(self.path, _content(replace(self, results={**self.results, name: result})), "out")
+        self.results[name] = result
         tell(self.summary)
 
     def remove(self) -> None:

@@ -1,6 +1,5 @@
 """A command and the process that waits for it: tried with real signals, at moments when Python could not handle them."""
 
-import errno
 import os
 import pty
 import select
@@ -132,7 +131,10 @@ def test_a_pause_holds_until_it_is_continued(tmp_path):
 
 def test_a_terminal_gets_its_line_and_its_cursor_back():
     ours, theirs = pty.openpty()
-    bar = "\nfrom conservative.reports.terminal.progress import progress\nwith progress() as step:\n    step(0.5, 'at work'); time.sleep(600)"
+    bar = (
+        "\nfrom conservative.reports.terminal.progress import progress"
+        "\nwith progress() as step:\n    step(0.5, 'at work'); time.sleep(600)"
+    )
     environment = variables(PYTHONPATH=str(ROOT), TERM="xterm-256color")
     process = subprocess.Popen(
         [sys.executable, "-c", SUPERVISED + bar], stderr=theirs, stdout=theirs, env=environment, start_new_session=True
@@ -153,8 +155,7 @@ def read(terminal):
     """Return what is on a terminal, nothing when nobody has it open any more."""
     try:
         return os.read(terminal, 4096)
-    except OSError as error:
-        assert error.errno == errno.EIO
+    except OSError:  # what Linux says then
         return b""
 
 
