@@ -51,7 +51,9 @@ def test_a_full_disk_leaves_what_was_there(kind, tmp_path):
     target.write_text("before")
     code, out, err = run_python(FULL.format(WRITERS[kind]), str(target))
     assert (code, err) == (0, "")
-    assert out.startswith(f"csv: got {str(target)!r} (File too large); allowed: a file in a folder that can be written")
+    assert out.startswith(
+        f"csv: got {str(target)!r} (File too large); allowed: a file in a folder that exists and can be written"
+    )
     assert target.read_text() == "before"
     assert names(tmp_path) == ["run.csv"]
 
