@@ -76,7 +76,8 @@ def make_folder(folder: Path, argument: str) -> None:
 
 def listen(listener: Callable[[list[Path]], None]) -> None:
     """Have a function called with the places that are being written, whenever these change."""
-    _LISTENERS.append(listener)
+    if listener not in _LISTENERS:
+        _LISTENERS.append(listener)
 
 
 @contextmanager
@@ -122,13 +123,11 @@ def _temporaries(place: Path, suffix: str = "") -> list[Path]:
 
 def lock(path: Path) -> int | None:
     """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
-    try:
+    with suppress(OSError):
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
-    except OSError:
-        return None
-    if _try_lock(handle) and _is_at(handle, path):
-        return handle
-    os.close(handle)
+        if _try_lock(handle) and _is_at(handle, path):
+            return handle
+        os.close(handle)
     return None
 
 

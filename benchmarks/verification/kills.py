@@ -120,9 +120,7 @@ def main() -> None:
         found.append(each)
         print(each, flush=True)
     killed, wrong = sum(each.number is not None for each in found), sum(bool(each.complaints) for each in found)
-    print(
-        f"{killed} kills of {options.count}, {len(found) - killed} whole reports of the same rows but for times: {wrong} complaints"
-    )
+    print(f"{killed} kills of {options.count}, {len(found) - killed} whole reports, equal but for times: {wrong} complaints")
     sys.exit(wrong > 0)
 
 

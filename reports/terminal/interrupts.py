@@ -22,7 +22,7 @@ def interruptible(number: signal.Signals) -> Iterator[None]:
     Compiled code that is interrupted while it is loaded raises `SystemError`, for one. A process that is supervised leaves its
     signals to the one that does it.
     """
-    if supervision.board is not None:
+    if supervision.list_places():
         yield
         return
     stops: list[KeyboardInterrupt] = []

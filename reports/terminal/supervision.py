@@ -77,8 +77,19 @@ def tell(message: str) -> None:
         board.tell(message)
 
 
+def list_places() -> bool:
+    """Have the places listed that are being written from now on; return whether this process is supervised."""
+    if board is None:
+        return False
+    from conservative import files  # here, since a --help writes nothing
+
+    files.listen(board.list_places)
+    return True
+
+
 def supervise() -> None:
     """Go on in a child; in the parent wait for that and exit as it does. Where there is no fork, go on as it is."""
+    global board
     if not hasattr(os, "fork"):
         return
     stops = {number for number in EXIT_CODES if signal.getsignal(number) != signal.SIG_IGN}  # nohup, and sh's &, ignore some
@@ -96,7 +107,7 @@ def supervise() -> None:
         signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the group is in the background of its terminal, and writes there
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*EXIT_CODES, *waited})
-    _listen(shared)
+    board = shared
 
 
 def _end_with_the_parent(pipe: int) -> None:
@@ -109,15 +120,6 @@ def _end_with_the_parent(pipe: int) -> None:
     except BlockingIOError:
         return
     os._exit(1)  # the parent was gone before that
-
-
-def _listen(shared: Board) -> None:
-    """Leave on the board which places are being written."""
-    global board
-    from conservative import files
-
-    board = shared
-    files.listen(shared.list_places)
 
 
 def _wait(child: int, waited: set[signal.Signals], shared: Board) -> NoReturn:

@@ -21,8 +21,9 @@ HANG = 120
 SUPERVISED = """
 import os, signal, sys, time
 from pathlib import Path
-from conservative.reports.terminal.supervision import supervise, tell
+from conservative.reports.terminal.supervision import list_places, supervise, tell
 supervise()
+assert list_places()
 """
 WORK = {
     "a loop in C": "print('at work', flush=True); sum(range(10**14))",
