@@ -11,7 +11,6 @@ on. Should the parent be killed, a pipe is closed, of which the kernel tells the
 
 from __future__ import annotations
 
-import fcntl
 import os
 import signal
 import sys
@@ -112,6 +111,8 @@ def supervise() -> None:
 
 def _end_with_the_parent(pipe: int) -> None:
     """Lead a group that gets SIGIO, which ends it, when the other end of the pipe is closed."""
+    import fcntl  # here, as only POSIX has it
+
     os.setpgid(0, 0)
     fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid())
     fcntl.fcntl(pipe, fcntl.F_SETFL, os.O_NONBLOCK | fcntl.FASYNC)
