@@ -11,7 +11,7 @@ def launch() -> None:
 
     from ..terminal.supervision import supervise
 
-    supervise()
+    supervise(_tidy)
     _buffer_output()
     from conservative.errors import MissingExtra, require_extra
 
@@ -31,6 +31,15 @@ def _let_signals_wait() -> None:
 
     if hasattr(_signal, "pthread_sigmask"):
         _signal.pthread_sigmask(_signal.SIG_BLOCK, (_signal.SIGINT, _signal.SIGTERM))
+
+
+def _tidy(place: str) -> bool:
+    """Remove leftovers beside a place, and return whether all are gone."""
+    from pathlib import Path
+
+    from ..terminal.report_folder import recover
+
+    return recover(Path(place))
 
 
 def _buffer_output() -> None:

@@ -15,10 +15,12 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from mmap import mmap
 from typing import NoReturn
 
+Tidy = Callable[[str], bool]
+"""What removes leftovers beside a place, and says whether all are gone."""
 EXIT_CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _SLOT = 1 << 16
 """Bytes of what a child leaves."""
@@ -86,7 +88,7 @@ def list_places() -> bool:
     return True
 
 
-def supervise() -> None:
+def supervise(tidy: Tidy) -> None:
     """Go on in a child; in the parent wait for that and exit as it does. Where there is no fork, go on as it is."""
     global board
     if not hasattr(os, "fork"):
@@ -99,7 +101,7 @@ def supervise() -> None:
     child = os.fork()
     if child:
         os.close(ours)  # `theirs` stays open as long as this process lives
-        _wait(child, waited, shared)
+        _wait(child, waited, shared, tidy)
     os.close(theirs)
     _end_with_the_parent(ours)
     for number in (*stops, signal.SIGCHLD):
@@ -123,7 +125,7 @@ def _end_with_the_parent(pipe: int) -> None:
     os._exit(1)  # the parent was gone before that
 
 
-def _wait(child: int, waited: set[signal.Signals], shared: Board) -> NoReturn:
+def _wait(child: int, waited: set[signal.Signals], shared: Board, tidy: Tidy) -> NoReturn:
     """Wait for signals: that the child has ended, that it has to, that it has to pause. Exit as it does."""
     while True:
         number = signal.sigwait(waited)
@@ -136,7 +138,10 @@ def _wait(child: int, waited: set[signal.Signals], shared: Board) -> NoReturn:
             _signal_group(child, signal.SIGKILL)
         ended, status = os.waitpid(child, 0 if number in EXIT_CODES else os.WNOHANG)
         if ended:
-            _exit(status, number, child, shared)
+            if not os.WIFEXITED(status):
+                _signal_group(child, signal.SIGKILL)
+                _tidy(shared.read()[1], tidy)
+            _exit(status, number, shared)
 
 
 def _signal_group(child: int, number: signal.Signals) -> None:
@@ -149,35 +154,25 @@ def _signal_group(child: int, number: signal.Signals) -> None:
             continue
 
 
-def _exit(status: int, number: int, child: int, shared: Board) -> NoReturn:
+def _exit(status: int, number: int, shared: Board) -> NoReturn:
     """Exit as a child did, or as one that was ended by the signal `number`."""
     if os.WIFEXITED(status):
         sys.exit(os.WEXITSTATUS(status))
-    cause = number if number in EXIT_CODES else os.WTERMSIG(status)
-    _signal_group(child, signal.SIGKILL)
-    message, places = shared.read()
-    _tidy(places)
-    known = cause in EXIT_CODES
-    words = "Interrupted" if known else f"Ended by {signal.Signals(cause).name}"
-    _say("; ".join(filter(None, [words, message])))
-    if known:
-        sys.exit(EXIT_CODES[signal.Signals(cause)])
-    signal.signal(cause, signal.SIG_DFL) if cause != signal.SIGKILL else None
+    cause = signal.Signals(number if number in EXIT_CODES else os.WTERMSIG(status))
+    words = "Interrupted" if cause in EXIT_CODES else f"Ended by {cause.name}"
+    _say("; ".join(filter(None, [words, shared.read()[0]])))
+    if cause in EXIT_CODES:
+        sys.exit(EXIT_CODES[cause])
+    if cause != signal.SIGKILL:
+        signal.signal(cause, signal.SIG_DFL)
     os.kill(os.getpid(), cause)
     sys.exit(128 + cause)
 
 
-def _tidy(places: list[str]) -> None:
+def _tidy(places: list[str], tidy: Tidy) -> None:
     """Remove what is left over beside places that were being written."""
-    if not places:
-        return
-    from pathlib import Path
-
-    from .report_folder import recover
-
     end = time.monotonic() + _PATIENCE
-    left = places
-    while (left := [place for place in left if not recover(Path(place))]) and time.monotonic() < end:
+    while (places := [place for place in places if not tidy(place)]) and time.monotonic() < end:
         time.sleep(0.01)
 
 

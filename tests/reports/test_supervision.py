@@ -21,8 +21,9 @@ HANG = 120
 SUPERVISED = """
 import os, signal, sys, time
 from pathlib import Path
+from conservative.files import remove_leftovers
 from conservative.reports.terminal.supervision import list_places, supervise, tell
-supervise()
+supervise(lambda place: remove_leftovers(Path(place)))
 assert list_places()
 """
 WORK = {
