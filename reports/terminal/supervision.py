@@ -16,6 +16,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from mmap import mmap
 from typing import NoReturn
 
@@ -93,18 +94,20 @@ def supervise(tidy: Tidy) -> None:
     global board
     if not hasattr(os, "fork"):
         return
-    stops = {number for number in EXIT_CODES if signal.getsignal(number) != signal.SIG_IGN}  # nohup, and sh's &, ignore some
-    waited = {*stops, signal.SIGTSTP, signal.SIGCHLD}
+    stops = (*EXIT_CODES, signal.SIGTSTP)
+    waited = {number for number in stops if signal.getsignal(number) != signal.SIG_IGN} | {signal.SIGCHLD}
     signal.signal(signal.SIGCHLD, lambda number, frame: None)  # where it is ignored, a child leaves no exit code
     signal.pthread_sigmask(signal.SIG_BLOCK, waited)
     shared, (ours, theirs) = Board(), os.pipe()
     child = os.fork()
     if child:
+        with suppress(OSError):
+            os.setpgid(child, child)  # the child does so too: the first of them makes the group
         os.close(ours)  # `theirs` stays open as long as this process lives
         _wait(child, waited, shared, tidy)
     os.close(theirs)
     _end_with_the_parent(ours)
-    for number in (*stops, signal.SIGCHLD):
+    for number in waited:
         signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the group is in the background of its terminal, and writes there
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*EXIT_CODES, *waited})
@@ -116,8 +119,10 @@ def _end_with_the_parent(pipe: int) -> None:
     import fcntl  # here, as only POSIX has it
 
     os.setpgid(0, 0)
-    fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid())
-    fcntl.fcntl(pipe, fcntl.F_SETFL, os.O_NONBLOCK | fcntl.FASYNC)
+    os.set_blocking(pipe, False)
+    with suppress(OSError):  # not every system has it for pipes
+        fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid())
+        fcntl.fcntl(pipe, fcntl.F_SETFL, os.O_NONBLOCK | fcntl.FASYNC)
     try:
         os.read(pipe, 1)
     except BlockingIOError:
@@ -145,13 +150,9 @@ def _wait(child: int, waited: set[signal.Signals], shared: Board, tidy: Tidy) ->
 
 
 def _signal_group(child: int, number: signal.Signals) -> None:
-    """Send a signal to the child and all that it has started; to the child alone where it does not lead its group yet."""
-    for send in (os.killpg, os.kill):
-        try:
-            send(child, number)
-            return
-        except ProcessLookupError:
-            continue
+    """Send a signal to the child and all that it has started; of these some can be left when the child is gone."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, number)
 
 
 def _exit(status: int, number: int, shared: Board) -> NoReturn:
