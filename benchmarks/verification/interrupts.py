@@ -80,7 +80,7 @@ def tries(count: int, seed: int) -> Iterator[Try]:
 
 
 def attempt(command: Sequence[str], moment: float) -> Try | None:
-    """Interrupt a command at a moment, s; None where it has ended before."""
+    """Interrupt a command at a moment, s; None where it had ended before, or was just about to."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "work"
         folder.mkdir()
@@ -89,7 +89,12 @@ def attempt(command: Sequence[str], moment: float) -> Try | None:
         if not late:
             started.interrupt()
         ended = started.end()
-        return None if late else Try(command, moment, ended, temporaries(folder))
+        return None if late or came_too_late(ended) else Try(command, moment, ended, temporaries(folder))
+
+
+def came_too_late(ended: Ended) -> bool:
+    """Return whether a command has ended as it does without a signal, and at once: one that goes on has lost its interrupt."""
+    return ended.code in (0, 2) and ended.seconds <= LIMIT and "Traceback" not in ended.err
 
 
 def summary(found: Sequence[Try]) -> str:

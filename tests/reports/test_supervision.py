@@ -196,3 +196,11 @@ def test_the_attack_sees_what_leaks(ended, left, expected):
     found = list(interrupts.Try(("list",), 1.0, interrupts.Ended(*ended), left).complaints)
     assert len(found) == len(expected)
     assert all(complaint.startswith(words) for complaint, words in zip(found, expected, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("ended", "expected"),
+    [((0, "all", "", 0.1, False), True), ((0, "all", "", 0.6, False), False), ((130, "", "Interrupted\n", 0.1, False), False)],
+)
+def test_the_attack_knows_what_ended_by_itself_from_what_lost_a_signal(ended, expected):
+    assert interrupts.came_too_late(interrupts.Ended(*ended)) == expected
