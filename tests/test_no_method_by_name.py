@@ -27,6 +27,8 @@ ALLOWED = {
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
+    "benchmarks/verification/interrupts.py": ("scipy", "a run that stays in Python for long"),
+    "benchmarks/verification/kills.py": ("moser_veselov", "the method of the report that is killed"),
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
     "reports/documentation/readme_pictures.py": (
         "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy",
