@@ -21,7 +21,7 @@ from .mutants import Mutant
 WORKER = Path(__file__).with_name("worker.py")
 FIRST_LIMIT, SLACK, SPARE = 300, 3, 5
 """Processor's time, s, allowed to the code as it is; to a mutant SLACK times what that took, and SPARE s."""
-ENVIRONMENT = {"NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+ENVIRONMENT = {"NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": ""}
 NOT_COPIED = shutil.ignore_patterns(".[!g]*", ".git", "__pycache__", "build", "dist")
 
 

@@ -12,10 +12,11 @@ import resource
 import signal
 import sys
 import tempfile
+import traceback
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic, sleep, time
 from typing import IO, Any
 
 HELD = ("pytest", "numpy", "scipy.special", "scipy.spatial.transform", "scipy.integrate", "scipy.stats", "numba", "mpmath")
@@ -23,19 +24,27 @@ HELD += ("hypothesis", "pandas", "click.testing", "pytest_benchmark.plugin", "xd
 """Imported once, before the fork; what is not installed is passed over."""
 WALL_PER_CPU = 20
 """Wall time allowed per second of the processor's: other programs want it too."""
-OPTIONS = ("-x", "-q", "-n0", "-p", "no:cacheprovider")
+STAMPS: dict[Path, int] = {}
+OPTIONS = ("-x", "-q", "-n0", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
 
 
 def judge(order: dict[str, Any]) -> dict[str, Any]:
     """Return how the tests of one mutant ended; the file is as before afterwards."""
     path = Path(order["file"])
     before = path.read_bytes()
-    path.write_text(order["text"], encoding="utf-8")
+    replace(path, order["text"].encode())
     try:
         with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
             return _wait(_fork(order["tests"], order["limit"], said), order["limit"], said)
     finally:
-        path.write_bytes(before)
+        replace(path, before)
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Write a file with a time, whole s, that it never had: Python takes cached code for that of a file as old and long."""
+    path.write_bytes(content)
+    STAMPS[path] = STAMPS.get(path, int(time())) + 1
+    os.utime(path, (STAMPS[path], STAMPS[path]))
 
 
 def _fork(tests: list[str], limit: float, said: IO[str]) -> int:
@@ -49,8 +58,10 @@ def _fork(tests: list[str], limit: float, said: IO[str]) -> int:
         for stream in (sys.stdout, sys.stderr):
             os.dup2(said.fileno(), stream.fileno())
         code = int(import_module("pytest").main([*OPTIONS, *tests]))
-        sys.stdout.flush()
+    except BaseException:
+        traceback.print_exc()
     finally:
+        sys.stdout.flush()
         os._exit(code)
 
 
