@@ -81,8 +81,10 @@ def test_a_first_baseline():
 
 
 def test_values_of_several_runs_are_their_median_and_range():
-    runs = [with_values(energy_drift_max=value) for value in (1e-3, 4e-3, 2e-3)]
-    row = baseline.update_baseline(None, runs, "three").rows[ROW.id]
+    runs = [replace(with_values(energy_drift_max=value), commit=str(value)) for value in (1e-3, 4e-3, 2e-3)]
+    made = baseline.update_baseline(None, runs, "three")
+    row = made.rows[ROW.id]
+    assert (made.history[0]["commit"], made.history[0]["runs"]) == ("0.001", 3)
     assert row.measures["energy drift max"] == Allowed(2e-3, 3e-3, 3, pytest.approx(2e-3 + 15e-3))
     assert row.time_ratios["here"].runs == 3
 

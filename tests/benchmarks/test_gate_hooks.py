@@ -181,3 +181,9 @@ def test_the_gate_is_the_last_item_and_fails_in_its_own_words(gate, request):
     with pytest.raises(KeyError) as other:
         {}["key"]
     assert "{}" in str(item.repr_failure(other))
+
+
+def test_the_gate_comes_after_all_other_plugins():
+    for hook in (pytest_gate.Gate.pytest_collection_modifyitems, pytest_gate.Gate.pytest_sessionfinish):
+        assert hook.pytest_impl["trylast"]
+    assert pytest_gate.Gate.pytest_runtest_makereport.pytest_impl["wrapper"]

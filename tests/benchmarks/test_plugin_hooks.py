@@ -101,3 +101,10 @@ def test_accuracy_is_shown_group_by_group():
     config.conservative_benchmark = False
     pytest_plugin.pytest_terminal_summary(terminal)
     assert len(said) == 17
+
+
+def test_the_plugin_is_asked_before_those_it_changes_and_after_those_it_adds_to():
+    for hook in (pytest_plugin.pytest_xdist_auto_num_workers, pytest_plugin.pytest_benchmark_group_stats):
+        assert hook.pytest_impl["tryfirst"]
+        assert hook.pytest_impl["optionalhook"]
+    assert pytest_plugin.pytest_terminal_summary.pytest_impl["trylast"]

@@ -24,9 +24,9 @@ def test_the_yardstick_turns_a_free_body():
         turn = (-b * x - c * y_ - d * z, a * x + c * z - d * y_, a * y_ + d * x - b * z, a * z + b * y_ - c * x)
         return [-y_ * z, z * x, -x * y_ / 3, *(0.5 * part for part in turn)]
 
-    start, h, n = [0.3, 1.1, -0.7, 1, 0, 0, 0], 1e-3, 200
+    start, h, n = [0.3, 1.1, -0.7, 1, 0, 0, 0], 1e-3, 3000
     exact = solve_ivp(rates, (0, n * h), start, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
-    assert yardstick.step_reference_body(n, h) == pytest.approx(exact[3] + exact[0], abs=1e-7)  # measured 2e-8: order 2
+    assert yardstick.step_reference_body(n, h) == pytest.approx(exact[3] + exact[0], abs=3e-6)  # order 2
     assert yardstick.step_reference_body(0, h) == 1.3
 
 
@@ -61,10 +61,12 @@ def test_both_lasts_a_sample(clock):
 
     def prepare(n):
         prepared.append(n)
-        return lambda: n * 1e-6
+        return lambda: calls.append(n) or n * 1e-6
 
+    calls = []
     steps, run = yardstick._lasting(prepare)
     assert prepared == [16, 128, 401]  # at most eight times as many at once
+    assert calls == [16] * 6 + [128] * 6 + [401] * 6  # a first call and the fastest of five
     assert (steps, run()) == (401, 401e-6)
     assert yardstick._lasting(lambda n: lambda: n * 2.4e-5)[0] == 16
     assert yardstick._lasting(lambda n: lambda: 0.0)[0] == 2**22  # 16 times a power of 8: the first not below 2^20

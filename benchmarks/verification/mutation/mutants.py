@@ -18,6 +18,9 @@ TOOL = "cosmic-ray==8.7.0"
 TRIVIAL = ("BitOr", "BitAnd", "BitXor", "LShift", "RShift")
 """Operators that no float has: any test that reaches such a mutant kills it, which would flatter the share."""
 
+COMPILERS = ("kernel", "small")
+"""Decorators that leave kernels as they are, where they run as plain Python."""
+
 
 @dataclass(frozen=True)
 class Mutant:
@@ -96,9 +99,12 @@ def _same_code(one: str, other: str) -> bool:
 
 
 def _outline(source: str) -> str:
-    """Return the code without what is not evaluated: annotations (all files defer them) and texts that stand alone."""
+    """Return the code without what does nothing: annotations (all files defer them), texts that stand alone, compilation."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            compiled = [each for each in node.decorator_list if isinstance(each, ast.Name) and each.id in COMPILERS]
+            node.decorator_list = [each for each in node.decorator_list if each not in compiled]
         for name in ("annotation", "returns"):
             if getattr(node, name, None) is not None:
                 setattr(node, name, ast.Constant(None))
