@@ -14,7 +14,7 @@ FREE = [
     free((1, 1.4, 2), (0.3, -1.9, 0.3)),
     free((1.4, 2, 1), (-0.4, 0.5, 0.7), np.eye(3)),
 ]
-SYMMETRIC = [free((1, 1, 2), (1, 0.3, 0.5)), free((2, 1, 1), (1, 0.3, 0.5)), free((1, 1, 1), (1, 0.3, 0.5))]
+SYMMETRIC = [free((1, 1, 2), (1, 0.3, 0.5)), free((2, 1, 1), (1, 0.3, 0.5)), free((1, 1, 1), (1, 0.3, 0.5), np.eye(3))]
 REST = free((1, 1.4, 2), (0, 0, 0))
 TOPS = [top(), top((1, 1, 1.7), (0.1, 0.2, 3.0)), top((1, 1, 0.3), (0.4, 0.2, 0)), top(weight=1e-4), top(turn=np.eye(3))]
 IN_FIELDS = [in_field(name) for name in FIELDS]
