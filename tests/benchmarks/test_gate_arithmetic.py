@@ -212,3 +212,5 @@ def test_a_gain_as_large_as_a_failure_is_noted():
     same = compare.judge(KEPT, with_values(energy_drift_max=1e-3 - 4e-5, observed_order=2.04))
     assert not same.notes
     assert not compare.judge(KEPT, changed(definition="new", values={"energy drift max": 0.0})).notes
+    two = baseline.update_baseline(None, [replace(RUN, rows={OTHER.id: OTHER, **RUN.rows})], "two")
+    assert len(compare.judge(two, with_values(energy_drift_max=1e-3 - 6e-5)).notes) == 1  # the other row is missing

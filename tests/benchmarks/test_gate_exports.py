@@ -3,6 +3,8 @@
 import json
 import math
 
+import pytest
+
 from conservative.benchmarks.gate import dashboards
 from conservative.benchmarks.gate.compare import Verdict, Violation
 from conservative.benchmarks.gate.results import Results, Row, Status
@@ -38,7 +40,9 @@ def test_benchers_format_has_the_ends_of_what_has_a_spread():
 
 
 def test_a_name_of_a_measure_becomes_a_slug():
-    assert list(dashboards.bmf(Results("", {"a": Row("a", "", "", Status.PASSED, values={"(A) b/C 9": 1.0})}))["a"]) == ["a-b-c-9"]
+    assert list(dashboards.bmf(Results("", {"a": Row("a", "", "", Status.PASSED, values={"(A) b/C 9": 1.0})}))["a"]) == [
+        "a-b-c-9"
+    ]
 
 
 def test_both_formats_are_written(tmp_path):
@@ -48,6 +52,12 @@ def test_both_formats_are_written(tmp_path):
         "custom_smaller_is_better.json": dashboards.smaller_is_better(FOUND),
         "bencher.json": dashboards.bmf(FOUND),
     }
+
+
+def test_what_json_does_not_know_is_an_error(tmp_path):
+    row = Row("id", "", "", Status.PASSED, values={"mine": 1.0}, spreads={"mine": math.nan})
+    with pytest.raises(ValueError, match="JSON"):
+        dashboards.write(Results("here", {"id": row}), tmp_path)
 
 
 def test_the_summary_is_a_table_of_violations_and_a_list_of_notes():

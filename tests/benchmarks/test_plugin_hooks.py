@@ -18,7 +18,9 @@ class Options(SimpleNamespace):
 
 def configuration(*arguments, source=pytest.Config.ArgsSource.ARGS, timer=True, **options):
     given = SimpleNamespace(args=arguments, dir=Path.cwd())
-    plugins = SimpleNamespace(hasplugin=lambda name: timer and name == "benchmark", register=lambda *plugin: known.append(plugin))
+    plugins = SimpleNamespace(
+        hasplugin=lambda name: timer and name == "benchmark", register=lambda *plugin: known.append(plugin)
+    )
     known = []
     wanted = {"conservative_benchmark": True, "conservative_gate": False, "args": list(arguments), "args_source": source}
     wanted |= {"conservative_gate_baseline": "b", "conservative_gate_times": "known", "rootpath": Path("root")}
@@ -95,7 +97,7 @@ def test_accuracy_is_shown_group_by_group():
     assert config.stash[MEASURED] == rows
     pytest_plugin.pytest_terminal_summary(terminal)
     assert [line.split("  ")[0] for line in said] == ["accuracy beside time", "benchmark", "a", "c", "", "benchmark", "b", ""]
-    config.option.dist = "load"
+    config.option.dist = "worksteal"
     pytest_plugin.pytest_terminal_summary(terminal)
     assert said[8].startswith("--benchmark: timing is off under -n")
     config.conservative_benchmark = False

@@ -116,3 +116,21 @@ def test_the_definition_holds_every_constant(monkeypatch):
             assert yardstick.definition() != before
     assert np.isfinite(yardstick.step_reference_body(10**3, 1e-2))
     assert math.isclose(eval(before[before.rindex("(") :])[0], 0.0004)
+
+
+def test_another_process_is_asked_by_name(monkeypatch):
+    asked = []
+
+    def run(command, **options):
+        asked.append((command[1:], options))
+        return SimpleNamespace(stdout="1.5\n")
+
+    monkeypatch.setattr(yardstick.subprocess, "run", run)
+    assert yardstick.time_ratio_elsewhere("brick_flip", "reduced") == 1.5
+    ((command, options),) = asked
+    assert command == ["-m", "conservative.benchmarks.gate.yardstick", "brick_flip", "reduced"]
+    assert options["text"] is options["check"] is True
+
+
+def test_the_yardstick_is_compiled_once():
+    assert yardstick.compile_reference.cache_parameters()["maxsize"] == 1

@@ -1,6 +1,5 @@
 """Motions of scenes by SciPy's DOP853 from the textbook's equations, as truth for runs of a few steps."""
 
-
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -32,7 +31,14 @@ def free(moments, w, turn=TURN):
 
 def top(moments=(1.0, 1.0, 0.3), w=(0.4, -0.7, 9.0), weight=5.0, turn=TURN):
     body = cv.RigidBody(turn @ np.diag(moments) @ turn.T)
-    return cv.Scene(f"top {moments}, {w}, {weight}, {turn[0, 0]:.2f}", body, START, turn @ np.array(w), 1.0, cv.UniformGravity(weight, turn[:, 2]))
+    return cv.Scene(
+        f"top {moments}, {w}, {weight}, {turn[0, 0]:.2f}",
+        body,
+        START,
+        turn @ np.array(w),
+        1.0,
+        cv.UniformGravity(weight, turn[:, 2]),
+    )
 
 
 def hat(w):

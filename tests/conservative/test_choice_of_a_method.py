@@ -44,7 +44,7 @@ class Known(cv.Method):
         self.taken.append(grid)
         rate = 2.0 + self.size * grid.dt**self.power
         if grid.dt > self.fails_above:
-            raise cv.Unsupported(f"steps of {grid.dt}")
+            raise cv.Unsupported("dt", grid.dt, "shorter steps")
         R = Rotation.from_rotvec(np.outer(rate * grid.t, (0, 0, 1))).as_matrix()
         counters = Counters(grid.n_steps, grid.n_steps, 2 * grid.n_steps)
         return lambda: cv.Trajectory(scene, grid.t, R, np.tile((0, 0, 2.0), (len(R), 1)), self.label, counters)
@@ -73,7 +73,14 @@ def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected)
 
 @pytest.mark.parametrize(
     ("estimate", "power", "expected"),
-    [(1e-4, 2, math.sqrt(0.5e-2)), (0.6e-6, 2, 0.9), (1e-3, 2, 0.1), (math.inf, 2, 0.5), (1e-4, 0, 0.5), (1.6e-5, 4, (0.5 / 16) ** 0.25)],
+    [
+        (1e-5, 2, math.sqrt(0.05)),
+        (0.6e-6, 2, 0.9),
+        (1e-3, 2, 0.1),
+        (math.inf, 2, 0.5),
+        (1e-4, 0, 0.5),
+        (1.6e-5, 4, (0.5 / 16) ** 0.25),
+    ],
 )
 def test_the_next_step_follows_from_the_order(estimate, power, expected):
     assert automatic._step_factor(estimate, 1e-6, Known(power=power)) == pytest.approx(expected)
@@ -85,7 +92,14 @@ def test_factors_by_which_a_finer_run_is_better():
 
 @pytest.mark.parametrize(
     ("errors", "stalls"),
-    [([1.0, 0.9], False), ([1.0, 0.9, 0.8], True), ([1.0, 0.9, 0.69], False), ([1.0, 0.69, 0.9], False), ([9.0, 1.0, 0.71, 0.71], True), ([1.0, 0.7, 0.9], False)],
+    [
+        ([1.0, 0.9], False),
+        ([1.0, 0.9, 0.8], True),
+        ([1.0, 0.9, 0.69], False),
+        ([1.0, 0.69, 0.9], False),
+        ([9.0, 1.0, 0.71, 0.71], True),
+        ([1.0, 0.7, 0.9], False),
+    ],
 )
 def test_errors_that_stop_falling(errors, stalls):
     assert automatic.stops_falling(errors) is stalls

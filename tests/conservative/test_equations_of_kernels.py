@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ellipj
 
 import conservative as cv
-from conservative.kernels import gauss, moser_veselov, projected, reduced
+from conservative.kernels import gauss, moser_veselov, reduced
 
 from .exact_motion import TURN, free, in_field
 
@@ -29,6 +29,12 @@ def equation(h, a, field=None):
     return J * a + np.cross(a, J * a) - h / 2 * (L + h / 2 * (T - np.cross(a, T)))
 
 
+def columns(h, a, field=None):
+    """The derivative of the equation by a, (3, 3), as a difference quotient."""
+    sides = [(equation(h, a + EPSILON * e, field), equation(h, a - EPSILON * e, field)) for e in np.eye(3)]
+    return np.array([(above - below) / (2 * EPSILON) for above, below in sides]).T
+
+
 def end(h, a, field=None):
     """Cay(2a)' (L + h T)"""
     T = np.zeros(3) if field is None else np.array(reduced.finite_torque(field, Q, triple(a))[0])
@@ -39,10 +45,14 @@ def end(h, a, field=None):
 
 @pytest.mark.parametrize("field", [None, FIELD])
 def test_reduced_residual_and_its_tangent(field):
-    np.testing.assert_allclose(reduced.residual(0.3, triple(J), field, Q, triple(L), triple(A)), equation(0.3, A, field), atol=1e-14)
-    tangent = [(equation(0.3, A + EPSILON * e, field) - equation(0.3, A - EPSILON * e, field)) / (2 * EPSILON) for e in np.eye(3)]
+    np.testing.assert_allclose(
+        reduced.residual(0.3, triple(J), field, Q, triple(L), triple(A)), equation(0.3, A, field), atol=1e-14
+    )
+    tangent = [
+        (equation(0.3, A + EPSILON * e, field) - equation(0.3, A - EPSILON * e, field)) / (2 * EPSILON) for e in np.eye(3)
+    ]
     rows = reduced.inverse_tangent(0.3, triple(J), field, Q, triple(A))
-    np.testing.assert_allclose(np.array(rows) @ np.array(tangent).T, np.eye(3), atol=1e-8)
+    np.testing.assert_allclose(np.array(rows) @ tangent, np.eye(3), atol=1e-8)
 
 
 @pytest.mark.parametrize("field", [None, FIELD])
@@ -54,7 +64,7 @@ def test_reduced_newton(field):
         assert trusted
         assert np.abs(equation(h, np.array(a), field)).max() < 1e-15
         np.testing.assert_allclose(L + gain, end(h, np.array(a), field), atol=2e-15)
-        assert corrections == (3 if h == 0.05 else 3)
+        assert corrections == 3
         assert 1e-12 < size < 1e-4
 
 
@@ -98,7 +108,10 @@ def follow(h, field=None, parts=40):
     a = np.zeros(3)
     for part in np.linspace(0, h, parts + 1)[1:]:
         for _ in range(6):
-            tangent = [(equation(part, a + EPSILON * e, field) - equation(part, a - EPSILON * e, field)) / (2 * EPSILON) for e in np.eye(3)]
+            tangent = [
+                (equation(part, a + EPSILON * e, field) - equation(part, a - EPSILON * e, field)) / (2 * EPSILON)
+                for e in np.eye(3)
+            ]
             a = a - np.linalg.solve(np.array(tangent).T, equation(part, a, field))
     return a
 
@@ -198,7 +211,7 @@ def test_moser_veselov_power_series():
     np.testing.assert_allclose(np.convolve(quotient, b)[: moser_veselov.TERMS], a, rtol=1e-12)
 
 
-@pytest.mark.parametrize("moments", [(1, 1.4, 2), (2, 1.4, 1), (1, 1, 2), (2, 1, 1)])
+@pytest.mark.parametrize("moments", [(0.9, 1.4, 2.3), (2.3, 1.4, 0.9), (1, 1, 2), (2, 1, 1)])
 def test_moser_veselov_polhode(moments):
     """Amplitudes and the start on the curve: L = (A1 c, A2 s, A3 d), with the energy and the length of L."""
     momentum = np.array([0.2, -0.3, 1.9])
@@ -209,51 +222,3 @@ def test_moser_veselov_polhode(moments):
     assert p.m + p.mc == pytest.approx(1)
     assert p.s**2 + p.c**2 == pytest.approx(1)
     assert p.d**2 == pytest.approx(p.mc + p.m * p.c**2)
-
-
-def test_projected_brings_a_state_back_to_its_invariants():
-    scene = in_field("gravity")
-    field, axis, scales = scene.potential.kernel_field(TURN), (0.0, 0.0, 1.0), (3.0, 2.0)
-    inverse, q = triple(1 / J), (0.5, -0.5, 0.5, 0.5)
-    kept = projected.values(inverse, field, axis, q, triple(L))
-    for away in (1e-3, 1e-6):
-        moved_q, moved_L = triple(np.array(q) + away * np.array([1, 2, -1, 0.5])), triple(L + away * np.array([1, -2, 3]))
-        back_q, back_L, corrections, defect = projected.project(inverse, field, axis, kept, scales, moved_q, moved_L)
-        now = projected.values(inverse, field, axis, back_q, back_L)
-        np.testing.assert_allclose(now, kept, atol=4e-15)
-        assert defect <= 2.0**-51
-        assert 1 <= corrections <= 3
-        assert np.linalg.norm(back_q) == pytest.approx(1, abs=1e-10)
-        assert np.abs(np.subtract(back_L, moved_L)).max() < 10 * away
-
-
-def test_projected_leaves_a_state_that_is_too_far_away():
-    field, axis, scales = FIELD, (0.0, 0.0, 1.0), (3.0, 2.0)
-    inverse = triple(1 / J)
-    kept = projected.values(inverse, field, axis, Q, triple(L))
-    for factor, corrected in ((1.02, True), (1.5, False)):
-        _, found, corrections, defect = projected.project(inverse, field, axis, kept, scales, Q, triple(factor * L))
-        assert (corrections > 0) == corrected == (defect < 1e-15)
-        assert corrected or found == triple(factor * L)
-    failed = cv.Projected().prepare(in_field("gravity"), cv.Grid(4.0, 6, 1))()
-    assert failed.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
-    assert failed.outcome.residual > 1e-6
-    assert failed.counters.evaluations == 12 * failed.counters.steps
-
-
-def test_projected_moves_the_state_least():
-    """The correction is in the plane of the two gradients, and first order in what is asked for."""
-    field, size, w = FIELD, 2.0, L / J
-    for axis in (None, (0.0, 0.0, 1.0)):
-        e, m = 1e-5, (0.0 if axis is None else -2e-5)
-        dL, turn = projected.shortest_move(triple(1 / J), field, axis, size, e, m, Q, triple(L))
-        T = np.array(reduced.body_torque(field, Q))
-        assert w @ dL - T @ turn == pytest.approx(e, rel=1e-6)
-        gradients = [np.concatenate([size * w, -T])]
-        if axis is not None:
-            v = np.array(projected.in_body(Q, axis))
-            gradients.append(np.concatenate([size * v, np.cross(L, v)]))
-            assert v @ dL + np.cross(L, v) @ turn == pytest.approx(m, rel=1e-6)
-        move = np.concatenate([np.array(dL) / size, turn])
-        left = np.linalg.lstsq(np.array(gradients).T, move, rcond=None)[1]
-        assert left < 1e-22

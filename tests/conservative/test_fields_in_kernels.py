@@ -15,6 +15,8 @@ KINDS = {"gravity": "Uniform", "gradient": "Gradient", "function": "Function", "
 Q = (0.9, -0.5, 0.7, 1.1)
 A = np.array([0.31, -0.22, 0.43])
 EPSILON = 1e-5
+X, ORIGIN = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+FUNCTIONS = (fields.energy, fields.body_torque, fields.finite_torque, fields.finite_derivative, point_fields.slope)
 
 
 def matrix(q):
@@ -56,7 +58,7 @@ def test_torque_of_a_step_does_the_work_of_the_step(case):
     scene, field = case
     T, _ = fields.finite_torque(field, Q, tuple(A))
     work = scene.potential.energy(turned(A) @ TURN.T) - scene.potential.energy(matrix(Q) @ TURN.T)
-    assert -2 * A @ T == pytest.approx(float(work), abs=2e-14)
+    assert pytest.approx(float(work), abs=2e-14) == -2 * A @ T
     R0, R1 = matrix(Q), turned(A)
     V_star, _ = fields.finite_derivative(field, columns(R0), columns(R1))
     mean = 0.5 * (R0 + R1)
@@ -86,7 +88,9 @@ def test_finite_derivative_is_the_potentials(case):
         np.testing.assert_allclose(dV_star[:, k], (ends[0] - ends[1]) / (2 * EPSILON), atol=3e-9)
 
 
-@pytest.mark.parametrize("field", [point_fields.Spring((1, 0, 0), (0, 0, 0), 3.0, 0.4), point_fields.Attraction((1, 0, 0), (0, 0, 0), 2.0)])
+@pytest.mark.parametrize(
+    "field", [point_fields.Spring((1, 0, 0), (0, 0, 0), 3.0, 0.4), point_fields.Attraction((1, 0, 0), (0, 0, 0), 2.0)]
+)
 def test_slope_is_a_divided_difference(field):
     """Of Spring and Attraction, over the square of the distance."""
 
@@ -101,10 +105,10 @@ def test_slope_is_a_divided_difference(field):
     assert point_fields.slope(field, 1.3, 1.3)[0] == pytest.approx((F(1.3 + 1e-4) - F(1.3 - 1e-4)) / 2e-4, rel=1e-7)
 
 
-@pytest.mark.parametrize("function", [fields.energy, fields.body_torque, fields.finite_torque, fields.finite_derivative, point_fields.slope])
+@pytest.mark.parametrize(
+    "function", [fields.energy, fields.body_torque, fields.finite_torque, fields.finite_derivative, point_fields.slope]
+)
 def test_what_is_no_field_is_refused(function):
     """Whether it is Uniform, Spring, Attraction, Gradient or Function."""
     with pytest.raises(TypeError, match="not a field: 'none'"):
         function("none", 1.0, 2.0) if function not in (fields.energy, fields.body_torque) else function("none", 1.0)
-
-

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.attitude import to_quaternion
-from conservative.methods import gauss, moser_veselov, non_spinning, principal_axes, projected
-from conservative.methods.coefficients import explicit, gauss_legendre
+from conservative.declarations import Candidacy
+from conservative.methods import moser_veselov
+from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
 
-from .exact_motion import START, TURN, free, in_field, top
+from .exact_motion import free, in_field, top
 
 TOP, FREE, GRAVITY, SPRUNG = top(), free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity"), in_field("spring")
-LEFT_OUT = "energy"
 AXIS = "momentum along the field's axis"
 
 
@@ -29,7 +28,12 @@ AXIS = "momentum along the field's axis"
         (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
         (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
         (cv.Projected(), "projected", 8, {"energy", "vertical momentum", AXIS}),
-        (cv.Substepped("reduced:order=4"), "substepped:method=reduced:order=4", 4, {"energy", "momentum", "vertical momentum", AXIS}),
+        (
+            cv.Substepped("reduced:order=4"),
+            "substepped:method=reduced:order=4",
+            4,
+            {"energy", "momentum", "vertical momentum", AXIS},
+        ),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )
@@ -38,11 +42,18 @@ def test_order_and_invariants(method, name, order, conserves):
 
 
 def test_candidates_and_their_cost():
-    ranks = {method: (method.candidacy.rank, method.candidacy.exact, method.candidacy.group) for method in (cv.Lame, cv.Reduced)}
+    ranks = {
+        method: (method.candidacy.rank, method.candidacy.exact, method.candidacy.group) for method in (cv.Lame, cv.Reduced)
+    }
     assert ranks == {cv.Lame: (1, True, ""), cv.Reduced: (4, False, "implicit")}
     assert (cv.MoserVeselov.candidacy.rank, cv.MoserVeselov.candidacy.exact) == (0, True)
     assert (cv.Projected.candidacy.rank, cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (2, 3, "implicit")
-    assert [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())] == [(10, 50), (50, 60), (340, 80)]
+    costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
+    assert costs == [(10, 50), (50, 60), (340, 80)]
+        (10, 50),
+        (50, 60),
+        (340, 80),
+    ]
     assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
     assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
 
@@ -112,26 +123,6 @@ def test_what_is_at_the_edge_of_what_is_allowed():
     assert composition_of(4, "forest_ruth_3") is COMPOSITIONS["forest_ruth_3"]
 
 
-@pytest.mark.parametrize("stages", [1, 2, 3, 7])
-def test_gauss_legendre_coefficients(stages):
-    table = gauss_legendre.tableau(stages)
-    nodes, weights = np.polynomial.legendre.leggauss(stages)
-    np.testing.assert_allclose(table.c, (1 + nodes) / 2, atol=1e-15)
-    np.testing.assert_allclose(table.b, weights / 2, atol=1e-15)
-    for k in range(stages):
-        np.testing.assert_allclose(table.A @ table.c**k, table.c ** (k + 1) / (k + 1), atol=1e-14)
-        np.testing.assert_allclose(table.E @ table.c**k, ((1 + table.c) ** (k + 1) - 1) / (k + 1), atol=2e-12)
-    assert np.abs(table.b_low).max() < 1e-16
-    assert math.fsum([*table.b, *table.b_low, -1.0]) == pytest.approx(0, abs=1e-30)
-    padded = gauss.pad_tableau(stages)
-    width = -(-stages // 4) * 4
-    assert [each.shape for each in padded] == [(stages * width,), (stages * width,), (width,), (width,)]
-    np.testing.assert_array_equal(padded[0].reshape(stages, width)[:, :stages], table.A.T)
-    assert not padded[0].reshape(stages, width)[:, stages:].any()
-    np.testing.assert_array_equal(padded[2][:stages], table.b)
-    np.testing.assert_array_equal(padded[3][:stages], table.b_low)
-
-
 def test_what_methods_do_not_support():
     said = [method.unsupported(scene) for method, scene in ((cv.Gauss(), SPRUNG), (cv.Lame(), SPRUNG), (cv.Lame(), GRAVITY))]
     assert said[0].startswith("collocation keeps quadratic invariants")
@@ -140,7 +131,13 @@ def test_what_methods_do_not_support():
     assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
     assert cv.Reduced(frame="non_spinning").unsupported(FREE).startswith("frame non_spinning needs")
     assert cv.Substepped("gauss").unsupported(SPRUNG) == said[0]
-    for method, scene in ((cv.Gauss(), FREE), (cv.Lame(), TOP), (cv.MoserVeselov(), FREE), (cv.Projected(), SPRUNG), (cv.Reduced(), FREE)):
+    for method, scene in (
+        (cv.Gauss(), FREE),
+        (cv.Lame(), TOP),
+        (cv.MoserVeselov(), FREE),
+        (cv.Projected(), SPRUNG),
+        (cv.Reduced(), FREE),
+    ):
         assert method.unsupported(scene) is None
 
 
@@ -172,57 +169,6 @@ def test_axes_of_the_polhode(J, L):
     assert sorted(J)[1] == own[1]
     above = momentum @ momentum - np.sum(momentum**2 / own) * own[1]
     assert above * (own[2] - own[0]) >= 0
-
-
-def test_frames():
-    assert non_spinning.resolve_frame("auto", TOP) == "non_spinning"
-    assert non_spinning.resolve_frame("auto", FREE) == non_spinning.resolve_frame("auto", free((1, 1, 1), (0, 1, 0))) == "body"
-    assert non_spinning.resolve_frame("auto", free((1, 1, 1 + 1e-9), (0, 1, 0))) == "non_spinning"
-    assert non_spinning.resolve_frame("non_spinning", FREE) == "non_spinning"
-    with pytest.raises(cv.BadInput, match="frame"):
-        principal_axes.principal_start(FREE, "non_spinning")
-
-
-def test_a_start_in_principal_axes_and_in_the_slow_frame():
-    start = principal_axes.principal_start(GRAVITY)
-    R, J = GRAVITY.body.R_BP, GRAVITY.body.moments
-    np.testing.assert_allclose(start.J, J)
-    np.testing.assert_allclose(start.J_inverse, 1 / J)
-    np.testing.assert_allclose(start.L, R.T @ GRAVITY.body.inertia @ GRAVITY.w_WB_B0, atol=1e-14)
-    np.testing.assert_allclose(np.abs(start.q), np.abs(to_quaternion(START @ R)), atol=1e-14)
-    np.testing.assert_allclose(start.R_BP, R)
-    assert start.spin is None
-    slow = principal_axes.principal_start(TOP, "non_spinning")
-    np.testing.assert_allclose((slow.J, slow.J_inverse), np.ones((2, 3)), rtol=1e-14)
-    assert slow.spin == pytest.approx(((1.0 - 0.3) / 0.3 * slow.L[2], 1 / 0.3))
-    assert slow.L[2] == pytest.approx(0.3 * 9)
-    assert (slow.field.x, slow.field.y) == (0, 0)
-    assert slow.field.z == pytest.approx(5)
-    assert principal_axes.principal_start(top(turn=np.eye(3)), "non_spinning").R_BP is None
-
-
-def test_units_of_the_closed_system():
-    model = gauss.closed_system(principal_axes.principal_start(GRAVITY))
-    size = np.linalg.norm(principal_axes.principal_start(GRAVITY).L)
-    assert 0.5 < size / model.unit <= 1
-    assert math.log2(model.unit).is_integer()
-    rest = gauss.closed_system(principal_axes.principal_start(free((1, 1.4, 2), (0, 0, 0))))
-    assert (rest.unit, rest.L) == (1.0, (0.0, 0.0, 0.0))
-    hanging = cv.Scene("at rest", GRAVITY.body, START, (0, 0, 0), 1.0, GRAVITY.potential)
-    moment = 2.0 * np.linalg.norm((0.2, 0.1, 0.4))
-    expected = 2.0 ** math.ceil(math.log2(math.sqrt(2.0 * moment)))
-    assert gauss.closed_system(principal_axes.principal_start(hanging)).unit == expected
-    assert np.linalg.norm(gauss.closed_system(principal_axes.principal_start(FREE)).gamma) == pytest.approx(1)
-
-
-def test_scales_and_axis_of_the_projection():
-    energy, momentum = projected.invariant_scales(GRAVITY)
-    assert energy == GRAVITY.energy_scale
-    assert momentum == pytest.approx(math.sqrt(2 * energy * 2.0))
-    assert projected.field_axis(GRAVITY) == pytest.approx((0, 0, 1))
-    axis = np.array([0.5, 0.2, 0.3])
-    np.testing.assert_allclose(np.abs(projected.field_axis(SPRUNG)), axis / np.linalg.norm(axis))
-    assert projected.field_axis(FREE) is projected.field_axis(in_field("function")) is None or TURN is not None
 
 
 def test_the_papers_method_stops_where_it_cannot_go_on():

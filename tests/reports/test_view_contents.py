@@ -58,7 +58,9 @@ def test_each_scene_has_its_rows_and_no_others(built):
         for rows in (scene.points, scene.drifts, scene.errors):
             assert set(rows["scene"]) == {scene.name}
             assert list(rows.index) == list(range(len(rows)))
+            assert "index" not in rows
         assert scene.line_count == 2
+        assert len(scene.contests[1]) == len(built[0].scenes[0].contests[1])  # as many points, all of them its own
         assert scene.front.equals(work_precision.front(scene.points))
         assert scene.thin_drifts.equals(lines.thin(scene.drifts))
         header, body = scene.order

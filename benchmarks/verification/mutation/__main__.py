@@ -1,4 +1,4 @@
-"""What the tests notice: `python -m conservative.benchmarks.verification.mutation [NAME ...] [--sample N] [--seed S] [--jobs N]`.
+"""What tests notice: `python -m conservative.benchmarks.verification.mutation [NAME ...] [--sample N] [--seed S] [--jobs N]`.
 
 Small faults made by cosmic-ray are planted one at a time in a copy of the tree, and the tests that `mutation.toml` names for
 the file are run, with kernels as plain Python. NAME is a room of that table or a file of one; without any, all are tried. Of
@@ -33,7 +33,7 @@ def measure_room(judges: Judges, room: table.Room, files: list[str], count: int,
         if verdict.survived:
             print(f"  survived: {verdict.mutant}\n    {table.find_reason(verdict.mutant) or 'no reason known'}", flush=True)
     print_shares(verdicts)
-    return share([verdict for verdict in verdicts])[0]
+    return share(verdicts)[0]
 
 
 def print_shares(verdicts: list[Verdict]) -> None:

@@ -51,7 +51,7 @@ class Judge:
         shutil.copytree(root, folder, symlinks=True, ignore=NOT_COPIED, dirs_exist_ok=True)
         self.process = subprocess.Popen(
             [sys.executable, "-P", str(WORKER), str(folder)],
-            env={**os.environ, **ENVIRONMENT, "PYTHONPATH": str(folder)},
+            env={**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -24,7 +24,7 @@ COMPILERS = ("kernel", "small")
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change of one file, its path relative to the root: the new text, and the first line that differs, before and after."""
+    """One change of a file, its path relative to the root: the new text, and the first line that differs, before and after."""
 
     file: str
     line: int
