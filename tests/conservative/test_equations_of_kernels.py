@@ -29,12 +29,6 @@ def equation(h, a, field=None):
     return J * a + np.cross(a, J * a) - h / 2 * (L + h / 2 * (T - np.cross(a, T)))
 
 
-def columns(h, a, field=None):
-    """The derivative of the equation by a, (3, 3), as a difference quotient."""
-    sides = [(equation(h, a + EPSILON * e, field), equation(h, a - EPSILON * e, field)) for e in np.eye(3)]
-    return np.array([(above - below) / (2 * EPSILON) for above, below in sides]).T
-
-
 def end(h, a, field=None):
     """Cay(2a)' (L + h T)"""
     T = np.zeros(3) if field is None else np.array(reduced.finite_torque(field, Q, triple(a))[0])
