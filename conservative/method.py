@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import positive_integer, positive_number
+from .check import MOST_STEPS, describe, most_samples, positive_integer, positive_number, real_number, what_fits
 from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
@@ -39,11 +39,28 @@ class Grid:
     """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
+
+    Raises
+    ------
+    BadInput
+        dt is not a finite number above 0; n_steps or every is not an integer of 1 to `MOST_STEPS`; or the samples are more than
+        `most_samples`.
     """
 
     dt: float
     n_steps: int
     every: int = 1
+
+    def __post_init__(self) -> None:
+        step = real_number(self.dt)  # no range: steps of scenes in other units are no longer in SI units
+        if step is None or not 0 < step < math.inf:
+            raise BadInput("dt", describe(self.dt), "a finite step above 0, s")
+        for argument in ("n_steps", "every"):
+            allowed = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
+            if positive_integer(argument, getattr(self, argument), allowed) > MOST_STEPS:
+                raise BadInput(argument, describe(getattr(self, argument)), allowed)
+        if self.n_samples > most_samples():
+            raise BadInput("every", f"{self.every}, for {self.n_samples} samples of {self.n_steps} steps", what_fits(self.n_steps))
 
     @property
     def steps(self) -> Array:
@@ -75,14 +92,21 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     Raises
     ------
     BadInput
-        dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
+        dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1 or more, or
+        the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
     if step > end:
         raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
-    return Grid(step, max(1, math.ceil(end / step * (1 - 1e-9))), positive_integer("sample_every", sample_every))
+    n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
+    if n_steps > MOST_STEPS:
+        raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps")
+    every = min(positive_integer("sample_every", sample_every), n_steps)
+    if 1 + n_steps // every > most_samples():
+        raise BadInput("sample_every", f"{every}, with {n_steps} steps of {step:g} s", what_fits(n_steps))
+    return Grid(step, n_steps, every)
 
 
 class Method(ABC):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import from_quaternion, to_quaternion
-from conservative.check import positive_integer
+from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.uniform_gravity import UniformGravity
@@ -144,7 +144,7 @@ def states(
 def _check_bits(bits: object) -> None:
     allowed = "an integer from 53 (double precision) to 4096"
     if not 53 <= positive_integer("bits", bits, allowed) <= 4096:
-        raise BadInput("bits", repr(bits), allowed)
+        raise BadInput("bits", describe(bits), allowed)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array, cayley, from_quaternion, rotation_about, triple
-from ..check import positive_number, read_only
+from ..check import describe, positive_number, read_only
 from ..errors import BadInput, PotentialFailed
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
@@ -82,7 +82,7 @@ class FunctionPotential(_Fields):
     ) -> None:
         for name, function in (("energy", energy), ("gradient", gradient)):
             if not callable(function):
-                raise BadInput(name, repr(function), "a function of a matrix (3, 3)")
+                raise BadInput(name, describe(function), "a function of a matrix (3, 3)")
         V = energy if isinstance(energy, Energy) else Energy(energy)
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient)
         _check_gradient(V, G)

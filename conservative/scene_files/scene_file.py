@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
-from ..check import finite_array, finite_number, rotation
+from ..check import describe, finite_array, finite_number, rotation
 from ..entry_points import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
@@ -182,7 +182,7 @@ def _axis_angle(axis: ArrayLike, angle: float) -> Array:
 def _direction(argument: str, value: ArrayLike, size: int, allowed: str) -> Array:
     found = finite_array(argument, value, ((size,),), allowed)
     if not found.any():
-        raise BadInput(argument, repr(value), allowed)
+        raise BadInput(argument, describe(value), allowed)
     return found / np.abs(found).max()
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.check import choice, finite_number
+from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
@@ -59,7 +59,7 @@ class Heyoka(Method):
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
-            raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
+            raise BadInput("tol", describe(self.tol), "a number above 0 and below 1")
         choice("frame", self.frame, FRAMES)
         version("heyoka", "heyoka")
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
-from conservative.check import choice, finite_number
+from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.potential import torque_W
@@ -58,7 +58,7 @@ class SciPy(Method):
         choice("integrator", self.integrator, INTEGRATORS)
         allowed = f"a number from {_SMALLEST_RTOL:g} (100 rounding units) to below 1"
         if not _SMALLEST_RTOL <= finite_number("rtol", self.rtol, allowed) < 1:
-            raise BadInput("rtol", repr(self.rtol), allowed)
+            raise BadInput("rtol", describe(self.rtol), allowed)
 
     @property
     def label(self) -> str:
