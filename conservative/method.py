@@ -60,7 +60,9 @@ class Grid:
             if positive_integer(argument, getattr(self, argument), allowed) > MOST_STEPS:
                 raise BadInput(argument, describe(getattr(self, argument)), allowed)
         if self.n_samples > most_samples():
-            raise BadInput("every", f"{self.every}, for {self.n_samples} samples of {self.n_steps} steps", what_fits(self.n_steps))
+            raise BadInput(
+                "every", f"{self.every}, for {self.n_samples} samples of {self.n_steps} steps", what_fits(self.n_steps)
+            )
 
     @property
     def steps(self) -> Array:
@@ -102,7 +104,9 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
     n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
     if n_steps > MOST_STEPS:
-        raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps")
+        raise BadInput(
+            "dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps"
+        )
     every = min(positive_integer("sample_every", sample_every), n_steps)
     if 1 + n_steps // every > most_samples():
         raise BadInput("sample_every", f"{every}, with {n_steps} steps of {step:g} s", what_fits(n_steps))

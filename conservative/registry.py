@@ -27,6 +27,7 @@ from .scene import Scene
 T = TypeVar("T")
 _NAME = "a name with its settings, a text"
 
+
 def list_scenes() -> tuple[str, ...]:
     """Return the names of all registered scenes, in their order; none is imported."""
     return tuple(list_entries(SCENES))
@@ -98,7 +99,7 @@ def _split(text: str) -> tuple[str, list[str]]:
 
 
 def _call(target: Callable[..., T], argument: str, settings: list[str]) -> T:
-    """Return what a registered function or class makes of the settings; what it does not take is bad input, however it says so."""
+    """Return what a registered function or class makes of the settings; what it does not take is bad input."""
     arguments = _arguments(argument, target, settings)
     try:
         return target(**arguments)
