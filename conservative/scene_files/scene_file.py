@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,8 @@ def load(path: str | Path) -> Scene:
     MissingEngine
         The body stands in another file whose engine is not installed.
     """
+    if not isinstance(path, str | PathLike):
+        raise BadInput("path", describe(path), "the path of a file")
     top = read(Path(path))
     top.only(_TOP)
     t_end = top.value("t_end", "a finite duration above 0, s")

@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import epilog, split_names
+from .options import FilePath, epilog, split_names
 
 if TYPE_CHECKING:
     from conservative.benchmarks.recommendation.recommend import Recommendation
@@ -38,7 +38,7 @@ FILES = ("recommendation.json", "recommendation.svg")
     "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
 )
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for recommendation.json and recommendation.svg.")
+@click.option("--out", type=FilePath(), help="Folder for recommendation.json and recommendation.svg.")
 def recommend(
     scene: str,
     error: float,
