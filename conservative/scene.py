@@ -172,7 +172,7 @@ def _check_parts(name: object, body: object, potential: object) -> None:
 def _invariants(value: object) -> tuple[Invariant, ...]:
     """Return invariants as a tuple; raise `BadInput` for what is none of them."""
     try:
-        found = tuple(value)  # type: ignore[arg-type]
+        found: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
     except Exception:  # no iterable, or one that fails
         found = (value,)
     if not all(isinstance(each, Invariant) for each in found):

@@ -16,9 +16,9 @@ from ..errors import BadInput, nearest
 Key = tuple[str, ...]
 Built = TypeVar("Built")
 
-LARGEST = 100_000
-"""Bytes of a file that are read at most: a scene has less than a tenth of it."""
-MOST_LINES = 1000
+LARGEST = 1_000_000
+"""Bytes of a file that are read at most: a scene has less than a hundredth of it."""
+MOST_LINES = 100
 """Lines of one statement: finding its end takes the square of them, seconds at this limit."""
 
 

@@ -122,7 +122,7 @@ def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, str]:
 
 def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, str]:
     """Return the same, with steps cut at the samples."""
-    states, steps, outcome = np.full((len(t), len(integrator.state)), np.nan), 0, None
+    states, steps = np.full((len(t), len(integrator.state)), np.nan), 0
     states[0] = integrator.state
     for sample, time in enumerate(t[1:], start=1):
         outcome, _, _, taken, *_ = integrator.propagate_until(time, max_steps=STEP_LIMIT - steps)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from click.shell_completion import CompletionItem
 
 EXIT_CODES = """Exit codes:
     0    done
@@ -15,18 +14,13 @@ EXIT_CODES = """Exit codes:
 """
 
 
-class FilePath(click.ParamType):
+class FilePath(click.Path):
     """A path, which no system takes with a NUL in it."""
-
-    name = "path"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if "\0" in str(value):
             self.fail(f"got {value!r}; allowed: a path without NUL", param, ctx)
         return Path(str(value))
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        return click.Path().shell_complete(ctx, param, incomplete)
 
 
 def epilog(*examples: str) -> str:
