@@ -1,0 +1,267 @@
+"""What `conservative.benchmarks.verification.hostile_values` tries: calls of the public API with hostile arguments.
+
+Each kind of call has arguments that work; some of them are replaced by hostile ones. Source: our own.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+
+import conservative as cv
+from conservative import registry
+from conservative.check import describe
+from conservative.method import Method
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.engines.scipy import SciPy
+from conservative.references.exact.method import Exact, free_body, lagrange_top
+from conservative.references.precise import Precise
+from conservative.scene_files import scene_file
+from conservative.trajectory import Trajectory
+
+from .hostile_arguments import draw_hostile, scramble
+
+OURS = (cv.Reduced(), cv.Reduced(4), cv.Gauss(2), cv.MoserVeselov(), cv.Lame(), cv.Projected(), cv.Convected(), cv.Substepped())
+REFERENCES = (MuJoCo(), Pinocchio(), Heyoka(1e-9), SciPy(rtol=1e-6), Exact(), Precise(64))
+MODELS = {
+    body_from_mjcf: '<mujoco><worldbody><body name="arm"><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>',
+    body_from_urdf: '<robot name="r"><link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
+    'ixz="0" iyz="0"/></inertial></link></robot>',
+}
+
+
+@dataclass(frozen=True)
+class Try:
+    """A call to make: what it is of, the call in words, and the call."""
+
+    name: str
+    words: str
+    call: Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One motion, computed twice: in usual units, and with units of time and inertia that are far away."""
+
+    plain: Trajectory
+    scaled: Trajectory
+
+
+def make_try(rng: Random, folder: Path) -> Try:
+    """Return the next try; the files that it reads are written to a folder."""
+    kinds = [
+        _construct,
+        _construct,
+        _construct,
+        _set,
+        _integrate,
+        _name,
+        _scene_function,
+        _scene_file,
+        _extreme,
+        _units,
+        _closed_form,
+    ]
+    return (_model_file if rng.random() < 0.002 else rng.choice(kinds))(rng, folder)
+
+
+def _swap(rng: Random, name: str, function: Callable[..., object], arguments: Mapping[str, Any]) -> Try:
+    """Return a call in which one or more of the arguments are hostile."""
+    swapped = rng.sample(list(arguments), k=min(len(arguments), rng.choice((1, 1, 1, 2, 3)))) if arguments else []
+    given = {key: draw_hostile(rng, value) if key in swapped else value for key, value in arguments.items()}
+    words = ", ".join(f"{key}={describe(given[key])}" for key in swapped)
+    return Try(name, f"{name}({words})", lambda: function(**given))
+
+
+def _body() -> cv.RigidBody:
+    return cv.RigidBody((1.0, 2.0, 2.5))
+
+
+def _quartic(R: Any) -> float:
+    return float(R[2] @ (0.0, 0.1, 0.4)) ** 4
+
+
+def _quartic_gradient(R: Any) -> Any:
+    return np.outer([0, 0, 1], 4 * float(R[2] @ (0.0, 0.1, 0.4)) ** 3 * np.array((0.0, 0.1, 0.4)))
+
+
+def _scene_of(**given: Any) -> cv.Scene:
+    return cv.Scene(**given)
+
+
+SCENE = {"name": "s", "R_WB0": np.eye(3), "w_WB_B0": (0.1, 0.2, 3.0), "t_end": 1.0, "potential": None}
+DETAILS = {"dt": 0.05, "extra_invariants": (), "group": "g", "source": "s"}
+CONSTRUCTORS: dict[Callable[..., object], dict[str, Any]] = {
+    cv.RigidBody: {"inertia": (1.0, 2.0, 2.5)},
+    cv.Scene: {**SCENE, "body": _body(), **DETAILS},
+    cv.UniformGravity: {"weight": 1.0, "com_B": (0, 0, 0.1)},
+    cv.LinearSpring: {"stiffness": 1.0, "point_B": (1, 0, 0), "anchor_W": (0, 0, 1), "rest_length": 0.5},
+    cv.PointAttraction: {"strength": 1.0, "point_B": (1, 0, 0), "anchor_W": (0, 0, 2)},
+    cv.GravityGradient: {"rate": 1.0, "inertia": (1.0, 2.0, 2.5), "direction_W": (0, 0, 1)},
+    cv.FunctionPotential: {"energy": _quartic, "gradient": _quartic_gradient, "scale": 1.0, "axis_W": (0, 0, 1)},
+    cv.Invariant: {"name": "i", "unit": "J", "scale": 1.0, "evaluate": lambda R, w: w[:, 0]},
+    cv.Grid: {"dt": 0.1, "n_steps": 10, "every": 2},
+    cv.shapes.box: {"size": (1, 2, 3), "mass": 1.0, "density": None},
+    cv.shapes.ellipsoid: {"semi_axes": (1, 2, 3), "mass": None, "density": 1.0},
+    cv.shapes.cylinder: {"radius": 1.0, "height": 2.0, "mass": None, "density": 1.0},
+    cv.shapes.cone: {"radius": 1.0, "height": 2.0, "mass": 1.0, "density": None},
+    cv.shapes.MassDistribution: {"mass": 1.0, "com_B": (0, 0, 1), "inertia_com": (1, 2, 2.5)},
+    cv.shapes.box((1, 2, 3), mass=1).rotate: {"R_BS": np.eye(3)},
+    cv.shapes.box((1, 2, 3), mass=1).about: {"com_B": (0, 0, 1)},
+    cv.shapes.box((1, 2, 3), mass=1).gravity: {"g": 9.81},
+}
+
+
+def _construct(rng: Random, folder: Path) -> Try:
+    """Return a call of a constructor; of a scene it makes a run now and then, and of a shape its body."""
+    function, arguments = rng.choice(list(CONSTRUCTORS.items()))
+    made = _swap(rng, function.__name__, function, arguments)
+    return Try(made.name, made.words, lambda: _use(made.call()))
+
+
+def _use(value: object) -> object:
+    """Return what follows from a value: of a mass its body, of a grid nothing more, of a potential a run in it."""
+    if isinstance(value, cv.shapes.MassDistribution):
+        return value.body
+    if isinstance(value, cv.Grid):
+        return value.n_samples < 10**6 and value.t
+    if isinstance(value, cv.FunctionPotential):
+        return cv.integrate(_scene_of(**{**SCENE, "potential": value}, body=_body()), 0.1, t_end=0.2)
+    return value
+
+
+def _set(rng: Random, folder: Path) -> Try:
+    """Return a call of a method's class with hostile settings."""
+    family: type[Method] = type(rng.choice(OURS + REFERENCES))
+    settings = {name: p.default for name, p in inspect.signature(family).parameters.items()}
+    return _swap(rng, family.__name__, family, settings)
+
+
+def _integrate(rng: Random, folder: Path) -> Try:
+    """Return a short run with hostile arguments."""
+    scene = rng.choice((cv.scenes.brick_flip(), cv.scenes.lagrange_top(), cv.scenes.sprung_body()))
+    arguments = {"scene": scene, "dt": 0.05, "method": rng.choice((*OURS, None)), "t_end": 0.3, "sample_every": 2}
+    more = rng.choice(({"error": None}, {"on_failure": "return"}, {}))
+    if rng.random() < 0.1:
+        more, arguments["method"] = {"error": 1e-6}, None
+    return _swap(rng, "integrate", cv.integrate, {**arguments, **more})
+
+
+def _name(rng: Random, folder: Path) -> Try:
+    """Return a look-up of a scrambled name."""
+    look = rng.choice((registry.scene, registry.method))
+    names = registry.list_scenes() if look is registry.scene else registry.list_methods()
+    setting = rng.choice(
+        ("", ":", ":1e400", ":none", ":true", f":{'9' * 400}", ":nan", ":x=1", ":-1", ":0", ":[]", ":\0", ":1,2,3,4")
+    )
+    text: Any = rng.choice(names) + setting
+    text = draw_hostile(rng, "s") if rng.random() < 0.2 else scramble(rng, text) if rng.random() < 0.3 else text
+    return Try(look.__name__, f"registry.{look.__name__}({describe(text)})", lambda: look(text))
+
+
+def _scene_function(rng: Random, folder: Path) -> Try:
+    """Return a call of one of the scenes with hostile parameters."""
+    name = rng.choice(registry.list_scenes())
+    function = getattr(cv.scenes, name)
+    parameters = {key: p.default for key, p in inspect.signature(function).parameters.items()}
+    return _swap(rng, f"scenes.{name}", function, parameters)
+
+
+def _scene_file(rng: Random, folder: Path) -> Try:
+    """Return the reading of a scene file with a hostile value, or with scrambled text."""
+    lines, path = scene_file.template().splitlines(), folder / "scene.toml"
+    number = rng.choice([i for i, line in enumerate(lines) if "=" in line and not line.startswith("#")])
+    values = (
+        "1e400",
+        "nan",
+        "-inf",
+        "9" * 400,
+        "[1, 2]",
+        '"text"',
+        "true",
+        "1979-05-27",
+        '"\\u0000"',
+        "{}",
+        "1e-200",
+        "[[1e300]]",
+        "",
+    )
+    lines[number] = lines[number].partition("=")[0] + "= " + rng.choice(values)
+    text = "\n".join(lines)
+    text = scramble(rng, text) if rng.random() < 0.5 else text
+
+    def load() -> object:
+        path.write_text(text, encoding="utf-8", errors="surrogatepass")
+        return scene_file.load(path)
+
+    return Try("scene file", f"scene_file.load of {lines[number]!r}, scrambled or not", load)
+
+
+def _model_file(rng: Random, folder: Path) -> Try:
+    """Return the reading of a scrambled model file, or of one with a hostile path or name."""
+    read, text = rng.choice(list(MODELS.items()))
+    path, changed = folder / "model.xml", scramble(rng, text)
+
+    def call(path: object, name: object) -> object:
+        (folder / "model.xml").write_text(changed, encoding="utf-8", errors="surrogatepass")
+        return read(path, name)  # type: ignore[arg-type]
+
+    if rng.random() < 0.5:
+        return _swap(rng, read.__name__, call, {"path": str(path), "name": "arm"})
+    return Try(read.__name__, f"{read.__name__} of {changed!r}", lambda: call(path, "arm"))
+
+
+def _draw_scene(rng: Random, time: float, inertia: float) -> cv.Scene:
+    """Return a random scene in units of time, s, and of inertia, kg m^2."""
+    moments = np.array([rng.uniform(0.7, 1.3) for _ in range(3)])
+    if rng.random() < 0.4:
+        moments[1] = moments[0]
+    rates, moment = np.array([rng.gauss(0, 1) for _ in range(3)]), rng.uniform(0.1, 3)
+    field = cv.UniformGravity(moment * inertia / time**2, (0, 0, 1.0)) if rng.random() < 0.5 else None
+    return cv.Scene("drawn", cv.RigidBody(moments * inertia), np.eye(3), rates / time, 0.5 * time, field)
+
+
+def _units(rng: Random, folder: Path) -> Try:
+    """Return the same run in usual and in far units, both powers of two, so that exact arithmetic would give the same."""
+    seed, time, inertia = rng.random(), 2.0 ** rng.randint(-300, 300), 2.0 ** rng.randint(-300, 300)
+    method: Method = rng.choice(OURS + REFERENCES)
+
+    def run() -> Pair:
+        scenes = (_draw_scene(Random(seed), 1.0, 1.0), _draw_scene(Random(seed), time, inertia))
+        plain, scaled = (cv.integrate(s, s.t_end / 10, method, on_failure="return") for s in scenes)
+        return Pair(plain, scaled)
+
+    return Try(f"{method.family} in units", f"{method.name}, units {time:g} s and {inertia:g} kg m^2, scene {seed}", run)
+
+
+def _extreme(rng: Random, folder: Path) -> Try:
+    """Return a run of a scene whose numbers lie anywhere in the range that is allowed."""
+    exponent = lambda: 10.0 ** rng.uniform(-99, 99)  # noqa: E731
+    moments, rates = [exponent() for _ in range(3)], [exponent() for _ in range(3)]
+    t_end, weight, method = exponent(), exponent(), rng.choice(OURS)
+    if rng.random() < 0.5:
+        moments = [exponent()] * 3
+
+    def run() -> object:
+        field = cv.UniformGravity(weight, (0, 0, 1)) if int(t_end) % 2 else None
+        scene = cv.Scene("extreme", cv.RigidBody(moments), np.eye(3), rates, t_end, field)
+        return cv.integrate(scene, t_end / 10, method, on_failure="return")
+
+    return Try(f"{method.family} at extremes", f"{method.name}, J {moments}, w {rates}, t_end {t_end}, weight {weight}", run)
+
+
+def _closed_form(rng: Random, folder: Path) -> Try:
+    """Return a call of a closed form with hostile arguments."""
+    arguments = {"body": cv.RigidBody((1, 1, 2)), "R_WB0": np.eye(3), "w_WB_B0": (1, 2, 3), "t": [0.0, 1.0]}
+    if rng.random() < 0.5:
+        return _swap(rng, "free_body", free_body, arguments)
+    return _swap(rng, "lagrange_top", lagrange_top, {**arguments, "potential": cv.UniformGravity(1, (0, 0, 1))})
