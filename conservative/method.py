@@ -59,6 +59,8 @@ class Grid:
             allowed = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
             if positive_integer(argument, getattr(self, argument), allowed) > MOST_STEPS:
                 raise BadInput(argument, describe(getattr(self, argument)), allowed)
+        if not math.isfinite(step * self.n_steps):
+            raise BadInput("dt", f"{step:g}, for {self.n_steps} steps", "a step whose multiples are finite, s")
         if self.n_samples > most_samples():
             raise BadInput(
                 "every", f"{self.every}, for {self.n_samples} samples of {self.n_steps} steps", what_fits(self.n_steps)

@@ -74,6 +74,24 @@ def make_try(rng: Random, folder: Path) -> Try:
     return (_model_file if rng.random() < 0.002 else rng.choice(kinds))(rng, folder)
 
 
+def warm_up() -> None:
+    """Run every method once in each field, since compiling may take longer than a try."""
+    scenes = [
+        cv.scenes.brick_flip(),
+        cv.scenes.lagrange_top(),
+        cv.scenes.sprung_body(),
+        _scene_in(cv.FunctionPotential(_quartic, _quartic_gradient)),
+    ]
+    for method in (*OURS, cv.Reduced(4, frame="auto"), *REFERENCES):
+        for scene in scenes:
+            if method.unsupported(scene) is None:
+                cv.integrate(scene, 0.005, method, t_end=0.01, on_failure="return")
+
+
+def _scene_in(potential: cv.Potential) -> cv.Scene:
+    return cv.Scene("s", _body(), np.eye(3), (0.1, 0.2, 3.0), 1.0, potential)
+
+
 def _swap(rng: Random, name: str, function: Callable[..., object], arguments: Mapping[str, Any]) -> Try:
     """Return a call in which one or more of the arguments are hostile."""
     swapped = rng.sample(list(arguments), k=min(len(arguments), rng.choice((1, 1, 1, 2, 3)))) if arguments else []
@@ -92,10 +110,6 @@ def _quartic(R: Any) -> float:
 
 def _quartic_gradient(R: Any) -> Any:
     return np.outer([0, 0, 1], 4 * float(R[2] @ (0.0, 0.1, 0.4)) ** 3 * np.array((0.0, 0.1, 0.4)))
-
-
-def _scene_of(**given: Any) -> cv.Scene:
-    return cv.Scene(**given)
 
 
 SCENE = {"name": "s", "R_WB0": np.eye(3), "w_WB_B0": (0.1, 0.2, 3.0), "t_end": 1.0, "potential": None}
@@ -135,7 +149,7 @@ def _use(value: object) -> object:
     if isinstance(value, cv.Grid):
         return value.n_samples < 10**6 and value.t
     if isinstance(value, cv.FunctionPotential):
-        return cv.integrate(_scene_of(**{**SCENE, "potential": value}, body=_body()), 0.1, t_end=0.2)
+        return cv.integrate(_scene_in(value), 0.1, t_end=0.2)
     return value
 
 

@@ -32,7 +32,7 @@ from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed,
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .hostile_calls import Pair, Try, make_try
+from .hostile_calls import Pair, Try, make_try, warm_up
 
 REFUSALS = (BadInput, IntegrationFailed, PotentialFailed, MissingEngine)
 """What a try may raise."""
@@ -158,6 +158,7 @@ def _alarm() -> Iterator[None]:
 @click.option("--first", type=click.IntRange(0), default=0, show_default=True, help="Number of the first try.")
 def main(count: int, seed: int, first: int) -> None:
     """Try hostile values, and print each kind of leak with one call that shows it."""
+    warm_up()
     with TemporaryDirectory() as folder:
         leaks = find_leaks(draw_tries(count, seed, Path(folder), first))
     for kind, leak in sorted(leaks.items()):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from conservative.attitude import Array
 from conservative.body import RigidBody
-from conservative.check import describe, finite_array, rotation
+from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
@@ -198,10 +198,8 @@ def _motion(start: Start, potential: Potential | None) -> ClosedForm:
 
 
 def _times(t: ArrayLike) -> Array:
-    try:
-        shape = np.shape(t)
-    except ValueError:  # rows of different lengths: refused below like all that is no array
-        shape = ()
+    found = real_array(t)  # what is no array of numbers is refused below
+    shape = () if found is None else found.shape
     return finite_array("t", t, (shape,), "finite times (n,), s")
 
 
