@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from .check import describe, printable_text, real_number
-from .entry_points import METHODS, SCENES, list_entries, load_entry
+from .deferred_imports import METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
