@@ -183,7 +183,25 @@ def most_samples() -> int:
     return int((memory if memory > 0 else USUAL_MEMORY) * MEMORY_SHARE / SAMPLE_BYTES)
 
 
-def what_fits(n_steps: int) -> str:
-    """Return which distance of samples a run of so many steps can have, in words."""
-    fewest = -(-n_steps // (most_samples() - 1))
-    return f"{fewest} or more, or longer steps: up to {most_samples():.3g} samples fit in memory, at {SAMPLE_BYTES} bytes each"
+def require_memory(argument: str, n_steps: int, every: int) -> None:
+    """Raise `BadInput` if a run of so many steps, every `every`-th of them a sample, has more than `most_samples`."""
+    most, samples = most_samples(), 1 + -(-n_steps // every)
+    if samples > most:
+        fits = f"up to {most:.3g} samples fit in memory, {SAMPLE_BYTES} bytes each"
+        fits = f"{-(-n_steps // (most - 1))} or more, or longer steps: {fits}"
+        raise BadInput(argument, f"{every}, for {samples} samples of {n_steps} steps", fits)
+
+
+def check_grid(dt: object, n_steps: object, every: object) -> None:
+    """Raise `BadInput` for a step that is not finite, s, counts beyond `MOST_STEPS`, and samples that do not fit in memory."""
+    step = real_number(dt)  # no range: steps of scenes in other units are no longer in SI units
+    if step is None or not 0 < step < math.inf:
+        raise BadInput("dt", describe(dt), "a finite step above 0, s")
+    allowed = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
+    counts = positive_integer("n_steps", n_steps, allowed), positive_integer("every", every, allowed)
+    for argument, count in zip(("n_steps", "every"), counts, strict=True):
+        if count > MOST_STEPS:
+            raise BadInput(argument, describe(count), allowed)
+    if not math.isfinite(step * counts[0]):
+        raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
+    require_memory("every", *counts)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, describe, most_samples, positive_integer, positive_number, real_number, what_fits
+from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
 from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
@@ -52,19 +52,7 @@ class Grid:
     every: int = 1
 
     def __post_init__(self) -> None:
-        step = real_number(self.dt)  # no range: steps of scenes in other units are no longer in SI units
-        if step is None or not 0 < step < math.inf:
-            raise BadInput("dt", describe(self.dt), "a finite step above 0, s")
-        for argument in ("n_steps", "every"):
-            allowed = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
-            if positive_integer(argument, getattr(self, argument), allowed) > MOST_STEPS:
-                raise BadInput(argument, describe(getattr(self, argument)), allowed)
-        if not math.isfinite(step * self.n_steps):
-            raise BadInput("dt", f"{step:g}, for {self.n_steps} steps", "a step whose multiples are finite, s")
-        if self.n_samples > most_samples():
-            raise BadInput(
-                "every", f"{self.every}, for {self.n_samples} samples of {self.n_steps} steps", what_fits(self.n_steps)
-            )
+        check_grid(self.dt, self.n_steps, self.every)
 
     @property
     def steps(self) -> Array:
@@ -110,8 +98,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
             "dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps"
         )
     every = min(positive_integer("sample_every", sample_every), n_steps)
-    if 1 + n_steps // every > most_samples():
-        raise BadInput("sample_every", f"{every}, with {n_steps} steps of {step:g} s", what_fits(n_steps))
+    require_memory("sample_every", n_steps, every)
     return Grid(step, n_steps, every)
 
 

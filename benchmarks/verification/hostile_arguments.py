@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from random import Random
@@ -21,6 +23,15 @@ class _Failing:
 
     def __array__(self, *arguments: Any, **settings: Any) -> Any:
         raise RuntimeError("no array")
+
+
+@dataclass(frozen=True)
+class Try:
+    """A call to make: what it is of, the call in words, and the call."""
+
+    name: str
+    words: str
+    call: Callable[[], object]
 
 
 HUGE = 10**400

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -18,20 +17,15 @@ import conservative as cv
 from conservative import registry
 from conservative.check import describe
 from conservative.method import Method
-from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
-from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.pinocchio import Pinocchio
-from conservative.references.engines.scipy import SciPy
-from conservative.references.exact.method import Exact, free_body, lagrange_top
-from conservative.references.precise import Precise
+from conservative.references.exact.method import free_body, lagrange_top
 from conservative.scene_files import scene_file
-from conservative.trajectory import Trajectory
 
-from .hostile_arguments import draw_hostile, scramble
+from .hostile_arguments import Try, draw_hostile, scramble
+from .hostile_scales import OURS, REFERENCES, try_extremes, try_units
 
-OURS = (cv.Reduced(), cv.Reduced(4), cv.Gauss(2), cv.MoserVeselov(), cv.Lame(), cv.Projected(), cv.Convected(), cv.Substepped())
-REFERENCES = (MuJoCo(), Pinocchio(), Heyoka(1e-9), SciPy(rtol=1e-6), Exact(), Precise(64))
+MODEL_FILES = 0.002
+"""Share of the tries that read a model file, which takes a second."""
 MODELS = {
     body_from_mjcf: '<mujoco><worldbody><body name="arm"><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>',
     body_from_urdf: '<robot name="r"><link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
@@ -39,39 +33,12 @@ MODELS = {
 }
 
 
-@dataclass(frozen=True)
-class Try:
-    """A call to make: what it is of, the call in words, and the call."""
-
-    name: str
-    words: str
-    call: Callable[[], object]
-
-
-@dataclass(frozen=True)
-class Pair:
-    """One motion, computed twice: in usual units, and with units of time and inertia that are far away."""
-
-    plain: Trajectory
-    scaled: Trajectory
-
-
-def make_try(rng: Random, folder: Path) -> Try:
-    """Return the next try; the files that it reads are written to a folder."""
-    kinds = [
-        _construct,
-        _construct,
-        _construct,
-        _set,
-        _integrate,
-        _name,
-        _scene_function,
-        _scene_file,
-        _extreme,
-        _units,
-        _closed_form,
-    ]
-    return (_model_file if rng.random() < 0.002 else rng.choice(kinds))(rng, folder)
+def make_try(rng: Random, folder: Path, part: str = "all") -> Try:
+    """Return the next try of a part of `PARTS`; the files that it reads are written to a folder."""
+    kinds = PARTS[part]
+    if _model_file in kinds and rng.random() < MODEL_FILES:
+        return _model_file(rng, folder)
+    return rng.choice([kind for kind in kinds if kind is not _model_file])(rng, folder)
 
 
 def warm_up() -> None:
@@ -234,48 +201,15 @@ def _model_file(rng: Random, folder: Path) -> Try:
     return Try(read.__name__, f"{read.__name__} of {changed!r}", lambda: call(path, "arm"))
 
 
-def _draw_scene(rng: Random, time: float, inertia: float) -> cv.Scene:
-    """Return a random scene in units of time, s, and of inertia, kg m^2."""
-    moments = np.array([rng.uniform(0.7, 1.3) for _ in range(3)])
-    if rng.random() < 0.4:
-        moments[1] = moments[0]
-    rates, moment = np.array([rng.gauss(0, 1) for _ in range(3)]), rng.uniform(0.1, 3)
-    field = cv.UniformGravity(moment * inertia / time**2, (0, 0, 1.0)) if rng.random() < 0.5 else None
-    return cv.Scene("drawn", cv.RigidBody(moments * inertia), np.eye(3), rates / time, 0.5 * time, field)
-
-
-def _units(rng: Random, folder: Path) -> Try:
-    """Return the same run in usual and in far units, both powers of two, so that exact arithmetic would give the same."""
-    seed, time, inertia = rng.random(), 2.0 ** rng.randint(-300, 300), 2.0 ** rng.randint(-300, 300)
-    method: Method = rng.choice(OURS + REFERENCES)
-
-    def run() -> Pair:
-        scenes = (_draw_scene(Random(seed), 1.0, 1.0), _draw_scene(Random(seed), time, inertia))
-        plain, scaled = (cv.integrate(s, s.t_end / 10, method, on_failure="return") for s in scenes)
-        return Pair(plain, scaled)
-
-    return Try(f"{method.family} in units", f"{method.name}, units {time:g} s and {inertia:g} kg m^2, scene {seed}", run)
-
-
-def _extreme(rng: Random, folder: Path) -> Try:
-    """Return a run of a scene whose numbers lie anywhere in the range that is allowed."""
-    exponent = lambda: 10.0 ** rng.uniform(-99, 99)  # noqa: E731
-    moments, rates = [exponent() for _ in range(3)], [exponent() for _ in range(3)]
-    t_end, weight, method = exponent(), exponent(), rng.choice(OURS)
-    if rng.random() < 0.5:
-        moments = [exponent()] * 3
-
-    def run() -> object:
-        field = cv.UniformGravity(weight, (0, 0, 1)) if int(t_end) % 2 else None
-        scene = cv.Scene("extreme", cv.RigidBody(moments), np.eye(3), rates, t_end, field)
-        return cv.integrate(scene, t_end / 10, method, on_failure="return")
-
-    return Try(f"{method.family} at extremes", f"{method.name}, J {moments}, w {rates}, t_end {t_end}, weight {weight}", run)
-
-
 def _closed_form(rng: Random, folder: Path) -> Try:
     """Return a call of a closed form with hostile arguments."""
     arguments = {"body": cv.RigidBody((1, 1, 2)), "R_WB0": np.eye(3), "w_WB_B0": (1, 2, 3), "t": [0.0, 1.0]}
     if rng.random() < 0.5:
         return _swap(rng, "free_body", free_body, arguments)
     return _swap(rng, "lagrange_top", lagrange_top, {**arguments, "potential": cv.UniformGravity(1, (0, 0, 1))})
+
+
+_ARGUMENTS = (_construct, _construct, _set, _integrate, _name, _scene_function, _scene_file, _closed_form, _model_file)
+_SCALES = (try_extremes, try_units)
+PARTS = {"arguments": _ARGUMENTS, "scales": _SCALES, "all": _ARGUMENTS + _SCALES}
+"""Kinds of call: with hostile arguments, and with numbers anywhere in the range that is allowed."""

@@ -32,7 +32,9 @@ from conservative.errors import AccuracyNotReached, BadInput, IntegrationFailed,
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .hostile_calls import Pair, Try, make_try, warm_up
+from .hostile_arguments import Try
+from .hostile_calls import PARTS, make_try, warm_up
+from .hostile_scales import Pair
 
 REFUSALS = (BadInput, IntegrationFailed, PotentialFailed, MissingEngine)
 """What a try may raise."""
@@ -64,9 +66,9 @@ def find_leaks(tries: Iterable[Try]) -> dict[str, Leak]:
     return found
 
 
-def draw_tries(count: int, seed: int, folder: Path, first: int = 0) -> Iterator[Try]:
+def draw_tries(count: int, seed: int, folder: Path, first: int = 0, part: str = "all") -> Iterator[Try]:
     """Return tries from number `first` on, each of its own seed; the files that some of them read are written to a folder."""
-    return (make_try(Random(f"{seed} {number}"), folder) for number in range(first, first + count))
+    return (make_try(Random(f"{seed} {number}"), folder, part) for number in range(first, first + count))
 
 
 def judge(attempt: Try) -> str:
@@ -156,11 +158,12 @@ def _alarm() -> Iterator[None]:
 @click.option("--count", type=click.IntRange(1), default=20000, show_default=True, help="Tries.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of what is tried.")
 @click.option("--first", type=click.IntRange(0), default=0, show_default=True, help="Number of the first try.")
-def main(count: int, seed: int, first: int) -> None:
+@click.option("--part", type=click.Choice(list(PARTS)), default="all", show_default=True, help="Kinds of call.")
+def main(count: int, seed: int, first: int, part: str) -> None:
     """Try hostile values, and print each kind of leak with one call that shows it."""
     warm_up()
     with TemporaryDirectory() as folder:
-        leaks = find_leaks(draw_tries(count, seed, Path(folder), first))
+        leaks = find_leaks(draw_tries(count, seed, Path(folder), first, part))
     for kind, leak in sorted(leaks.items()):
         click.echo(f"{leak.count:6} x {kind}\n         {leak.reproducer}")
     click.echo(f"{count} tries, {sum(leak.count for leak in leaks.values())} leaks of {len(leaks)} kinds")
