@@ -75,7 +75,7 @@ def _read(kind: str, path: object, name: object) -> MassDistribution:
     _, package, engine = ENGINES[kind]
     version(package, engine)
     request = {"kind": kind, "path": _text_of(path), "name": printable_text("name", name, "the name of a body, a text")}
-    found = _ask(request) if sys.executable else model_reader.answer(request)
+    found = _ask({**request, "cpu_seconds": CPU_SECONDS})
     if "bad" in found:
         raise BadInput(*found["bad"])
     if "missing" in found:
@@ -93,7 +93,7 @@ def _text_of(path: object) -> str:
     return text
 
 
-def _ask(request: dict[str, str]) -> dict[str, Any]:
+def _ask(request: dict[str, Any]) -> dict[str, Any]:
     """Return the answer of a reader; raise `BadInput` where its limits end it."""
     command = [sys.executable, "-P", "-m", model_reader.__name__]
     places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
@@ -110,6 +110,6 @@ def _ask(request: dict[str, str]) -> dict[str, Any]:
     return found
 
 
-def _unreadable(request: dict[str, str], end: str) -> BadInput:
+def _unreadable(request: dict[str, Any], end: str) -> BadInput:
     allowed = f"a file that {ENGINES[request['kind']][2]} reads within {CPU_SECONDS} s and {MEMORY / 2**30:g} GiB"
     return BadInput("path", f"{request['path']!r}, whose reading ended after {end}", allowed)

@@ -166,12 +166,12 @@ def _combine(parts: list[tuple[float, Array, Array]], fixed_point: Array | None)
     return MassDistribution(mass, np.zeros(3) if fixed_point is None else com - fixed_point, inertia)
 
 
-def answer(request: dict[str, str]) -> dict[str, Any]:
+def answer(request: dict[str, Any]) -> dict[str, Any]:
     """Return mass, kg, centre, m, and inertia about it, kg m^2, of the body asked for; or what is wrong, in words."""
     kind, path, name = request["kind"], request["path"], request["name"]
     try:
         load(*ENGINES[kind])
-        _limit()
+        _limit(request["cpu_seconds"])
         found = {"mjcf": read_mjcf, "urdf": read_urdf}[kind](path, name)
     except BadInput as error:
         return {"bad": [error.argument, str(error.got), error.allowed]}
@@ -182,7 +182,7 @@ def answer(request: dict[str, str]) -> dict[str, Any]:
     return {"mass": found.mass, "com_B": found.com_B.tolist(), "inertia_com": found.inertia_com.tolist()}
 
 
-def _limit() -> None:
+def _limit(cpu_seconds: int) -> None:
     """Set limits of this process that the engine, loaded already, cannot pass."""
     try:
         import resource
@@ -190,7 +190,7 @@ def _limit() -> None:
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         limits = {
             resource.RLIMIT_AS: pages * resource.getpagesize() + MEMORY,
-            resource.RLIMIT_CPU: CPU_SECONDS,
+            resource.RLIMIT_CPU: cpu_seconds,
             resource.RLIMIT_CORE: 0,
         }
         for which, most in limits.items():
