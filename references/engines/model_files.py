@@ -95,7 +95,7 @@ def _text_of(path: object) -> str:
 
 def _ask(request: dict[str, Any]) -> dict[str, Any]:
     """Return the answer of a reader; raise `BadInput` where its limits end it."""
-    command = [sys.executable, "-P", "-m", model_reader.__name__]
+    command = [sys.executable or "python3", "-P", "-m", model_reader.__name__]
     places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
     environment = {**os.environ, "PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1"}
     try:
@@ -104,6 +104,8 @@ def _ask(request: dict[str, Any]) -> dict[str, Any]:
         )
     except subprocess.TimeoutExpired:
         raise _unreadable(request, f"{SECONDS:g} s") from None
+    except OSError as error:  # no memory for a process, or no Python where one is embedded
+        raise _unreadable(request, f"a reader that does not start: {error}") from None
     if done.returncode != 0:
         raise _unreadable(request, f"exit status {done.returncode} of the reader")
     found: dict[str, Any] = json.loads(done.stdout)
