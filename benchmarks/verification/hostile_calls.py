@@ -131,7 +131,7 @@ def _integrate(rng: Random, folder: Path) -> Try:
     """Return a short run with hostile arguments."""
     scene = rng.choice((cv.scenes.brick_flip(), cv.scenes.lagrange_top(), cv.scenes.sprung_body()))
     arguments = {"scene": scene, "dt": 0.05, "method": rng.choice((*OURS, None)), "t_end": 0.3, "sample_every": 2}
-    more = rng.choice(({"error": None}, {"on_failure": "return"}, {}))
+    more: dict[str, Any] = rng.choice(({"error": None}, {"on_failure": "return"}, {}))
     if rng.random() < 0.1:
         more, arguments["method"] = {"error": 1e-6}, None
     return _swap(rng, "integrate", cv.integrate, {**arguments, **more})

@@ -58,13 +58,16 @@ def try_units(rng: Random, folder: Path) -> Try:
     return Try(f"{method.family} in units", f"{method.name}, units {time:g} s and {inertia:g} kg m^2, scene {seed}", run)
 
 
+def _draw_size(rng: Random) -> float:
+    return 10.0 ** rng.uniform(-99, 99)
+
+
 def try_extremes(rng: Random, folder: Path) -> Try:
     """Return a run of a scene whose numbers lie anywhere in the range that is allowed."""
-    exponent = lambda: 10.0 ** rng.uniform(-99, 99)  # noqa: E731
-    moments, rates = [exponent() for _ in range(3)], [exponent() for _ in range(3)]
-    t_end, weight, method = exponent(), exponent(), rng.choice(OURS)
+    moments, rates = [_draw_size(rng) for _ in range(3)], [_draw_size(rng) for _ in range(3)]
+    t_end, weight, method = _draw_size(rng), _draw_size(rng), rng.choice(OURS)
     if rng.random() < 0.5:
-        moments = [exponent()] * 3
+        moments = [_draw_size(rng)] * 3
 
     def run() -> object:
         field = cv.UniformGravity(weight, (0, 0, 1)) if int(t_end) % 2 else None
