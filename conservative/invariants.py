@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,8 +10,12 @@ import numpy as np
 
 from .attitude import Array
 from .body import RigidBody
+from .check import describe, printable_text, real_number
+from .errors import BadInput
 from .potentials.potential import Potential
 from .potentials.uniform_gravity import UniformGravity
+
+_NAME = "a text of one character or more"
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,12 +24,27 @@ class Invariant:
 
     `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
     which has the unit `unit` and is above 0.
+
+    Raises
+    ------
+    BadInput
+        name or unit is no text, scale is not a finite number above 0, or evaluate cannot be called.
     """
 
     name: str
     unit: str
     scale: float
     evaluate: Callable[[Array, Array], Array]
+
+    def __post_init__(self) -> None:
+        if not printable_text("name", self.name, _NAME):
+            raise BadInput("name", "''", _NAME)
+        printable_text("unit", self.unit, "a text")
+        number = real_number(self.scale)
+        if number is None or not 0 < number < math.inf:
+            raise BadInput("scale", describe(self.scale), "a finite number above 0")
+        if not callable(self.evaluate):
+            raise BadInput("evaluate", describe(self.evaluate), "a function of attitudes (n, 3, 3) and rates (n, 3)")
 
 
 def sizes(drift: Array) -> Array:

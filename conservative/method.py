@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import positive_integer, positive_number
+from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
 from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
@@ -39,11 +39,20 @@ class Grid:
     """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
+
+    Raises
+    ------
+    BadInput
+        dt is not a finite number above 0; n_steps or every is not an integer of 1 to `MOST_STEPS`; or the samples are more than
+        `most_samples`.
     """
 
     dt: float
     n_steps: int
     every: int = 1
+
+    def __post_init__(self) -> None:
+        check_grid(self.dt, self.n_steps, self.every)
 
     @property
     def steps(self) -> Array:
@@ -75,14 +84,22 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     Raises
     ------
     BadInput
-        dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
+        dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1 or more, or
+        the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
     if step > end:
         raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
-    return Grid(step, max(1, math.ceil(end / step * (1 - 1e-9))), positive_integer("sample_every", sample_every))
+    n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
+    if n_steps > MOST_STEPS:
+        raise BadInput(
+            "dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps"
+        )
+    every = min(positive_integer("sample_every", sample_every), n_steps)
+    require_memory("sample_every", n_steps, every)
+    return Grid(step, n_steps, every)
 
 
 class Method(ABC):

@@ -131,10 +131,10 @@ def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int
     """Return a grid of an even number of steps of at most dt."""
     if spacing is None:
         n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
-        return Grid(t_end / n, n, sample_every)
+        return Grid(t_end / n, n, min(sample_every, n))
     each = 2 * max(1, math.ceil(spacing / dt / 2 * (1 - 1e-9)))
     n = each * math.ceil(t_end / spacing * (1 - 1e-9))
-    return Grid(spacing / each, n, each * sample_every)
+    return Grid(spacing / each, n, min(each * sample_every, n))
 
 
 def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:

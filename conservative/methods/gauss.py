@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, triple
-from ..check import choice, positive_integer
+from ..check import choice, describe, positive_integer
 from ..declarations import README, Candidacy, Claims, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -61,7 +61,7 @@ class Gauss(Method):
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"
         if positive_integer("stages", self.stages, allowed) > MOST_STAGES:
-            raise BadInput("stages", self.stages, allowed)
+            raise BadInput("stages", describe(self.stages), allowed)
         choice("frame", self.frame, FRAMES)
 
     @property

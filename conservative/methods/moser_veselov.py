@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
+from ..check import choice
 from ..declarations import README, Candidacy, Claims
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -67,8 +68,8 @@ class MoserVeselov(_Fields, Method):
     kernel: ClassVar[str] = "moser_veselov"
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
-        if order is not None and (isinstance(order, bool) or order not in ORDERS):
-            raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
+        if order is not None:
+            choice("order", order, ORDERS)
         super().__init__(None if order == "exact" else order)
 
     @property

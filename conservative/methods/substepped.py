@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .. import registry
-from ..check import positive_integer
+from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
@@ -45,9 +45,9 @@ class Substepped(Method):
         positive_integer("most", self.most)
         allowed = "the name of a method of ours with a step, such as 'reduced:order=4'"
         if not isinstance(self.method, str) or self.method.partition(":")[0] == self.family:
-            raise BadInput("method", repr(self.method), allowed)
+            raise BadInput("method", describe(self.method), allowed)
         if self.inner.order is None or self.inner.role != Role.OURS:
-            raise BadInput("method", repr(self.method), allowed)
+            raise BadInput("method", describe(self.method), allowed)
 
     @property
     def inner(self) -> Method:

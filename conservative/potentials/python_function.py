@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import Array, cayley, from_quaternion, rotation_about, triple
-from ..check import positive_number, read_only
+from ..attitude import ROTATION_TOLERANCE, Array, cayley, from_quaternion, rotation_about, triple
+from ..check import describe, finite_array, positive_number
 from ..errors import BadInput, PotentialFailed
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
 
@@ -20,6 +20,7 @@ _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
 _NEWTON_DIFFERENCE = 1e-7
 _AGREEMENT = 1e-4
+_AXIS = "a unit vector (3,), world axes, about which the field is symmetric"
 _ROUND_OFF = 8 * 2.0**-53
 N_INPUTS, N_OUTPUTS = 27, 90
 """Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
@@ -80,12 +81,11 @@ class FunctionPotential(_Fields):
     ) -> None:
         for name, function in (("energy", energy), ("gradient", gradient)):
             if not callable(function):
-                raise BadInput(name, repr(function), "a function of a matrix (3, 3)")
+                raise BadInput(name, describe(function), "a function of a matrix (3, 3)")
         V = energy if isinstance(energy, Energy) else Energy(energy)
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient)
         _check_gradient(V, G)
-        axis = None if axis_W is None else read_only(np.array(axis_W, dtype=float))
-        super().__init__(V, G, _size(scale, G), axis)
+        super().__init__(V, G, _size(scale, G), None if axis_W is None else _check_axis(axis_W, G))
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return Gonzalez's discrete gradient V*, (3, 3), in J."""
@@ -114,22 +114,47 @@ class FunctionPotential(_Fields):
 
 def _check_gradient(energy: Energy, gradient: Gradient) -> None:
     """Compare the gradient with differences of the energy at one attitude."""
-    found, differences = gradient.at(_PROBE), np.empty((3, 3))
+    found, differences = _probe("gradient", gradient, _PROBE), np.empty((3, 3))
     for index in np.ndindex(3, 3):
         aside = np.zeros((3, 3))
         aside[index] = _DIFFERENCE
-        differences[index] = (energy.at(_PROBE + aside) - energy.at(_PROBE - aside)) / (2 * _DIFFERENCE)
+        ahead, behind = (float(_probe("energy", energy, _PROBE + sign * aside)) for sign in (1, -1))
+        differences[index] = (ahead - behind) / (2 * _DIFFERENCE)
     off = np.abs(differences - found).max()
     if not off <= _AGREEMENT * max(np.abs(found).max(), np.abs(differences).max()):
         raise BadInput("gradient", f"a matrix off by {off:.3g} J from differences of the energy", "the derivative of `energy`")
 
 
+def _probe(argument: str, function: Energy | Gradient, R: Array) -> Array:
+    """Return what a function gives at one attitude (3, 3); what it raises, and what is not finite, is bad input."""
+    allowed = "a function that gives a real number, J" if argument == "energy" else "a function that gives a matrix (3, 3), J"
+    try:
+        found = function.at(R)
+    except PotentialFailed as failure:
+        raise BadInput(argument, f"a function that fails: {describe(failure.__cause__)}", allowed) from failure.__cause__
+    return finite_array(argument, found, ((), (3, 3)), f"{allowed}, at every attitude")
+
+
+def _check_axis(axis_W: ArrayLike, gradient: Gradient) -> Array:
+    """Return the axis, if it is one: a unit vector (3,) along which the field has no torque."""
+    axis = finite_array("axis_W", axis_W, ((3,),), _AXIS)
+    if abs(np.linalg.norm(axis) - 1) > ROTATION_TOLERANCE:
+        raise BadInput("axis_W", describe(axis.tolist()), _AXIS)
+    found = _probe("gradient", gradient, _PROBE)
+    torque, size = abs(_moment(np.eye(3), _PROBE, found) @ axis), np.abs(found).max()
+    if torque > _AGREEMENT * size:
+        raise BadInput("axis_W", f"{axis.tolist()}, about which the field has a torque of {torque:.3g} N m", _AXIS)
+    return axis
+
+
 def _size(scale: float | Size | None, gradient: Gradient) -> Size:
     """Return the size of V that is given, or the largest of a few gradients."""
     if scale is not None:
-        return scale if isinstance(scale, Size) else Size(positive_number("scale", scale, "a finite energy above 0, J"))
+        value = scale.value if isinstance(scale, Size) else scale
+        return Size(positive_number("scale", value, "a finite energy above 0, J"))
     half_turns = from_quaternion(np.eye(4))
-    return Size(max(float(np.linalg.norm(gradient.at(R))) for R in (_PROBE, *half_turns, *(half_turns @ _PROBE))) or 1.0)
+    attitudes = (_PROBE, *half_turns, *(half_turns @ _PROBE))
+    return Size(max(float(np.linalg.norm(_probe("gradient", gradient, R))) for R in attitudes) or 1.0)
 
 
 class _Callback:

@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import epilog, split_names
+from .options import FilePath, epilog, split_names
 
 if TYPE_CHECKING:
     from conservative.benchmarks.recommendation.recommend import Recommendation
@@ -41,7 +41,7 @@ FILES = ("recommendation.json", "recommendation.svg")
     "--time-limit", type=float, default=60.0, show_default=True, help="Time, s, after which an engine's run is ended."
 )
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for recommendation.json and recommendation.svg.")
+@click.option("--out", type=FilePath(), help="Folder for recommendation.json and recommendation.svg.")
 def recommend(scene: str, engine: tuple[str, ...], as_json: bool, out: Path | None, **limits: Any) -> None:
     """Probe our methods and every engine on SCENE, a name or a file, and say what reaches the error, at what cost and drift.
 

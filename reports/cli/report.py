@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import epilog, split_names
+from .options import FilePath, epilog, split_names
 
 
 @click.command(
@@ -38,9 +38,7 @@ from .options import epilog, split_names
 @click.option("--png", is_flag=True, help="Pictures as PNG, too.")
 @click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
 @click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
-@click.option(
-    "--out", type=click.Path(path_type=Path), default="report", show_default=True, help="Folder, replaced as a whole."
-)
+@click.option("--out", type=FilePath(), default="report", show_default=True, help="Folder, replaced as a whole.")
 def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], methods: tuple[str, ...], **extent: Any) -> None:
     """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
 
