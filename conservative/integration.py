@@ -84,7 +84,7 @@ def _integrate_with(
         raise BadInput("method", repr(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
     grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
     require_support(method, scene)
-    return method.prepare(scene, grid)()
+    return method.solve(scene, grid)
 
 
 def _integrate_to(

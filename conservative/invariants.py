@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,9 @@ from .attitude import Array
 from .body import RigidBody
 from .potentials.potential import Potential
 from .potentials.uniform_gravity import UniformGravity
+
+MOMENTUM = {"momentum", "vertical momentum", "momentum along the field's axis"}
+"""Names of the world momentum, or of its component that a field leaves alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,34 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     if axis is not None:
         found.append(Invariant("axial momentum", "kg m^2/s", scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(found)
+
+
+def kernel_constants(
+    body: RigidBody, potential: Potential | None, invariants: Iterable[Invariant], R_WB0: Array, w_WB_B0: Array
+) -> Array:
+    """Return the constants (5, 4) that `conservative.kernels.drifts` takes: those of invariants that are not there are 0.
+
+    Parameters
+    ----------
+    body, potential
+        What moves, and what acts on it.
+    invariants
+        Some of those that `invariants_of` gives.
+    R_WB0, w_WB_B0
+        Attitude (3, 3) and rates (3,), rad/s, body axes, at the start.
+    """
+    rows = np.zeros((5, 4))
+    for invariant in invariants:
+        start = invariant.evaluate(R_WB0[None], w_WB_B0[None])[0]
+        if invariant.name == "energy":
+            rows[0] = 1 / invariant.scale, 0.0, 0.0, start
+        elif invariant.name in MOMENTUM:
+            directions = np.eye(3) if potential is None or potential.axis_W is None else potential.axis_W[None]
+            part = slice(1, 1 + len(directions))
+            rows[part, :3], rows[part, 3] = directions / invariant.scale, start / invariant.scale
+        elif (axis := axial_direction(body, potential)) is not None:
+            rows[4, :3], rows[4, 3] = axis / invariant.scale, start / invariant.scale
+    return rows
 
 
 def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:

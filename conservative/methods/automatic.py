@@ -139,11 +139,11 @@ def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int
 
 def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
     """Return the estimated error, rad, inf where a run fails, and the trajectory of a run, from one more at twice the step."""
-    fine = method.prepare(scene, grid)()
+    fine = method.solve(scene, grid)
     # Half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
     stride = 1 + grid.every % 2
     try:
-        coarse = method.prepare(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))()
+        coarse = method.solve(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))
     except (IntegrationFailed, MissingEngine, Unsupported):
         return math.inf, fine
     if not (fine.ok and coarse.ok):

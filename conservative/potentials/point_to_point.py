@@ -49,7 +49,8 @@ class PointPotential(ABC):
         """Return the divided difference of V by the squared distance, (...), N/m, between distances (...), m."""
 
     def _from_anchor(self, R_WB: Array) -> Array:
-        return R_WB @ self.point_B - self.anchor_W
+        # One product of a tall matrix: NumPy takes ten times as long over a stack of small ones.
+        return (R_WB.reshape(-1, 3) @ self.point_B).reshape(R_WB.shape[:-1]) - self.anchor_W
 
     def distance(self, R_WB: Array) -> Array:
         """Return how far apart the points are, (...), m, at attitudes (..., 3, 3)."""
