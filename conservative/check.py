@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import math
 from numbers import Integral, Real
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import ROTATION_TOLERANCE, Array, orthonormality
 from .errors import BadInput
+
+T = TypeVar("T")
 
 
 def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...], ...], allowed: str) -> Array:
@@ -88,3 +91,27 @@ def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
     """Raise `BadInput` unless `value` is one of `options`."""
     if value not in options:
         raise BadInput(argument, repr(value), "one of " + ", ".join(repr(o) for o in options))
+
+
+def power_of_two(size: float) -> float:
+    """Return the power of two above a finite size, by which dividing rounds nothing; 1 for a size of 0. Of any unit."""
+    return math.ldexp(1.0, min(math.frexp(size)[1], 1023)) if size > 0 else 1.0
+
+
+def length(vector: Array) -> float:
+    """Return |v| of a vector (3,), of any unit and size: squares neither vanish nor overflow."""
+    unit = power_of_two(float(np.abs(vector).max()))
+    return float(np.linalg.norm(vector / unit)) * unit
+
+
+def geometric_mean(a: float, b: float) -> float:
+    """Return the square root of the product of two numbers of any unit, above 0, which itself may overflow or vanish."""
+    (x, i), (y, j) = math.frexp(a), math.frexp(b)
+    return math.ldexp(math.sqrt(math.ldexp(x * y, (i + j) % 2)), (i + j) // 2)
+
+
+def build_unchecked(kind: type[T], **values: Any) -> T:
+    """Return a frozen value of two classes (see above) without its checks: for numbers in units of our own, of any size."""
+    made = object.__new__(kind)
+    kind.__bases__[0].__init__(made, **values)  # type: ignore[misc]  # that of the class which has the fields
+    return made

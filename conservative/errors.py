@@ -129,7 +129,8 @@ class InvalidResult(IntegrationFailed):
         self.label, self.reason = label, reason
         self.outcome = Outcome(OutcomeKind.INVALID, reason)
         super().__init__(
-            f"method: got {reason} from {label}; allowed: a Trajectory of the scene at the times of the grid, of arrays of float64"
+            f"method: got {reason} from {label}; "
+            "allowed: a Trajectory of the scene, with arrays of float64 that have a sample for each time of the grid"
         )
 
 

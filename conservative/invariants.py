@@ -9,6 +9,7 @@ import numpy as np
 
 from .attitude import Array
 from .body import RigidBody
+from .check import geometric_mean, length
 from .potentials.potential import Potential
 from .potentials.uniform_gravity import UniformGravity
 
@@ -66,8 +67,7 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     """
     found = [Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w))]
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
-    size = float(np.linalg.norm(body.momentum(w_WB_B0)))
-    scale = size or float(np.sqrt(body.moments.max() * energy_scale))
+    scale = length(body.momentum(w_WB_B0)) or geometric_mean(float(body.moments.max()), energy_scale)
     if potential is None:
         found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
@@ -115,10 +115,10 @@ def axial_direction(body: RigidBody, potential: Potential | None, tolerance: flo
     if potential is not None and not isinstance(potential, UniformGravity):
         return None
     moment_P = np.zeros(3) if potential is None else potential.moment_B @ body.R_BP
-    size = float(np.linalg.norm(moment_P))
+    size = length(moment_P)
     if size > 0 and np.ptp(body.moments) <= tolerance * body.moments.max():
         return np.asarray(body.R_BP @ (moment_P / size))
     axis = body.symmetry_axis(tolerance)
-    if axis is None or np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size:
+    if axis is None or length(np.delete(moment_P, axis)) > tolerance * size:
         return None
     return np.asarray(body.R_BP[:, axis] * (-1.0 if moment_P[axis] < 0 else 1.0))

@@ -146,7 +146,7 @@ class Method(ABC):
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         """Return how far orthonormality, and the invariants in `conserves`, may be off in a run that is called ok.
 
-        By default 0.001 and 0.1, which is meant for engines at loose tolerances: whoever conserves something should say how well.
+        By default 0.001 and 0.1, meant for engines at loose tolerances: whoever conserves something should say how well.
         """
         return Bounds(drift=1e-3, orthonormality=0.1)
 

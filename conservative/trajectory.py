@@ -1,4 +1,4 @@
-"""What a method hands back: sampled attitudes and rates, what it cost in work, how it ended, and whether that may be called ok."""
+"""What a method hands back: samples of a motion, what they cost in work, how it ended, and whether that may be called ok."""
 
 from __future__ import annotations
 
@@ -277,13 +277,16 @@ def _cut_at_drift(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Tr
     quantities = [("orthonormality", orthonormality(found.R_WB), bounds.orthonormality)]
     invariants = (invariant for invariant in found.scene.invariants if invariant.name in kept)
     quantities += [(invariant.name, sizes(found.drift(invariant)), bounds.drift) for invariant in invariants]
-    good, (name, values, bound) = min(
-        ((int(np.argmax(~(entry[1] <= entry[2]))) if not (entry[1] <= entry[2]).all() else len(found), entry) for entry in quantities),
-        key=lambda pair: pair[0],
-    )
+    good, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
     if good == len(found):
         return found
     return _cut(found, good, NotConserved(float(found.t[max(good - 1, 0)]), name, float(values.max()), bound))
+
+
+def _count_within(values: Array, bound: float) -> int:
+    """Return how many leading values (n,) are within a bound."""
+    within = values <= bound
+    return len(values) if within.all() else int(np.argmin(within))
 
 
 def _cut(found: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:

@@ -16,6 +16,7 @@ from ..errors import NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
+from .units import in_own_units
 
 MAX_ITERATIONS = 20
 Linearisation = Callable[[Array, Array], tuple[Array, Array]]
@@ -58,6 +59,7 @@ class Convected(Method):
     def picture_settings(cls) -> tuple[Convected, ...]:
         return (cls(),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from ..kernels.convected import G, conjugate_momentum
 

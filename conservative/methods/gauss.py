@@ -21,6 +21,7 @@ from .coefficients.gauss_legendre import MOST_STAGES, tableau
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start, quadruple
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class Gauss(Method):
     def audit_settings(cls) -> tuple[Gauss, ...]:
         return (cls(2),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))

@@ -42,6 +42,7 @@ from ..scene import Scene
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class Lame(Method):
             return "needs uniform gravity"
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))

@@ -16,6 +16,7 @@ from ..scene import Scene
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Projected(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
         coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, grid.dt)

@@ -17,6 +17,7 @@ from .coefficients.compositions import BEST, composition_of
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,7 @@ class Reduced(Method):
     def picture_settings(cls) -> tuple[Reduced, ...]:
         return (cls(),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
         coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)

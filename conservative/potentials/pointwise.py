@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,18 @@ from ..errors import BadInput
 
 EnergyFunction = Callable[[Array], float]
 GradientFunction = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Product:
+    """A function of a matrix (3, 3) times a constant: called, it gives the product, a number or a matrix."""
+
+    function: Callable[[Array], Any]
+    factor: float
+
+    def __call__(self, R: Array) -> Any:
+        """Return the product, in the function's unit."""
+        return self.function(R) * self.factor
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array, cayley, from_quaternion, rotation_about, triple
-from ..check import positive_number, read_only
+from ..check import build_unchecked, positive_number, read_only
 from ..errors import BadInput, PotentialFailed
-from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
+from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
@@ -104,6 +104,11 @@ class FunctionPotential(_Fields):
         if abs(lacking) <= _ROUND_OFF * (abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())):
             return gradient
         return gradient + lacking / np.sum(step * step) * step
+
+    def in_units(self, energy: float) -> FunctionPotential:
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        V, G = Energy(Product(self.energy.at, 1 / energy)), Gradient(Product(self.gradient.at, 1 / energy))
+        return build_unchecked(FunctionPotential, energy=V, gradient=G, scale=Size(self.scale() / energy), axis_W=self.axis_W)
 
     @cached_property
     def _callback(self) -> Any:
