@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +80,7 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
 
 
 def kernel_constants(
-    body: RigidBody, potential: Potential | None, invariants: Iterable[Invariant], R_WB0: Array, w_WB_B0: Array
+    body: RigidBody, potential: Potential | None, sizes: Mapping[Invariant, float], R_WB0: Array, w_WB_B0: Array
 ) -> Array:
     """Return the constants (5, 4) that `conservative.kernels.drifts` takes: those of invariants that are not there are 0.
 
@@ -88,23 +88,33 @@ def kernel_constants(
     ----------
     body, potential
         What moves, and what acts on it.
-    invariants
-        Some of those that `invariants_of` gives.
+    sizes
+        Some of the invariants that `invariants_of` gives, and what their drifts are relative to.
     R_WB0, w_WB_B0
         Attitude (3, 3) and rates (3,), rad/s, body axes, at the start.
     """
     rows = np.zeros((5, 4))
-    for invariant in invariants:
+    for invariant, size in sizes.items():
         start = invariant.evaluate(R_WB0[None], w_WB_B0[None])[0]
         if invariant.name == "energy":
-            rows[0] = 1 / invariant.scale, 0.0, 0.0, start
+            rows[0] = 1 / size, 0.0, 0.0, start
         elif invariant.name in MOMENTUM:
             directions = np.eye(3) if potential is None or potential.axis_W is None else potential.axis_W[None]
             part = slice(1, 1 + len(directions))
-            rows[part, :3], rows[part, 3] = directions / invariant.scale, start / invariant.scale
+            rows[part, :3], rows[part, 3] = directions / size, start / size
         elif (axis := axial_direction(body, potential)) is not None:
-            rows[4, :3], rows[4, 3] = axis / invariant.scale, start / invariant.scale
+            rows[4, :3], rows[4, 3] = axis / size, start / size
     return rows
+
+
+def find_size(invariant: Invariant, body: RigidBody, energy_scale: float) -> float:
+    """Return what rounding errors of an invariant are relative to, in its unit.
+
+    Of a momentum that is all that the energy can make of it, which is more than its `scale` where a body starts near rest.
+    """
+    if invariant.name not in MOMENTUM | {"axial momentum"}:
+        return invariant.scale
+    return max(invariant.scale, geometric_mean(2 * energy_scale, float(body.moments.max())))
 
 
 def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:

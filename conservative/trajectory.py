@@ -187,7 +187,7 @@ class Bounds:
     Attributes
     ----------
     drift
-        Of the invariants that a method names, relative to their scales.
+        Of the invariants that a method names, relative to their scales; of momenta, relative to all that the energy can make.
     orthonormality
         Of the largest component of |R'R - 1|.
     """
@@ -258,9 +258,14 @@ def _is_kept(found: Trajectory, steps: Steps, kept: frozenset[str], bounds: Boun
 
 
 def _find_constants(scene: Scene, kept: frozenset[str]) -> tuple[Array, Array]:
-    known = (invariant for invariant in scene.invariants if invariant.name in kept)
-    rows = invariants.kernel_constants(scene.body, scene.potential, known, scene.R_WB0, scene.w_WB_B0)
+    rows = invariants.kernel_constants(scene.body, scene.potential, _find_sizes(scene, kept), scene.R_WB0, scene.w_WB_B0)
     return np.array(scene.body.inertia), rows
+
+
+def _find_sizes(scene: Scene, kept: frozenset[str]) -> dict[Invariant, float]:
+    """Return the invariants of these names, and what their drifts are relative to."""
+    found = (invariant for invariant in scene.invariants if invariant.name in kept)
+    return {invariant: invariants.find_size(invariant, scene.body, scene.energy_scale) for invariant in found}
 
 
 def _cut_to_finite(found: Trajectory) -> Trajectory:
@@ -275,8 +280,8 @@ def _cut_at_drift(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Tr
     if found.failure is not None:
         return found
     quantities = [("orthonormality", orthonormality(found.R_WB), bounds.orthonormality)]
-    invariants = (invariant for invariant in found.scene.invariants if invariant.name in kept)
-    quantities += [(invariant.name, sizes(found.drift(invariant)), bounds.drift) for invariant in invariants]
+    for invariant, size in _find_sizes(found.scene, kept).items():
+        quantities.append((invariant.name, sizes(found.drift(invariant)) * (invariant.scale / size), bounds.drift))
     good, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
     if good == len(found):
         return found

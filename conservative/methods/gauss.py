@@ -17,6 +17,8 @@ from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start, quadruple
@@ -72,6 +74,9 @@ class Gauss(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     @property
     def cost(self) -> Cost:

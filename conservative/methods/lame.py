@@ -39,6 +39,8 @@ from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
@@ -71,6 +73,9 @@ class Lame(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):

@@ -15,6 +15,8 @@ from ..errors import BadInput
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
 from .units import converted, find_units, in_own_units
@@ -76,6 +78,9 @@ class MoserVeselov(_Fields, Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         return None if scene.free else "it is for free bodies"

@@ -13,6 +13,8 @@ from ..declarations import Candidacy, Cost
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
@@ -46,6 +48,9 @@ class Projected(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     @property
     def cost(self) -> Cost:

@@ -13,6 +13,8 @@ from ..declarations import README, Candidacy, Claims, Cost, SameErrors
 from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.compositions import BEST, composition_of
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
@@ -80,6 +82,9 @@ class Reduced(Method):
     def conserves(self) -> frozenset[str]:
         kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
         return kept | {"energy"} if self.frame == "body" else kept
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid, self.tol)
 
     @property
     def cost(self) -> Cost:
