@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,7 @@ from .check import geometric_mean, length
 from .potentials.potential import Potential
 from .potentials.uniform_gravity import UniformGravity
 
-MOMENTUM = {"momentum", "vertical momentum", "momentum along the field's axis"}
-"""Names of the world momentum, or of its component that a field leaves alone."""
+MOMENTUM_UNIT = "kg m^2/s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,52 +69,43 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
     scale = length(body.momentum(w_WB_B0)) or geometric_mean(float(body.moments.max()), energy_scale)
     if potential is None:
-        found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
+        found.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
         name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
-        found.append(Invariant(name, "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w) @ line))
+        found.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
     axis = axial_direction(body, potential)
     if axis is not None:
-        found.append(Invariant("axial momentum", "kg m^2/s", scale, lambda R, w: body.momentum(w) @ axis))
+        found.append(Invariant("axial momentum", MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(found)
 
 
-def kernel_constants(
-    body: RigidBody, potential: Potential | None, sizes: Mapping[Invariant, float], R_WB0: Array, w_WB_B0: Array
-) -> Array:
-    """Return the constants (5, 4) that `conservative.kernels.drifts` takes: those of invariants that are not there are 0.
+def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
+    """Return the invariants of a `Scene` that follow from the body and the field and have these names, and what their rounding errors are relative to, in their units.
 
-    Parameters
-    ----------
-    body, potential
-        What moves, and what acts on it.
-    sizes
-        Some of the invariants that `invariants_of` gives, and what their drifts are relative to.
-    R_WB0, w_WB_B0
-        Attitude (3, 3) and rates (3,), rad/s, body axes, at the start.
+    Of a momentum that is all that the energy can make of it, which is more than its scale where a body starts near rest.
     """
-    rows = np.zeros((5, 4))
-    for invariant, size in sizes.items():
-        start = invariant.evaluate(R_WB0[None], w_WB_B0[None])[0]
+    most = geometric_mean(2 * scene.energy_scale, float(scene.body.moments.max()))
+    found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
+    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in found}
+
+
+def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
+    """Return the inertia (3, 3), kg m^2, and constants (5, 4) of a `Scene`, as `conservative.kernels.drifts` takes them.
+
+    Those of invariants whose names are not among `kept` are 0. This file is below that of scenes.
+    """
+    body, potential, rows = scene.body, scene.potential, np.zeros((5, 4))
+    for invariant, size in kept_sizes(scene, kept).items():
+        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])[0]
         if invariant.name == "energy":
             rows[0] = 1 / size, 0.0, 0.0, start
-        elif invariant.name in MOMENTUM:
-            directions = np.eye(3) if potential is None or potential.axis_W is None else potential.axis_W[None]
+        elif invariant.name == "axial momentum":
+            rows[4, :3], rows[4, 3] = axial_direction(body, potential) / size, start / size
+        else:
+            directions = np.eye(3) if potential is None else potential.axis_W[None]
             part = slice(1, 1 + len(directions))
             rows[part, :3], rows[part, 3] = directions / size, start / size
-        elif (axis := axial_direction(body, potential)) is not None:
-            rows[4, :3], rows[4, 3] = axis / size, start / size
-    return rows
-
-
-def find_size(invariant: Invariant, body: RigidBody, energy_scale: float) -> float:
-    """Return what rounding errors of an invariant are relative to, in its unit.
-
-    Of a momentum that is all that the energy can make of it, which is more than its `scale` where a body starts near rest.
-    """
-    if invariant.name not in MOMENTUM | {"axial momentum"}:
-        return invariant.scale
-    return max(invariant.scale, geometric_mean(2 * energy_scale, float(body.moments.max())))
+    return np.array(body.inertia), rows
 
 
 def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:

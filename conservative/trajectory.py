@@ -10,56 +10,16 @@ import numpy as np
 
 from . import invariants, presentation
 from .attitude import Array, orthonormality
+from .deferred_imports import kernels
 from .errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
 from .invariants import Invariant, sizes
-from .lazy_kernels import kernels
-from .outcome import OK, Outcome
+from .outcome import OK, Choice, Outcome
+from .outcome import Counters as Counters
 from .scene import Scene
 
 if TYPE_CHECKING:
     import altair
     import pandas
-
-
-@dataclass(frozen=True)
-class Counters:
-    """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
-
-    None means that the method does not have the thing or its engine does not tell.
-    """
-
-    steps: int
-    stages: int | None = None
-    iterations: int | None = None
-    evaluations: int | None = None
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What `integrate(scene, error=...)` chose.
-
-    Attributes
-    ----------
-    method, dt
-        The `Method` that made the trajectory, and its step, s.
-    error
-        Attitude error asked for over the run, rad.
-    estimate
-        Estimated attitude error over the run, rad, from the same run at twice the step.
-    attempts
-        Steps tried on the whole run, s, with the estimate of each, rad.
-    """
-
-    method: Any  # a `Method`: naming the type would close a circle, as that file imports this one
-    dt: float
-    error: float
-    estimate: float
-    attempts: tuple[tuple[float, float], ...]
-
-    @property
-    def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
-        return self.estimate <= self.error
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +144,8 @@ class Steps(Protocol):
 class Bounds:
     """Up to where a run is called ok, sample by sample: no unit.
 
-    Attributes
-    ----------
-    drift
-        Of the invariants that a method names, relative to their scales; of momenta, relative to all that the energy can make.
-    orthonormality
-        Of the largest component of |R'R - 1|.
+    `drift` is that of the invariants that a method names, relative to their scales; of momenta, relative to all that the energy
+    can make of them. `orthonormality` is the largest component of |R'R - 1|.
     """
 
     drift: float
@@ -252,20 +208,9 @@ def _is_kept(found: Trajectory, steps: Steps, kept: frozenset[str], bounds: Boun
     """Return whether compiled code finds all samples within the bounds and all times right."""
     scene = found.scene
     V = np.zeros(len(found)) if scene.potential is None else scene.potential.energy(found.R_WB)
-    J, constants = scene.derive(_find_constants, kept)
+    J, constants = scene.derive(invariants.kernel_constants, kept)
     times, allowed = (steps.dt, steps.every, steps.n_steps, found.t), (bounds.drift, bounds.orthonormality)
     return bool(kernels("drifts").are_kept(*times, found.R_WB, found.w_WB_B, V, J, constants, *allowed))
-
-
-def _find_constants(scene: Scene, kept: frozenset[str]) -> tuple[Array, Array]:
-    rows = invariants.kernel_constants(scene.body, scene.potential, _find_sizes(scene, kept), scene.R_WB0, scene.w_WB_B0)
-    return np.array(scene.body.inertia), rows
-
-
-def _find_sizes(scene: Scene, kept: frozenset[str]) -> dict[Invariant, float]:
-    """Return the invariants of these names, and what their drifts are relative to."""
-    found = (invariant for invariant in scene.invariants if invariant.name in kept)
-    return {invariant: invariants.find_size(invariant, scene.body, scene.energy_scale) for invariant in found}
 
 
 def _cut_to_finite(found: Trajectory) -> Trajectory:
@@ -280,7 +225,7 @@ def _cut_at_drift(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Tr
     if found.failure is not None:
         return found
     quantities = [("orthonormality", orthonormality(found.R_WB), bounds.orthonormality)]
-    for invariant, size in _find_sizes(found.scene, kept).items():
+    for invariant, size in invariants.kept_sizes(found.scene, kept).items():
         quantities.append((invariant.name, sizes(found.drift(invariant)) * (invariant.scale / size), bounds.drift))
     good, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
     if good == len(found):

@@ -1,8 +1,8 @@
 """How far what our methods conserve may be off in a run that is called ok.
 
-Measured on all registered scenes, and on random bodies with ratios of moments up to 1e6: rounding leaves at most 0.3 eps (10 + n) k
-after n steps, where k is the ratio of the largest moment to the smallest, as an energy divides momenta by moments. A tolerance
-leaves at most half of itself in each step. Bounds are some ten times as much, and never above `LOOSEST`.
+Measured on all registered scenes, and on random bodies with ratios k of the largest moment to the smallest up to 1e6: rounding
+leaves at most 0.2 eps (10 + n) k after n steps, as an energy divides momenta by moments. A tolerance leaves at most half of
+itself in each step. Bounds are twenty times as much, and never above `LOOSEST`.
 """
 
 from __future__ import annotations
