@@ -63,6 +63,10 @@ def integrate(
         The equations of a step could not be solved.
     Diverged
         The state stopped being finite, or an engine gave up.
+    NotConserved
+        Orthonormality, or an invariant that the method names, left the method's `bounds`.
+    InvalidResult
+        The method gave no trajectory of the scene, or not all samples, or others than those of the grid.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", repr(scene), "a Scene, such as conservative.scenes.brick_flip()")

@@ -80,9 +80,10 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
-    """Return the invariants of a `Scene` that follow from the body and the field and have these names, and what their rounding errors are relative to, in their units.
+    """Return those invariants of a `Scene` that follow from body and field, by names, and what rounding errors are relative to.
 
-    Of a momentum that is all that the energy can make of it, which is more than its scale where a body starts near rest.
+    Those sizes have the units of the invariants. That of a momentum is all that the energy can make of it, which is more than
+    its scale where a body starts near rest.
     """
     most = geometric_mean(2 * scene.energy_scale, float(scene.body.moments.max()))
     found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)

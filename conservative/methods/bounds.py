@@ -7,7 +7,7 @@ itself in each step. Bounds are twenty times as much, and never above `LOOSEST`.
 
 from __future__ import annotations
 
-import numpy as np
+import sys
 
 from ..method import Grid
 from ..scene import Scene
@@ -26,7 +26,11 @@ def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float 
 
     `orthonormality` is None where it is kept no better than the invariants.
     """
-    J = scene.body.moments
-    rounding = ROUNDING * float(np.finfo(float).eps) * (10 + grid.n_steps) * float(J.max() / J.min())
+    rounding = ROUNDING * sys.float_info.epsilon * (10 + grid.n_steps) * scene.derive(condition)
     drift = min(LOOSEST, rounding + SOLVER * tol * grid.n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)
+
+
+def condition(scene: Scene) -> float:
+    """Return the ratio of the largest moment of the body to its smallest."""
+    return float(scene.body.moments.max() / scene.body.moments.min())
