@@ -14,7 +14,7 @@ from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
 from conservative.integration import integrate
 from conservative.method import Grid, Method
-from conservative.methods.automatic import bound_rate
+from conservative.methods.units import bound_rate
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene

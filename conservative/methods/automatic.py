@@ -28,7 +28,7 @@ from ..errors import AccuracyNotReached, IntegrationFailed, MissingEngine, Unsup
 from ..method import Grid, Method, Role
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
-from .units import converted, find_units
+from .units import bound_rate
 
 SAFETY = 0.5
 """Share of the wanted error that steps are chosen for."""
@@ -116,13 +116,6 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
             break
         dt = grid.dt * _step_factor(estimate, share, method)
     return (_count_work(method, trajectory) / duration if math.isfinite(estimate) else math.inf), grid.dt
-
-
-def bound_rate(scene: Scene) -> float:
-    """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
-    units = find_units(scene, scene.dt)
-    of_order_one = scene.derive(converted, units)
-    return math.sqrt(2 * of_order_one.energy_scale / float(of_order_one.body.moments.min())) / units.time
 
 
 def _count_work(method: Method, trajectory: Trajectory) -> float:

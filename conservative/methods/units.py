@@ -86,6 +86,13 @@ def converted(scene: Scene, units: Units) -> Scene:
     return scene if units == SI else units.convert(scene)
 
 
+def bound_rate(scene: Scene) -> float:
+    """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
+    units = find_units(scene, scene.dt)
+    of_order_one = scene.derive(converted, units)
+    return math.sqrt(2 * of_order_one.energy_scale / float(of_order_one.body.moments.min())) / units.time
+
+
 def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
     """Make a `Method.prepare` of one that is given only scenes of order one."""
 

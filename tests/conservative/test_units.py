@@ -13,8 +13,7 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.errors import NotConverged
 from conservative.invariants import sizes
 from conservative.method import Grid, Method
-from conservative.methods.automatic import bound_rate
-from conservative.methods.units import SI, find_units
+from conservative.methods.units import SI, bound_rate, find_units
 from conservative.registry import list_scenes, method
 from conservative.registry import scene as registered
 
@@ -151,3 +150,8 @@ def test_scales_of_invariants_neither_overflow_nor_vanish() -> None:
         for w in ((size, 0.5 * size, 0), (0, 0, 0)):
             falling = cv.Scene("extreme", body, np.eye(3), w, 1.0, cv.UniformGravity(size, (size, 0, 0)))
             assert all(0 < invariant.scale < math.inf for invariant in falling.invariants)
+
+
+def test_a_step_of_a_million_turns_is_refused() -> None:
+    with pytest.raises(cv.BadInput, match="dt: got 1e"):
+        cv.integrate(scene("top"), 1e30, cv.Lame(), t_end=1e30)
