@@ -15,13 +15,15 @@ import os
 from decimal import Decimal
 from functools import lru_cache
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import ROTATION_TOLERANCE, Array, orthonormality
 from .errors import BadInput
+
+T = TypeVar("T")
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Range of every number with a unit, in SI units, 0 apart; of an array the largest component counts.
@@ -205,3 +207,27 @@ def check_grid(dt: object, n_steps: object, every: object) -> None:
     if not math.isfinite(step * counts[0]):
         raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
     require_memory("every", *counts)
+
+
+def power_of_two(size: float) -> float:
+    """Return the power of two above a finite size, by which dividing rounds nothing; 1 for a size of 0. Of any unit."""
+    return math.ldexp(1.0, min(math.frexp(size)[1], 1023)) if size > 0 else 1.0
+
+
+def length(vector: Array) -> float:
+    """Return |v| of a vector (3,), of any unit and size: squares neither vanish nor overflow."""
+    unit = power_of_two(float(np.abs(vector).max()))
+    return float(np.linalg.norm(vector / unit)) * unit
+
+
+def geometric_mean(a: float, b: float) -> float:
+    """Return the square root of the product of two numbers of any unit, above 0, which itself may overflow or vanish."""
+    (x, i), (y, j) = math.frexp(a), math.frexp(b)
+    return math.ldexp(math.sqrt(math.ldexp(x * y, (i + j) % 2)), (i + j) // 2)
+
+
+def build_unchecked(kind: type[T], **values: Any) -> T:
+    """Return a frozen value of two classes (see above) without its checks: for numbers in units of our own, of any size."""
+    made = object.__new__(kind)
+    kind.__bases__[0].__init__(made, **values)  # type: ignore[misc]  # that of the class which has the fields
+    return made

@@ -63,6 +63,10 @@ def integrate(
         The equations of a step could not be solved.
     Diverged
         The state stopped being finite, or an engine gave up.
+    NotConserved
+        Orthonormality, or an invariant that the method names, left the method's `bounds`.
+    InvalidResult
+        The method gave no trajectory of the scene, or not all samples, or others than those of the grid.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
@@ -84,7 +88,7 @@ def _integrate_with(
         raise BadInput("method", describe(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
     grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
     require_support(method, scene)
-    return method.prepare(scene, grid)()
+    return method.solve(scene, grid)
 
 
 def _integrate_to(

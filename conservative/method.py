@@ -17,7 +17,7 @@ from .check import MOST_STEPS, check_grid, positive_integer, positive_number, re
 from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
-from .trajectory import Trajectory
+from .trajectory import Bounds, Trajectory, accept
 from .version import VERSION
 
 Run = Callable[[], Trajectory]
@@ -160,6 +160,13 @@ class Method(ABC):
         """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
         return frozenset()
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        """Return how far orthonormality, and the invariants in `conserves`, may be off in a run that is called ok.
+
+        By default 0.001 and 0.1, meant for engines at loose tolerances: whoever conserves something should say how well.
+        """
+        return Bounds(drift=1e-3, orthonormality=0.1)
+
     @property
     def cost(self) -> Cost:
         """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
@@ -181,6 +188,18 @@ class Method(ABC):
         of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
         prepared apart may overlap, in threads; nobody calls one run twice at a time.
         """
+
+    def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
+        """Return what a run of this method gave if it may be called ok, else what is good of it, with the failure.
+
+        Every run of every method goes through here. To be ok, a run has to give a `Trajectory` of the scene with all samples of
+        the grid, arrays of float64 of the right shapes, at the right times, finite, and within `bounds`.
+        """
+        return accept(found, scene, grid, self, self.bounds(scene, grid))
+
+    def solve(self, scene: Scene, grid: Grid) -> Trajectory:
+        """Return the trajectory on a grid, checked, whatever its outcome."""
+        return self.check(scene, grid, self.prepare(scene, grid)())
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
@@ -215,7 +234,7 @@ class Method(ABC):
         BadInput
             dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
         """
-        return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
+        return self.solve(scene, grid_for(scene, dt, t_end, sample_every))
 
 
 @lru_cache(maxsize=256)

@@ -17,10 +17,13 @@ from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start, quadruple
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,9 @@ class Gauss(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
+
     @property
     def cost(self) -> Cost:
         return Cost(step=50.0, correction=12.0 * self.stages)
@@ -93,6 +99,7 @@ class Gauss(Method):
     def audit_settings(cls) -> tuple[Gauss, ...]:
         return (cls(2),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))

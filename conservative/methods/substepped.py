@@ -10,7 +10,7 @@ from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Trajectory
+from ..trajectory import Bounds, Trajectory
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,9 @@ class Substepped(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return self.inner.conserves
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return self.inner.bounds(scene, Grid(grid.dt / self.most, grid.n_steps * self.most))
 
     def unsupported(self, scene: Scene) -> str | None:
         return self.inner.unsupported(scene)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,18 @@ def _blamed() -> Iterator[None]:
     except Exception as error:
         PotentialFailed.pending.cause = error
         raise PotentialFailed from error
+
+
+@dataclass(frozen=True)
+class Product:
+    """A function of a matrix (3, 3) times a constant: called, it gives the product, a number or a matrix."""
+
+    function: Callable[[Array], Any]
+    factor: float
+
+    def __call__(self, R: Array) -> Any:
+        """Return the product, in the function's unit."""
+        return self.function(R) * self.factor
 
 
 @dataclass(frozen=True)

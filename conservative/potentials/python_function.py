@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, cayley, from_quaternion, rotation_about, triple
-from ..check import describe, finite_array, positive_number
+from ..check import build_unchecked, describe, finite_array, positive_number
 from ..errors import BadInput, PotentialFailed
-from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
+from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
@@ -102,6 +102,11 @@ class FunctionPotential(_Fields):
         if abs(lacking) <= _ROUND_OFF * (abs(V_0) + abs(V_1) + abs(along) + float(np.abs(gradient * mean).sum())):
             return gradient
         return gradient + lacking / np.sum(step * step) * step
+
+    def in_units(self, energy: float) -> FunctionPotential:
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        V, G = Energy(Product(self.energy.at, 1 / energy)), Gradient(Product(self.gradient.at, 1 / energy))
+        return build_unchecked(FunctionPotential, energy=V, gradient=G, scale=Size(self.scale() / energy), axis_W=self.axis_W)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""

@@ -20,10 +20,11 @@ from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.bounds import bounds_of
 from conservative.potentials.potential import Potential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
-from conservative.trajectory import Counters, Trajectory
+from conservative.trajectory import Bounds, Counters, Trajectory
 from conservative.version import VERSION
 
 from .digits import MP_LOCK
@@ -139,6 +140,9 @@ class Exact(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         return _reason(_pendulum(scene) or scene.body, scene.potential)
