@@ -140,7 +140,7 @@ class AccuracyNotReached(UserWarning):
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka"),
-        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert"),
+        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }
 )

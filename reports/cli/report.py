@@ -28,6 +28,13 @@ from .options import epilog, split_names
 @click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option(
+    "--time-limit",
+    type=float,
+    metavar="S",
+    help="Longest run to plan for, s; a slower method gets fewer points, and one that goes on for ten times that, and at "
+    "least a minute, is ended.  [default: 0.6, with --quick 0.15]",
+)
 @click.option("--png", is_flag=True, help="Pictures as PNG, too.")
 @click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
 @click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
