@@ -10,7 +10,8 @@ Names are imported when they are first used: the pytest plugin lies below this p
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+
+TYPE_CHECKING = False  # not that of typing, which takes longer to import than all else here
 
 if TYPE_CHECKING:
     from . import scenes as scenes

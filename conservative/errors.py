@@ -44,7 +44,7 @@ class NotWritten(BadInput):
         argument: str,
         path: Path,
         cause: Exception,
-        allowed: str = "a file in a folder that exists and can be written, on a disk with room for it",
+        allowed: str = "a file in a folder that can be written, on a disk with room for it",
     ) -> None:
         self.path, self.cause = path, cause
         super().__init__(argument, f"{str(path)!r} ({getattr(cause, 'strerror', None) or cause})", allowed)

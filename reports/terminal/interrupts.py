@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from . import supervision
+
 
 class Terminated(KeyboardInterrupt):
     """SIGTERM, which `kill`, `timeout` and a CI that cancels a job send: the same as Ctrl-C but for the exit code."""
@@ -17,8 +19,12 @@ class Terminated(KeyboardInterrupt):
 def interruptible(number: signal.Signals) -> Iterator[None]:
     """Turn SIGINT into `KeyboardInterrupt`, SIGTERM into `Terminated`, also where another exception is made of it on the way.
 
-    Compiled code that is interrupted while it is loaded raises `SystemError`, for one.
+    Compiled code that is interrupted while it is loaded raises `SystemError`, for one. A process that is supervised leaves its
+    signals to the one that does it.
     """
+    if supervision.board is not None:
+        yield
+        return
     stops: list[KeyboardInterrupt] = []
 
     def stop(number: int, frame: object) -> None:

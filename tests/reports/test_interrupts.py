@@ -1,4 +1,4 @@
-"""What a signal becomes, inside a command and outside."""
+"""What a signal becomes where a process handles its signals itself, as in a notebook; for commands see test_supervision.py."""
 
 import signal
 
