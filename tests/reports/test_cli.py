@@ -50,6 +50,13 @@ def test_run_equals_the_known_rates():
     assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
 
 
+def test_run_tells_its_step_and_duration():
+    arguments = ("run", "brick_flip", "--dt", "0.005", "--t-end", "0.1")
+    assert " 0.1 s with dt = 0.005 s\n" in conservative(*arguments).stdout
+    summary = json.loads(conservative(*arguments, "--json").stdout)
+    assert (summary["dt"], summary["t_end"]) == (0.005, 0.1)
+
+
 def test_the_method_of_a_run_is_by_default_that_of_integrate():
     trajectory = integrate(registry.scene("brick_flip"), 0.01, t_end=0.02)
     assert trajectory.label == registry.method(DEFAULT_METHOD).label
