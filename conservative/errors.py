@@ -7,9 +7,12 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from .outcome import Outcome, OutcomeKind
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class BadInput(ValueError):
@@ -31,6 +34,20 @@ class NotLoadable(BadInput):
         self.place = place
         got = f"{name!r}, registered as {place!r}, which cannot be loaded ({type(cause).__name__}: {cause})"
         super().__init__(argument, got, "an entry point that names what is there")
+
+
+class NotWritten(BadInput):
+    """A file or a folder cannot be written; what was there is as it was. Attributes: `path`, and the `cause`."""
+
+    def __init__(
+        self,
+        argument: str,
+        path: Path,
+        cause: Exception,
+        allowed: str = "a file in a folder that exists and can be written, on a disk with room for it",
+    ) -> None:
+        self.path, self.cause = path, cause
+        super().__init__(argument, f"{str(path)!r} ({getattr(cause, 'strerror', None) or cause})", allowed)
 
 
 class MissingEngine(ImportError):

@@ -18,7 +18,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from .entry_points import METHODS, SCENES, list_entries, load_entry
+from .deferred_imports import METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene

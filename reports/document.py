@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from conservative import files
 from conservative.errors import BadInput
 
 from .page import markdown, page, scene_charts
@@ -15,8 +16,8 @@ from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
 from .run.provenance import provenance
-from .terminal import atomic_files
 from .terminal.progress import Step
+from .terminal.report_folder import MANIFEST, report_folder
 from .view import View, build
 
 SCHEMA = 2
@@ -38,7 +39,7 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     progress = checkpoint.begin(plan, out, source, resume)
     spans = plan.spans(name for name in plan.names if name not in progress.results)
     try:
-        with atomic_files.report_folder(out) as folder:
+        with report_folder(out) as folder:
             measurements = measure(plan, step, progress)
             view = build(plan, measurements, replace(source, resumed=progress.describe_earlier()))
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
@@ -55,18 +56,18 @@ def render(view: View, folder: Path, png: bool, announce: Callable[[str], None])
     announce("pictures")
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
-    (folder / "report.md").write_text(text, encoding="utf-8")
+    files.write_text(folder / "report.md", text, "out")
     announce("page")
-    (folder / "index.html").write_text(page.render(view, charts), encoding="utf-8")
-    view.table.to_csv(folder / "measurements.csv", index=False)
-    files = sorted({path.name for path in folder.iterdir()} | {atomic_files.MANIFEST})
-    (folder / atomic_files.MANIFEST).write_text(manifest(view, files), encoding="utf-8")
+    files.write_text(folder / "index.html", page.render(view, charts), "out")
+    files.write_text(folder / "measurements.csv", view.table.to_csv(index=False, lineterminator="\n"), "out")
+    names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
+    files.write_text(folder / MANIFEST, manifest(view, names), "out")
 
 
-def manifest(view: View, files: list[str]) -> str:
+def manifest(view: View, names: list[str]) -> str:
     """Return measurements.json; a value that could not be measured is null."""
     rows = view.table.astype(object).where(view.table.notna(), None).to_dict("records")  # pandas' own JSON cuts off digits
-    return json.dumps({"schema": SCHEMA, **asdict(view.source), "files": files, "rows": rows}, indent=1, ensure_ascii=False)
+    return json.dumps({"schema": SCHEMA, **asdict(view.source), "files": names, "rows": rows}, indent=1, ensure_ascii=False)
 
 
 def draw(chart: Any, path: Path, png: bool) -> str:
@@ -75,7 +76,7 @@ def draw(chart: Any, path: Path, png: bool) -> str:
 
     specification = chart.to_json()
     svg = path.with_suffix(".svg")
-    svg.write_text(vl_convert.vegalite_to_svg(specification), encoding="utf-8")
+    files.write_text(svg, vl_convert.vegalite_to_svg(specification), "out")
     if png:
-        path.with_suffix(".png").write_bytes(vl_convert.vegalite_to_png(specification, scale=2))
+        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(specification, scale=2), "out")
     return svg.name

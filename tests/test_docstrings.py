@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 import conservative
-from conservative import entry_points, registry
+from conservative import deferred_imports, registry
 from conservative.attitude import Array
 from conservative.check import positive_number
 from conservative.errors import BadInput, MissingEngine
@@ -27,7 +27,7 @@ def test_shapes_units_and_errors_are_documented(name):
 def test_everything_in_all_is_walked():
     walked = {n.partition(".")[0] for name in public_modules() for n, *_ in members(importlib.import_module(name))}
     functions = {name for name in conservative.__all__ if inspect.isfunction(getattr(conservative, name))}
-    methods = {entry.load().__name__ for entry in entry_points.list_entries(entry_points.METHODS).values()}
+    methods = {entry.load().__name__ for entry in deferred_imports.list_entries(deferred_imports.METHODS).values()}
     assert functions | methods <= walked
 
 
@@ -35,10 +35,10 @@ def test_everything_in_all_is_walked():
 
 WITHOUT_FORMULAS = {
     "conservative.check": "checks of arguments",
-    "conservative.lazy_kernels": "imports",
     "conservative.declarations": "values",
-    "conservative.entry_points": "names",
+    "conservative.deferred_imports": "imports and names",
     "conservative.errors": "exceptions",
+    "conservative.files": "files",
     "conservative.method": "the protocol",
     "conservative.outcome": "an enum and a value",
     "conservative.presentation": "tables and cards",

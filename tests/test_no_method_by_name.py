@@ -14,7 +14,7 @@ from .test_house import sources
 
 ALLOWED = {
     "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped", "the public names"),
-    "conservative/entry_points.py": ("reduced", "the default of every option that names a method"),
+    "conservative/deferred_imports.py": ("reduced", "the default of every option that names a method"),
     "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
     "conservative/integration.py": ("reduced", "the default of `integrate`"),
     "conservative/methods/moser_veselov.py": ("exact", "one of its orders"),

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import conservative as cv
-from conservative import entry_points, registry
+from conservative import deferred_imports, registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
@@ -82,10 +82,10 @@ def install(folder, monkeypatch, source, entry="borrowed = borrowed_method:Borro
     info = folder / "borrowed_method-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: borrowed_method\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{entry_points.METHODS}]\n{entry}\n")
+    (info / "entry_points.txt").write_text(f"[{deferred_imports.METHODS}]\n{entry}\n")
     monkeypatch.syspath_prepend(folder)
     importlib.invalidate_caches()
-    entry_points.list_entries.cache_clear()
+    deferred_imports.list_entries.cache_clear()
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def installed(tmp_path, monkeypatch):
     yield lambda *text: install(tmp_path, monkeypatch, *text)
     sys.modules.pop("borrowed_method", None)
     monkeypatch.undo()
-    entry_points.list_entries.cache_clear()
+    deferred_imports.list_entries.cache_clear()
 
 
 def test_the_automatic_choice_considers_it(installed):

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from conservative.errors import BadInput
+from conservative.files import make_folder, write_text
 from conservative.trajectory import Counters
 
 from ..measures.measure import Measure
@@ -183,11 +184,11 @@ def read(path: Path) -> Baseline:
 
 
 def write(baseline: Baseline, path: Path) -> None:
-    """Write a baseline, with the hash that tells a hand's edit or a merge from an update."""
+    """Write a baseline, with the hash that tells a hand's edit or a merge from an update. Raise `NotWritten` if that fails."""
     rows = {id: _row_as_json(row) for id, row in sorted(baseline.rows.items())}
     content = {"format": FORMAT, "rows": rows, "history": list(baseline.history)}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({**content, "sha256": _digest(content)}, indent=1) + "\n", encoding="utf-8")
+    make_folder(path.parent, "baseline")
+    write_text(path, json.dumps({**content, "sha256": _digest(content)}, indent=1) + "\n", "baseline")
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from conservative.files import write_text
+
 from ..measures.measure import Measure
 from .baseline import ORDER
 from .compare import Verdict
@@ -21,7 +23,7 @@ SMALLER_IS_BETTER, BMF, SUMMARY = "custom_smaller_is_better.json", "bencher.json
 def write(results: Results, folder: Path) -> None:
     """Write both formats of dashboards into a folder."""
     for name, content in ((SMALLER_IS_BETTER, smaller_is_better(results)), (BMF, bmf(results))):
-        (folder / name).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_text(folder / name, json.dumps(content, indent=1, allow_nan=False) + "\n", "results")
 
 
 def smaller_is_better(results: Results) -> list[dict[str, Any]]:

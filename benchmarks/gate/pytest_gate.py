@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from conservative.files import write_text
+
 from ..measures.origin import commit, machine
 from . import baseline, compare, dashboards, results, yardstick
 from .results import TIME_RATIO, Results, Row, Status
@@ -100,7 +102,7 @@ class Gate:
             self.without_baseline = True
             raise
         text = dashboards.markdown(self.verdict)
-        (self.folder / dashboards.SUMMARY).write_text(text, encoding="utf-8")
+        write_text(self.folder / dashboards.SUMMARY, text, "results")
         if summary := os.environ.get("GITHUB_STEP_SUMMARY"):
             with Path(summary).open("a", encoding="utf-8") as file:
                 file.write(text)

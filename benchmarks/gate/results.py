@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from conservative.errors import BadInput
+from conservative.files import make_folder, write_text
 
 FOLDER = Path(".benchmarks") / "gate"
 """Where a gated run leaves its results, relative to the root of the project."""
@@ -71,9 +72,9 @@ class Results:
 
 
 def write(results: Results, path: Path) -> None:
-    """Write results as JSON; floats come back as they are, nan as nan."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(as_json(results), indent=1) + "\n", encoding="utf-8")
+    """Write results as JSON; floats come back as they are, nan as nan. Raise `NotWritten` where that cannot be."""
+    make_folder(path.parent, "results")
+    write_text(path, json.dumps(as_json(results), indent=1) + "\n", "results")
 
 
 def as_json(results: Results) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from conservative.benchmarks.studies.case import Case, Success, attempt
 from conservative.benchmarks.studies.speed import keep_end, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
+from conservative.deferred_imports import kernels
 from conservative.integration import integrate
-from conservative.lazy_kernels import kernels
 from conservative.method import Method, Role, grid_for
 from conservative.registry import list_families
 from conservative.registry import method as named

@@ -14,12 +14,13 @@ coverage report. Results then differ by round-off, as products are not fused wit
 from __future__ import annotations
 
 import hashlib
-import os
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+
+from ..files import write_text
 
 COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
 """Whether kernels are machine code; else they are plain Python."""
@@ -50,9 +51,7 @@ def _drop_stale_code(cache: Path, sources: Path) -> None:
         return
     for index in cache.glob("*.nbi"):
         index.unlink(missing_ok=True)  # another process may be at it
-    fresh = stamp.with_suffix(f".{os.getpid()}")
-    fresh.write_text(digest)
-    fresh.replace(stamp)
+    write_text(stamp, digest, "NUMBA_CACHE_DIR")
 
 
 if COMPILED:

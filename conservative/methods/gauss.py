@@ -12,8 +12,8 @@ import numpy as np
 from ..attitude import Array, axes_about, from_quaternion, triple
 from ..check import choice, positive_integer
 from ..declarations import README, Candidacy, Claims, Cost
+from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..declarations import README, Candidacy, Claims
-from ..lazy_kernels import kernels
+from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..attitude import Array
 from ..declarations import README, Candidacy, Claims
+from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..lazy_kernels import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from .principal_axes import PrincipalStart, start_along

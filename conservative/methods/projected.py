@@ -10,7 +10,7 @@ import numpy as np
 
 from ..attitude import Triple, triple
 from ..declarations import Candidacy, Cost
-from ..lazy_kernels import kernels
+from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from .coefficients.explicit import DORMAND_PRINCE_8

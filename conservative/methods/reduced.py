@@ -10,7 +10,7 @@ import numpy as np
 
 from ..check import choice, positive_number
 from ..declarations import README, Candidacy, Claims, Cost, SameErrors
-from ..lazy_kernels import kernels
+from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from .coefficients.compositions import BEST, composition_of

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array
+from ..deferred_imports import kernels
 from ..errors import Diverged, IntegrationFailed, NotConverged, WrongBranch
-from ..lazy_kernels import kernels
 from ..method import Grid, Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
 from ..check import finite_array, finite_number, rotation
-from ..entry_points import BODY_FILES, list_entries, load_body_reader
+from ..deferred_imports import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction

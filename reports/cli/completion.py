@@ -32,7 +32,7 @@ def _last(incomplete: str) -> tuple[str, str]:
 
 
 def _registered(group: str, start: str) -> list[str]:
-    from conservative.entry_points import list_entries
+    from conservative.deferred_imports import list_entries
 
     return [name for name in list_entries(f"conservative.{group}") if name.startswith(start)]
 

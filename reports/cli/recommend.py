@@ -81,8 +81,7 @@ def _answer(
     from conservative import registry
     from conservative.benchmarks.recommendation.question import ask
     from conservative.benchmarks.recommendation.recommend import recommend as answer
-
-    from ..terminal.atomic_files import text_file
+    from conservative.files import text_file
 
     question = ask(registry.scene(scene), error, duration, engines or None, cost_limit)
     with ExitStack() as files:
@@ -103,14 +102,11 @@ def _contents(recommendation: Recommendation) -> tuple[str, str]:
 
 def _paths(out: Path | None) -> list[Path]:
     """Return the files of a recommendation; their folder is made if it is not there."""
-    from conservative.errors import BadInput
+    from conservative.files import make_folder
 
     if out is None:
         return []
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput("out", f"{str(out)!r} ({error.strerror})", "a folder that exists or can be made") from None
+    make_folder(out, "out")
     return [out / name for name in FILES]
 
 

@@ -43,8 +43,8 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     require_extra("conservative report", "report")
     from .. import document
     from ..run.plan import plan_report
-    from ..terminal.atomic_files import MANIFEST
     from ..terminal.progress import progress
+    from ..terminal.report_folder import MANIFEST
 
     plan = plan_report(split_names("scenes", scenes), split_names("methods", methods), **extent)
     _announce(out, resume)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from conservative.entry_points import DEFAULT_METHOD
+from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion

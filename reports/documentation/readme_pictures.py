@@ -21,6 +21,7 @@ from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import long_runs, studies
 from conservative.benchmarks.studies.study import Study
+from conservative.files import make_folder
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -101,7 +102,7 @@ def polhodes(scene: Scene, methods: tuple[Method, ...]) -> Any:
 
 def write(folder: Path, quick: bool, step: Step) -> list[Path]:
     """Measure, draw and write the pictures into a folder; return their files."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder, "folder")
     return [folder / document.draw(chart, folder / name, False) for name, chart in pictures(quick, step)]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from conservative.benchmarks.studies import long_runs
-from conservative.entry_points import DEFAULT_METHOD
+from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
 from ..tables.cells import Table, markdown

@@ -19,8 +19,8 @@ from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
+from conservative.files import text_file
 
-from ..terminal.atomic_files import text_file
 from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms

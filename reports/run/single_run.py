@@ -16,6 +16,7 @@ from conservative import registry
 from conservative.attitude import orthonormality
 from conservative.benchmarks.measures.timing import wall_time
 from conservative.errors import BadInput
+from conservative.files import text_file
 from conservative.integration import integrate, require_support
 from conservative.invariants import Invariant, sizes
 from conservative.method import Grid, Method, grid_for
@@ -25,7 +26,6 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..tables.cells import outcome_record
-from ..terminal.atomic_files import text_file
 from ..terminal.progress import Expect
 
 TRIAL = 100

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.entry_points import DEFAULT_METHOD
+from conservative.deferred_imports import DEFAULT_METHOD
 
 from .cells import Row, Table, number
 from .rows import of_measure, of_study

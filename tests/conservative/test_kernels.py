@@ -15,8 +15,8 @@ import pytest
 from numba.core.errors import TypingError
 
 import conservative as cv
+from conservative.deferred_imports import kernels
 from conservative.kernels.protocol import Result, Workspace, find_ends
-from conservative.lazy_kernels import kernels
 from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
 from conservative.registry import list_families

@@ -3,7 +3,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 import conservative as cv
-from conservative import entry_points, registry
+from conservative import deferred_imports, registry
 from conservative.errors import BadInput, NotLoadable
 
 
@@ -17,7 +17,7 @@ def test_every_scene_builds_under_its_name(name):
 
 @pytest.mark.parametrize("name", registry.list_methods())
 def test_every_method_is_a_frozen_value_that_is_read_back_from_its_name(name):
-    family = entry_points.list_entries(entry_points.METHODS)[name].load()
+    family = deferred_imports.list_entries(deferred_imports.METHODS)[name].load()
     assert family.family == name
     for method in family.variants():
         assert registry.method(method.name) == method
@@ -43,8 +43,8 @@ def test_an_unknown_setting_is_answered_with_the_nearest():
 
 def with_entry(monkeypatch, name, value):
     """Register one more method, as an installed package would."""
-    known = entry_points.list_entries(entry_points.METHODS) | {name: EntryPoint(name, value, entry_points.METHODS)}
-    monkeypatch.setattr(entry_points, "list_entries", lambda group: known)
+    known = deferred_imports.list_entries(deferred_imports.METHODS) | {name: EntryPoint(name, value, deferred_imports.METHODS)}
+    monkeypatch.setattr(deferred_imports, "list_entries", lambda group: known)
 
 
 @pytest.mark.parametrize("value", ["conservative.body:Phantom", "conservative.nowhere:Phantom"])

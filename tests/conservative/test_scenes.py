@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import entry_points, registry
+from conservative import deferred_imports, registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.scenes.turned_frame import in_body_frame
 
@@ -32,7 +32,7 @@ BUILDERS = {
 
 
 def builder_of(name):
-    return entry_points.list_entries(entry_points.SCENES)[name].load()
+    return deferred_imports.list_entries(deferred_imports.SCENES)[name].load()
 
 
 def numbers(case, key):

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import conservative as cv
-from conservative import entry_points
+from conservative import deferred_imports
 from conservative.attitude import angle_between, rotation_about
 from conservative.method import Role
 from conservative.scenes.turned_frame import in_body_frame
@@ -128,7 +128,7 @@ SYMMETRIES = (turned_world, turned_body, permuted_axes, reversed_time, scaled_ti
 def ours():
     """Every setting of every registered method of ours; `Convected` with its Newton iteration carried to round-off."""
     found = []
-    for entry in entry_points.list_entries(entry_points.METHODS).values():
+    for entry in deferred_imports.list_entries(deferred_imports.METHODS).values():
         if not entry.value.startswith("conservative."):
             continue
         for method in entry.load().variants():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import entry_points, registry
+from conservative import deferred_imports, registry
 from conservative.attitude import from_quaternion, rotation_about
 from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
@@ -206,9 +206,9 @@ def test_bad_input_is_named(written, tmp_path, case):
 
 
 def test_loaders_are_registered_and_unknown_kinds_named():
-    assert list(entry_points.list_entries(entry_points.BODY_FILES)) == ["mjcf", "urdf"]
-    assert entry_points.load_body_reader("mjcf") is body_from_mjcf
+    assert list(deferred_imports.list_entries(deferred_imports.BODY_FILES)) == ["mjcf", "urdf"]
+    assert deferred_imports.load_body_reader("mjcf") is body_from_mjcf
     with pytest.raises(cv.BadInput) as caught:
-        entry_points.load_body_reader("urfd")
+        deferred_imports.load_body_reader("urfd")
     assert (caught.value.argument, caught.value.got) == ("kind of file", "'urfd'")
     assert "'urdf' (nearest)" in caught.value.allowed

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from conservative import integrate, registry
 from conservative.benchmarks.gate import results
 from conservative.benchmarks.gate.results import Row
-from conservative.entry_points import DEFAULT_METHOD
+from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.reports.cli.main import main
 
 

@@ -5,7 +5,8 @@ import stat
 import pytest
 
 from conservative import BadInput
-from conservative.reports.terminal.atomic_files import MANIFEST, report_folder, text_file
+from conservative.files import text_file
+from conservative.reports.terminal.report_folder import MANIFEST, report_folder
 
 
 def write_report(folder, *names):

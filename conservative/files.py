@@ -1,0 +1,250 @@
+"""The one writer of files: what it writes is there whole or not at all.
+
+A file is written under a temporary name beside its place, which it takes once all of it is on the disk. A full disk, an
+exception or a kill leaves what was there before. Whoever makes a temporary holds a lock on it, which ends with the process,
+however that ends: a temporary that nobody holds is left over, and goes when the same place is written next.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import shutil
+import stat
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any
+
+from .errors import NotWritten
+
+try:
+    fcntl: Any = import_module("fcntl")
+except ImportError:  # not POSIX: no locks, and nothing is known to be left over
+    fcntl = None
+
+_PLACES: Counter[Path] = Counter()
+"""The places that are being written, and by how many."""
+_LISTENERS: list[Callable[[list[Path]], None]] = []
+
+
+@contextmanager
+def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
+    """Yield a text stream whose contents become the file `target` when the block ends well.
+
+    A place that cannot be written is an error before the block. A link stays one, a file keeps its permissions, and what is no
+    file, such as /dev/null, is written as it is.
+
+    Raises
+    ------
+    NotWritten
+        The file cannot be written, or the disk is full; the message names `argument`.
+    """
+    with _raw_file(target, argument) as raw:
+        stream = io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="")
+        try:
+            yield stream
+            stream.flush()
+        except BaseException:
+            raw.ended = True
+            raise
+        finally:
+            stream.detach().detach()
+
+
+def write_text(target: Path, text: str, argument: str) -> None:
+    """Make a text the content of the file `target`. Raise `NotWritten` as `text_file` does."""
+    write_bytes(target, text.encode(), argument)
+
+
+def write_bytes(target: Path, content: bytes, argument: str) -> None:
+    """Make bytes the content of the file `target`. Raise `NotWritten` as `text_file` does."""
+    with _raw_file(target, argument) as raw:
+        left = memoryview(content)
+        while left:
+            left = left[raw.write(left) :]
+
+
+def make_folder(folder: Path, argument: str) -> None:
+    """Make a folder, and those above it, unless they are there. Raise `NotWritten`, which names `argument`, if that fails."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise NotWritten(argument, folder, error, "a folder that exists or can be made") from None
+
+
+def listen(listener: Callable[[list[Path]], None]) -> None:
+    """Have a function called with the places that are being written, whenever these change."""
+    _LISTENERS.append(listener)
+
+
+@contextmanager
+def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, int]]:
+    """Yield the name of a temporary beside a place, and its handle; `make` creates and opens it. It is gone after the block.
+
+    Leftovers of the place go first. An `OSError` stays one: the caller knows what to make of it.
+    """
+    _list(place, 1)
+    try:
+        remove_leftovers(place)
+        fresh, handle = _make_locked(place, make)
+        try:
+            yield fresh, handle
+        finally:
+            remove(fresh)
+            release(handle)
+    finally:
+        _list(place, -1)
+
+
+def remove_leftovers(place: Path) -> None:
+    """Remove the temporaries of a place whose makers are gone."""
+    for path in leftovers(place):
+        remove(path)
+
+
+def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
+    """Yield the temporaries of a place whose makers are gone; each is locked until the next is asked for."""
+    pattern = re.compile(rf"\.{re.escape(place.name)}-[0-9a-f]{{12}}{suffix}")
+    with suppress(OSError):  # a folder that cannot be read has none that can be removed
+        for path in [path for path in place.parent.iterdir() if pattern.fullmatch(path.name)]:
+            handle = lock(path)
+            if handle is not None:
+                try:
+                    yield path
+                finally:
+                    release(handle)
+
+
+def lock(path: Path) -> int | None:
+    """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    if _try_lock(handle) and _is_at(handle, path):
+        return handle
+    os.close(handle)
+    return None
+
+
+def release(handle: int) -> None:
+    """Unlock and close: a process that was forked meanwhile has the handle too, and would keep the lock."""
+    with suppress(OSError):
+        if fcntl is not None:
+            fcntl.flock(handle, fcntl.LOCK_UN)
+    os.close(handle)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder with all that is in it, if it is there and can be removed."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
+
+
+def sync(path: Path) -> None:
+    """Have a file, or the names in a folder, on the disk, where the file system can."""
+    with suppress(OSError):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+class _RawFile(io.FileIO):
+    """A file whose errors name the place that its contents are for; once `ended`, it takes what is left and forgets it."""
+
+    def __init__(self, handle: int, target: Path, argument: str) -> None:
+        super().__init__(handle, "w", closefd=False)
+        self.target, self.argument, self.ended = target, argument, False
+
+    def write(self, content: Any) -> int:
+        if self.ended:
+            return memoryview(content).nbytes
+        try:
+            return super().write(content)
+        except OSError as error:
+            self.ended = True
+            raise NotWritten(self.argument, self.target, error) from None
+
+
+@contextmanager
+def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
+    """Yield a raw file that takes the place of `target` when the block ends well."""
+    with ExitStack() as stack:
+        with _as_not_written(target, argument):
+            place = Path(os.path.realpath(target))  # a link stays one
+            fresh, handle = stack.enter_context(_opened(place))
+        yield _RawFile(handle, target, argument)
+        if fresh != place:
+            with _as_not_written(target, argument):
+                os.fsync(handle)  # before it takes the place: else a crash of the machine could leave an empty file there
+                fresh.replace(place)
+            sync(place.parent)
+
+
+@contextmanager
+def _as_not_written(target: Path, argument: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:  # a ValueError: a NUL in the name
+        raise NotWritten(argument, target, error) from None
+
+
+@contextmanager
+def _opened(place: Path) -> Iterator[tuple[Path, int]]:
+    """Yield what to write into: a temporary with the permissions of the file, or the place itself where it is no file."""
+    if place.exists() and not os.access(place, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    if place.exists() and not place.is_file():
+        handle = os.open(place, os.O_WRONLY)  # of a folder, an error
+        try:
+            yield place, handle
+        finally:
+            os.close(handle)
+        return
+    with temporary(place, lambda path: os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)) as (fresh, handle):
+        if place.exists():
+            fresh.chmod(stat.S_IMODE(place.stat().st_mode))
+        yield fresh, handle
+
+
+def _list(place: Path, number: int) -> None:
+    _PLACES[place] += number
+    for listener in _LISTENERS:
+        listener(sorted(+_PLACES))
+
+
+def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:
+    """Return a new temporary and its handle, locked; another where somebody took it for a leftover before it was."""
+    while True:
+        fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
+        handle = make(fresh)
+        if _try_lock(handle, without=True) and _is_at(handle, fresh):
+            return fresh, handle
+        os.close(handle)
+
+
+def _try_lock(handle: int, without: bool = False) -> bool:
+    """Lock a file or a folder if no other process has; `without` is the answer where the file system has no locks."""
+    try:
+        if fcntl is None:
+            return without
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return without and not isinstance(error, BlockingIOError)
+    return True
+
+
+def _is_at(handle: int, path: Path) -> bool:
+    with suppress(OSError):
+        return os.path.samestat(os.fstat(handle), path.lstat())
+    return False
