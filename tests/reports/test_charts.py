@@ -1,10 +1,13 @@
 """What charts draw is in the unit that their axes name."""
 
+from types import SimpleNamespace
+
 import pandas as pd
 import pytest
 
+from conservative import Reduced
 from conservative.benchmarks.measures.measure import Measure
-from conservative.reports.charts import figures
+from conservative.reports.charts import figures, recommendation, spheres
 from conservative.reports.charts.style import power_axis
 from conservative.reports.tables import orders, work_precision
 
@@ -51,6 +54,20 @@ def test_drift_is_relative_over_seconds():
     assert panel["encoding"]["x"]["title"] == "t, s"
     assert panel["encoding"]["y"]["axis"]["title"] == "largest so far, relative"
     assert drawn(spec, "shown") == [figures.FLOOR, 1e-9]
+
+
+def test_the_cost_of_a_recommendation_is_in_microseconds():
+    probe = SimpleNamespace(method=Reduced(), dt=0.25, setting=0.25)
+    advice = [SimpleNamespace(reached=reached, best=probe, cost=3e-6, line="reduced") for reached in (True, False)]
+    found = recommendation.costs(SimpleNamespace(advice=advice))
+    assert found.to_dict("records") == [{"name": "reduced", "setting": "dt = 0.25 s", "cost": pytest.approx(3.0)}]
+
+
+def test_what_is_behind_the_sphere_is_pale():
+    curve = pd.DataFrame({"name": "a", "family": "a", "x": [1.0, 0.0], "y": [0.0, 1.0], "z": [0.0, 0.0]})
+    fade = spheres.chart(curve)["layer"][1]["encoding"]["opacity"]
+    assert fade["condition"]["test"] == "datum.near < 0"  # `near` is towards the eye
+    assert fade["condition"]["value"] < fade["value"]
 
 
 @pytest.mark.parametrize(("low", "high", "powers"), [(0.05, 200.0, [0.1, 1.0, 10.0, 100.0]), (1.0, 100.0, [1.0, 10.0, 100.0])])

@@ -120,6 +120,16 @@ def test_text_file_is_whole_or_as_before(tmp_path):
     assert tree(tmp_path) == ["run.csv"]
 
 
+def test_a_text_file_takes_the_place_of_the_one_before_and_is_not_written_over_it(tmp_path):
+    path = tmp_path / "kept.txt"
+    path.write_text("before")
+    with path.open() as reader:  # as somebody who reads it at that moment
+        with text_file(path, "out") as stream:
+            stream.write("after")
+        assert reader.read() == "before"
+    assert path.read_text() == "after"
+
+
 @pytest.mark.parametrize("place", [".", "missing/run.csv"])
 def test_text_file_that_cannot_be(tmp_path, place):
     with pytest.raises(BadInput, match=r"csv: got .*; allowed: a file"), text_file(tmp_path / place, "csv"):
