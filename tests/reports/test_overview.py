@@ -27,7 +27,7 @@ def test_a_line_of_tolerances_keeps_what_its_tightest_keeps():
         finding
         for method, error, drift in (("heyoka:tol=1e-3", 1e-2, 1e-3), ("heyoka:tol=1e-15", 1e-9, 1e-15))
         for finding in (
-            *point("heyoka", "engine", error, 1e-6, scene="brick_flip", method=method),
+            *point("heyoka", "engine", error, 1e-6, scene="brick_flip", method=method, series_setting=""),
             row("long_runs", method, "energy drift max", drift, **names),
         )
     ]
