@@ -31,20 +31,20 @@ def test_the_scale_of_an_attraction_is_its_energy_at_right_angles():
 
 
 def scales(w_WB_B0):
-    scene = cv.Scene("body", BODY, np.eye(3), w_WB_B0, 1.0, cv.UniformGravity(2.0, (0, 0.3, 0.4)))
+    scene = cv.Scene("body", BODY, np.eye(3), w_WB_B0, 1.0, cv.UniformGravity(3.0, (0, 0.3, 0.4)))
     return {invariant.name: invariant.scale for invariant in scene.invariants}
 
 
 def test_energy_is_relative_to_motion_and_field_and_momentum_to_that_of_the_start():
     found = scales((0, 2.0, 0))
-    assert found["energy"] == pytest.approx(1.3 * 4 / 2 + 2.0 * 0.5)
+    assert found["energy"] == pytest.approx(1.3 * 4 / 2 + 3.0 * 0.5)
     assert found["vertical momentum"] == pytest.approx(1.3 * 2)
 
 
 def test_at_rest_momentum_is_relative_to_what_the_field_can_make():
     found = scales((0, 0, 0))
-    assert found["energy"] == pytest.approx(2.0 * 0.5)
-    assert found["vertical momentum"] == pytest.approx(np.sqrt(1.3 * 1.0))
+    assert found["energy"] == pytest.approx(3.0 * 0.5)
+    assert found["vertical momentum"] == pytest.approx(np.sqrt(1.3 * 1.5))
 
 
 def test_the_step_that_nobody_names():
