@@ -134,6 +134,7 @@ def test_bounded_error_is_taken_as_linear_and_steady_drift_as_quadratic():
     error = 1e-8 * np.abs(np.sin(T))
     assert fit_law(T, error, 0.0, 1.0).extrapolate(100.0) == pytest.approx(1e-7, rel=1e-2)  # measured 1e-4
     drifting = fit_law(T, error, 2e-6, 1.0)
+    assert drifting.quadratic == pytest.approx(2e-6 / 2)  # the phase of a rate that changes steadily
     assert drifting.extrapolate(100.0) > 1e-2
     assert "extrapolated quadratically to 100 s" in drifting.describe(100.0)
 

@@ -91,6 +91,15 @@ def test_permissions_stay_and_are_ordinary_at_first(tmp_path):
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
 
+def test_a_file_takes_the_place_of_the_one_before_and_is_not_written_over_it(tmp_path):
+    path = tmp_path / "kept.txt"
+    path.write_text("before")
+    with path.open() as reader:  # as somebody who reads it at that moment
+        files.write_text(path, "after", "out")
+        assert reader.read() == "before"
+    assert path.read_text() == "after"
+
+
 def test_a_link_stays_one(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "real")
     for text in ("first", "second"):

@@ -13,6 +13,7 @@ from conservative.benchmarks.gate import results
 from conservative.benchmarks.gate.results import Row
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.reports.cli.main import main
+from conservative.reports.run import single_run
 
 
 def conservative(*arguments):
@@ -48,6 +49,20 @@ def test_run_equals_the_known_rates():
     assert summary["counters"]["steps"] == 600
     assert summary["drift"]["energy"] < 1e-14  # measured 4.5e-16
     assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
+
+
+def test_a_long_run_is_announced_with_the_time_of_all_its_parts(monkeypatch):
+    told = []
+    monkeypatch.setattr(single_run, "wall_time", lambda part: part() and 2.0)  # s
+    single_run.run_once("brick_flip", "reduced", 0.01, 2.0, None, told.append)
+    assert told == [2.0 * single_run.TRIAL]
+
+
+def test_run_tells_its_step_and_duration():
+    arguments = ("run", "brick_flip", "--dt", "0.005", "--t-end", "0.1")
+    assert " 0.1 s with dt = 0.005 s\n" in conservative(*arguments).stdout
+    summary = json.loads(conservative(*arguments, "--json").stdout)
+    assert (summary["dt"], summary["t_end"]) == (0.005, 0.1)
 
 
 def test_the_method_of_a_run_is_by_default_that_of_integrate():
