@@ -66,6 +66,7 @@ def test_units_of_the_closed_system():
     model = gauss.closed_system(principal_axes.principal_start(GRAVITY))
     size = np.linalg.norm(principal_axes.principal_start(GRAVITY).L)
     assert 0.5 < size / model.unit <= 1
+    np.testing.assert_allclose(model.J_inverse, model.unit / GRAVITY.body.moments)
     assert math.log2(model.unit).is_integer()
     rest = gauss.closed_system(principal_axes.principal_start(free((1, 1.4, 2), (0, 0, 0))))
     assert (rest.unit, rest.L) == (1.0, (0.0, 0.0, 0.0))

@@ -183,6 +183,7 @@ def test_substeps_double_until_the_steps_are_solved():
     same = cv.Reduced().prepare(scene, cv.Grid(0.6 / parts, 4 * parts, 2 * parts))()
     np.testing.assert_array_equal(found.R_WB, same.R_WB)
     assert not cv.Reduced().prepare(scene, cv.Grid(1.2 / parts, 2 * parts, parts))().ok
+    assert cv.Substepped(most=parts).prepare(scene, grid)().ok
     few = cv.Substepped(most=parts // 2).prepare(scene, grid)()
     assert few.outcome.kind in (cv.OutcomeKind.NOT_CONVERGED, cv.OutcomeKind.WRONG_BRANCH)
     easy = cv.Substepped().prepare(scene, cv.Grid(0.001, 4, 2))()

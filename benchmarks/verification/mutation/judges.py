@@ -99,7 +99,7 @@ class Judges:
         with ThreadPoolExecutor(self.count) as pool:
             sets = {tuple(tests): mutant.file for mutant, tests in mutants}
             limits = dict(zip(sets, pool.map(lambda one: self.find_limit(root, sets[one], list(one)), sets), strict=True))
-            yield from pool.map(lambda each: self._verdict(*each, limits[tuple(each[1])]), mutants)
+            yield from pool.map(lambda each: self._verdict(each[0], each[1], limits[tuple(each[1])]), mutants)
 
     def _verdict(self, mutant: Mutant, tests: list[str], limit: float) -> Verdict:
         return Verdict(mutant, self.judge(mutant.file, mutant.text, tests, limit)["code"])

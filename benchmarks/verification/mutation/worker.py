@@ -19,7 +19,16 @@ from pathlib import Path
 from time import monotonic, sleep, time
 from typing import IO, Any
 
-HELD = ("pytest", "numpy", "scipy.special", "scipy.spatial.transform", "scipy.integrate", "scipy.stats", "numba", "mpmath")
+HELD: tuple[str, ...] = (
+    "pytest",
+    "numpy",
+    "scipy.special",
+    "scipy.spatial.transform",
+    "scipy.integrate",
+    "scipy.stats",
+    "numba",
+    "mpmath",
+)
 HELD += ("hypothesis", "pandas", "click.testing", "pytest_benchmark.plugin", "xdist.plugin")
 """Imported once, before the fork; what is not installed is passed over."""
 WALL_PER_CPU = 20
