@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,19 +125,8 @@ START_TOLERANCE = 1e-6
 """How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
 
 
-class Steps(Protocol):
-    """What is needed of a `conservative.method.Grid`, which knows this file."""
-
-    @property
-    def dt(self) -> float: ...
-    @property
-    def n_steps(self) -> int: ...
-    @property
-    def every(self) -> int: ...
-    @property
-    def t(self) -> Array: ...
-    @property
-    def n_samples(self) -> int: ...
+Steps = Any
+"""A `conservative.method.Grid`: naming the type would close a circle, as that file imports this one."""
 
 
 @dataclass(frozen=True)

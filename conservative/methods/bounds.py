@@ -3,6 +3,7 @@
 Measured on all registered scenes, and on random bodies with ratios k of the largest moment to the smallest up to 1e6: rounding
 leaves at most 0.2 eps (10 + n) k after n steps, as an energy divides momenta by moments. A tolerance leaves at most half of
 itself in each step. Bounds are twenty times as much, and never above `LOOSEST`.
+Source: our own measurements.
 """
 
 from __future__ import annotations
@@ -32,5 +33,5 @@ def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float 
 
 
 def condition(scene: Scene) -> float:
-    """Return the ratio of the largest moment of the body to its smallest."""
+    """Return the ratio of the largest moment of the body to its smallest, dimensionless."""
     return float(scene.body.moments.max() / scene.body.moments.min())

@@ -64,7 +64,7 @@ SI = Units(1.0, 1.0)
 
 
 def find_units(scene: Scene, dt: float) -> Units:
-    """Return the units in which a scene is of order one and a step of dt s not far below."""
+    """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not far below."""
     if scene.potential is not None and not hasattr(scene.potential, "in_units"):
         return SI
     moment, rate = scene.derive(find_exponents)

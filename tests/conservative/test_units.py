@@ -117,7 +117,7 @@ def test_a_potential_that_cannot_be_rescaled_is_taken_as_it_is() -> None:
 
 
 def failing(time: float) -> NotConverged:
-    found = cv.Reduced().solve(scene("heavy", time * time, time), Grid(60 * time, 4))
+    found = cv.Convected(1e-9).solve(scene("heavy", time * time, time), Grid(20 * time, 4))
     assert isinstance(found.failure, NotConverged)
     return found.failure
 
@@ -137,7 +137,7 @@ def test_limits_of_steps_and_rates_are_in_seconds() -> None:
 
 @pytest.mark.parametrize("integrate", [cv.Reduced(), cv.Lame(), cv.Gauss()])
 def test_what_hardly_moves_in_a_step_has_no_division_by_zero(integrate: Method) -> None:
-    for unit in ((1.0, 1e90, 1.0), (1e-90, 1e90, 1e-90), (1e90, 1e90, 1e90)):
+    for unit in ((1.0, 1e40, 1.0), (1e-60, 1e20, 1e-30), (1e90, 1e60, 1e30)):
         slow = scene("top", *unit)
         found = integrate.solve(slow, Grid(1e-90, 5))
         assert found.ok, found.outcome
