@@ -20,16 +20,9 @@ from time import monotonic, sleep, time
 from typing import IO, Any
 
 HELD: tuple[str, ...] = (
-    "pytest",
-    "numpy",
-    "scipy.special",
-    "scipy.spatial.transform",
-    "scipy.integrate",
-    "scipy.stats",
-    "numba",
-    "mpmath",
+    *("pytest", "numpy", "scipy.special", "scipy.spatial.transform", "scipy.integrate", "scipy.stats", "numba", "mpmath"),
+    *("hypothesis", "pandas", "click.testing", "pytest_benchmark.plugin", "xdist.plugin"),
 )
-HELD += ("hypothesis", "pandas", "click.testing", "pytest_benchmark.plugin", "xdist.plugin")
 """Imported once, before the fork; what is not installed is passed over."""
 WALL_PER_CPU = 20
 """Wall time allowed per second of the processor's: other programs want it too."""
