@@ -90,7 +90,13 @@ class Lame(Method):
         return MOST_RADIANS / bound_rate(scene)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Return the run, as `Method.prepare`; raise `BadInput` for a step longer than `longest_step`, s."""
+        """Return the run of a scene, as `Method.prepare` has it.
+
+        Raises
+        ------
+        BadInput
+            The step is longer than `longest_step`, s.
+        """
         longest = self.longest_step(scene)
         if grid.dt > longest:
             raise BadInput("dt", f"{grid.dt:g}", f"a turn of {MOST_RADIANS:g} rad at most: up to {longest:g} s")
