@@ -29,7 +29,7 @@ ALLOWED = {
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_calls.py": ("reduced", "a setting with a frame"),
     "benchmarks/verification/hostile_scales.py": (
-        "convected exact gauss lame moser_veselov precise projected reduced substepped",
+        "convected exact gauss heyoka lame moser_veselov mujoco pinocchio precise projected reduced scipy substepped",
         "what moves a body of any scale",
     ),
     "benchmarks/verification/interrupts.py": ("scipy", "a run that stays in Python for long"),
