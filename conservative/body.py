@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array
-from .check import finite_array, read_only
+from .check import LARGEST, finite_array, read_only
 from .errors import BadInput
 
+TENSOR_CONDITION = 1e13
+"""Largest ratio of principal moments of a tensor that is not diagonal.
+
+Rounding it moves its smallest moment by up to 4e-16 of the largest (measured on 10,000 random ones): at this ratio by 0.4 %,
+and at 1e15 nobody can say whether that moment is above 0. Moments given as such are taken as they are.
+"""
 _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 
 
@@ -32,8 +38,9 @@ class RigidBody(_Fields):
     Raises
     ------
     BadInput
-        The inertia is not finite, not symmetric, not positive definite, or of another shape. Moments that no mass
-        distribution has (J1 + J2 < J3) are let through: the equations hold for them, though some engines refuse them.
+        The inertia is not finite, not symmetric, not positive definite, or of another shape; or its moments are too far apart,
+        by more than `TENSOR_CONDITION` in a tensor that is not diagonal. Moments that no mass distribution has (J1 + J2 < J3)
+        are let through: the equations hold for them, though some engines refuse them.
     """
 
     def __init__(self, inertia: ArrayLike) -> None:
@@ -91,6 +98,11 @@ def _check_tensor(tensor: Array) -> None:
     scale = np.abs(tensor).max()
     if np.abs(tensor - tensor.T).max() > 1e-12 * scale:
         raise BadInput("inertia", f"a matrix that is not symmetric (off by {np.abs(tensor - tensor.T).max():.3g})", _ALLOWED)
-    moments = np.linalg.eigvalsh(tensor)
+    diagonal = np.diag(tensor)
+    plain = np.count_nonzero(tensor - np.diag(diagonal)) == 0
+    moments = np.sort(diagonal) if plain else np.linalg.eigvalsh(tensor)
     if moments[0] <= 0:
         raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _ALLOWED)
+    condition = LARGEST if plain else TENSOR_CONDITION
+    if moments[-1] > condition * moments[0]:
+        raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")

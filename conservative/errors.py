@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from .outcome import Outcome, OutcomeKind
 
@@ -71,9 +70,13 @@ class MissingExtra(ImportError):
 
 
 class IntegrationFailed(ArithmeticError):
-    """A run did not reach its end. Attribute: `outcome`, which trajectories and tables carry."""
+    """A run did not reach its end, or not as it says. Attribute: `outcome`, which trajectories and tables carry."""
 
     outcome: Outcome
+
+    def at_times(self, unit: float) -> Self:
+        """Return the failure with its time, which is in units of `unit` s, in s; of failures without a time the same."""
+        return self
 
 
 class NotConverged(IntegrationFailed):
@@ -93,6 +96,10 @@ class NotConverged(IntegrationFailed):
             "allowed: a shorter step, or on_failure='return' to keep what was reached"
         )
 
+    def at_times(self, unit: float) -> Self:
+        """Return the failure with its time, which is in units of `unit` s, in s."""
+        return type(self)(self.step, self.time * unit, self.residual, self.reason)
+
 
 class WrongBranch(NotConverged):
     """The equations of a step have solutions, none of which is the one that the state leads to continuously."""
@@ -110,19 +117,45 @@ class Diverged(IntegrationFailed):
             f"dt: got a run that {self.outcome}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
         )
 
+    def at_times(self, unit: float) -> Self:
+        """Return the failure with its time, which is in units of `unit` s, in s."""
+        return type(self)(self.time * unit, self.reason)
 
-class PotentialFailed(RuntimeError):
-    """A function that a potential was made of raised an exception, which is this one's `__cause__`.
 
-    Kernels raise it without arguments; what was raised in the thread is kept in `pending` for it.
+class NotConserved(IntegrationFailed):
+    """A run reached its end without keeping what its method keeps.
+
+    Attributes: `time` (s, of the last good sample), `quantity` (name of the invariant, or orthonormality), its largest `drift`
+    and the `bound` up to which a run is called ok, both relative.
     """
 
-    pending = threading.local()
-
-    def __init__(self) -> None:
-        self.__cause__ = getattr(self.pending, "cause", None)
+    def __init__(self, time: float, quantity: str, drift: float, bound: float) -> None:
+        self.time, self.quantity, self.drift, self.bound = time, quantity, drift, bound
+        reason = f"{quantity} is off by {drift:.3g}, where {bound:.3g} is allowed"
+        self.outcome = Outcome(OutcomeKind.NOT_CONSERVED, reason, time=time)
         super().__init__(
-            f"potential: got {self.__cause__!r} from its energy or gradient; "
+            f"dt: got a run that ended {self.outcome}; allowed: a shorter step, a tighter tolerance, or on_failure='return'"
+        )
+
+
+class InvalidResult(IntegrationFailed):
+    """What a method gave is no trajectory of the scene on the grid. Attribute: `reason`, what is wrong with it."""
+
+    def __init__(self, label: str, reason: str) -> None:
+        self.label, self.reason = label, reason
+        self.outcome = Outcome(OutcomeKind.INVALID, reason)
+        super().__init__(
+            f"method: got {reason} from {label}; "
+            "allowed: a Trajectory of the scene, with arrays of float64 that have a sample for each time of the grid"
+        )
+
+
+class PotentialFailed(RuntimeError):
+    """A function that a potential was made of raised an exception, which is this one's `__cause__`."""
+
+    def __init__(self, cause: BaseException) -> None:
+        super().__init__(
+            f"potential: got {cause!r} from its energy or gradient; "
             "allowed: functions that give finite numbers for every matrix (3, 3) near a rotation"
         )
 
@@ -141,7 +174,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka"),
         "environments": ("uv", "platformdirs"),
-        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert"),
+        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }
 )

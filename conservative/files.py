@@ -28,7 +28,6 @@ except ImportError:  # not POSIX: no locks, and nothing is known to be left over
     fcntl = None
 
 _PLACES: Counter[Path] = Counter()
-"""The places that are being written, and by how many."""
 _LISTENERS: list[Callable[[list[Path]], None]] = []
 
 
@@ -71,15 +70,14 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
 
 def make_folder(folder: Path, argument: str) -> None:
     """Make a folder, and those above it, unless they are there. Raise `NotWritten`, which names `argument`, if that fails."""
-    try:
+    with _errors(folder, argument):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise NotWritten(argument, folder, error, "a folder that exists or can be made") from None
 
 
 def listen(listener: Callable[[list[Path]], None]) -> None:
     """Have a function called with the places that are being written, whenever these change."""
-    _LISTENERS.append(listener)
+    if listener not in _LISTENERS:
+        _LISTENERS.append(listener)
 
 
 @contextmanager
@@ -101,34 +99,35 @@ def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, 
         _list(place, -1)
 
 
-def remove_leftovers(place: Path) -> None:
-    """Remove the temporaries of a place whose makers are gone."""
+def remove_leftovers(place: Path) -> bool:
+    """Remove the temporaries of a place whose makers are gone; return whether there are no others."""
     for path in leftovers(place):
         remove(path)
+    return not _temporaries(place)
 
 
 def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
     """Yield the temporaries of a place whose makers are gone; each is locked until the next is asked for."""
+    for path in _temporaries(place, suffix):
+        if (handle := lock(path)) is not None:
+            yield path
+            release(handle)
+
+
+def _temporaries(place: Path, suffix: str = "") -> list[Path]:
     pattern = re.compile(rf"\.{re.escape(place.name)}-[0-9a-f]{{12}}{suffix}")
-    with suppress(OSError):  # a folder that cannot be read has none that can be removed
-        for path in [path for path in place.parent.iterdir() if pattern.fullmatch(path.name)]:
-            handle = lock(path)
-            if handle is not None:
-                try:
-                    yield path
-                finally:
-                    release(handle)
+    with suppress(OSError):  # in a folder that cannot be read there are none that could be removed
+        return [path for path in place.parent.iterdir() if pattern.fullmatch(path.name)]
+    return []
 
 
 def lock(path: Path) -> int | None:
     """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
-    try:
+    with suppress(OSError):
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
-    except OSError:
-        return None
-    if _try_lock(handle) and _is_at(handle, path):
-        return handle
-    os.close(handle)
+        if _try_lock(handle) and _is_at(handle, path):
+            return handle
+        os.close(handle)
     return None
 
 
@@ -180,19 +179,19 @@ class _RawFile(io.FileIO):
 def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     """Yield a raw file that takes the place of `target` when the block ends well."""
     with ExitStack() as stack:
-        with _as_not_written(target, argument):
+        with _errors(target, argument):
             place = Path(os.path.realpath(target))  # a link stays one
             fresh, handle = stack.enter_context(_opened(place))
         yield _RawFile(handle, target, argument)
         if fresh != place:
-            with _as_not_written(target, argument):
+            with _errors(target, argument):
                 os.fsync(handle)  # before it takes the place: else a crash of the machine could leave an empty file there
                 fresh.replace(place)
             sync(place.parent)
 
 
 @contextmanager
-def _as_not_written(target: Path, argument: str) -> Iterator[None]:
+def _errors(target: Path, argument: str) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:  # a ValueError: a NUL in the name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from .check import choice, positive_integer, positive_number
+from .check import choice, describe, positive_integer, positive_number
 from .errors import BadInput, Unsupported
 from .method import Method, grid_for
 from .methods.automatic import integrate_to_error
@@ -63,9 +63,13 @@ def integrate(
         The equations of a step could not be solved.
     Diverged
         The state stopped being finite, or an engine gave up.
+    NotConserved
+        Orthonormality, or an invariant that the method names, left the method's `bounds`.
+    InvalidResult
+        The method gave no trajectory of the scene, or not all samples, or others than those of the grid.
     """
     if not isinstance(scene, Scene):
-        raise BadInput("scene", repr(scene), "a Scene, such as conservative.scenes.brick_flip()")
+        raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     choice("on_failure", on_failure, ("raise", "return"))
     if error is None:
         trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
@@ -81,10 +85,10 @@ def _integrate_with(
 ) -> Trajectory:
     method = Reduced() if method is None else method
     if not isinstance(method, Method):
-        raise BadInput("method", repr(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
+        raise BadInput("method", describe(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
     grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
     require_support(method, scene)
-    return method.prepare(scene, grid)()
+    return method.solve(scene, grid)
 
 
 def _integrate_to(
@@ -92,7 +96,7 @@ def _integrate_to(
 ) -> Trajectory:
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:
-        raise BadInput("method", repr(method), "None together with error, which chooses the method")
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     spacing = None if dt is None else grid_for(scene, dt, end).dt
     return integrate_to_error(scene, error, end, spacing, positive_integer("sample_every", sample_every))

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .attitude import Array
 from .body import RigidBody
+from .check import describe, geometric_mean, length, printable_text, real_number
+from .errors import BadInput
 from .potentials.potential import Potential
 from .potentials.uniform_gravity import UniformGravity
+
+_NAME = "a text of one character or more"
+MOMENTUM_UNIT = "kg m^2/s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,12 +26,27 @@ class Invariant:
 
     `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
     which has the unit `unit` and is above 0.
+
+    Raises
+    ------
+    BadInput
+        name or unit is no text, scale is not a finite number above 0, or evaluate cannot be called.
     """
 
     name: str
     unit: str
     scale: float
     evaluate: Callable[[Array, Array], Array]
+
+    def __post_init__(self) -> None:
+        if not printable_text("name", self.name, _NAME):
+            raise BadInput("name", "''", _NAME)
+        printable_text("unit", self.unit, "a text")
+        number = real_number(self.scale)
+        if number is None or not 0 < number < math.inf:
+            raise BadInput("scale", describe(self.scale), "a finite number above 0")
+        if not callable(self.evaluate):
+            raise BadInput("evaluate", describe(self.evaluate), "a function of attitudes (n, 3, 3) and rates (n, 3)")
 
 
 def sizes(drift: Array) -> Array:
@@ -63,17 +85,46 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     """
     found = [Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w))]
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
-    size = float(np.linalg.norm(body.momentum(w_WB_B0)))
-    scale = size or float(np.sqrt(body.moments.max() * energy_scale))
+    scale = length(body.momentum(w_WB_B0)) or geometric_mean(float(body.moments.max()), energy_scale)
     if potential is None:
-        found.append(Invariant("momentum", "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w)))
+        found.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
         name = "vertical momentum" if isinstance(potential, UniformGravity) else "momentum along the field's axis"
-        found.append(Invariant(name, "kg m^2/s", scale, lambda R, w: momentum_W(body, R, w) @ line))
+        found.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
     axis = axial_direction(body, potential)
     if axis is not None:
-        found.append(Invariant("axial momentum", "kg m^2/s", scale, lambda R, w: body.momentum(w) @ axis))
+        found.append(Invariant("axial momentum", MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(found)
+
+
+def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
+    """Return those invariants of a `Scene` that follow from body and field, by names, and what rounding errors are relative to.
+
+    Those sizes have the units of the invariants. That of a momentum is all that the energy can make of it, which is more than
+    its scale where a body starts near rest.
+    """
+    most = geometric_mean(2 * scene.energy_scale, float(scene.body.moments.max()))
+    found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
+    return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in found}
+
+
+def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
+    """Return the inertia (3, 3), kg m^2, and constants (5, 4) of a `Scene`, as `conservative.kernels.drifts` takes them.
+
+    Those of invariants whose names are not among `kept` are 0. This file is below that of scenes.
+    """
+    body, potential, rows = scene.body, scene.potential, np.zeros((5, 4))
+    for invariant, size in kept_sizes(scene, kept).items():
+        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])[0]
+        if invariant.name == "energy":
+            rows[0] = 1 / size, 0.0, 0.0, start
+        elif invariant.name == "axial momentum":
+            rows[4, :3], rows[4, 3] = scene.symmetry_axis_B / size, start / size
+        else:
+            directions = np.eye(3) if potential is None else potential.axis_W[None]
+            part = slice(1, 1 + len(directions))
+            rows[part, :3], rows[part, 3] = directions / size, start / size
+    return np.array(body.inertia), rows
 
 
 def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:
@@ -84,10 +135,10 @@ def axial_direction(body: RigidBody, potential: Potential | None, tolerance: flo
     if potential is not None and not isinstance(potential, UniformGravity):
         return None
     moment_P = np.zeros(3) if potential is None else potential.moment_B @ body.R_BP
-    size = float(np.linalg.norm(moment_P))
+    size = length(moment_P)
     if size > 0 and np.ptp(body.moments) <= tolerance * body.moments.max():
         return np.asarray(body.R_BP @ (moment_P / size))
     axis = body.symmetry_axis(tolerance)
-    if axis is None or np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size:
+    if axis is None or length(np.delete(moment_P, axis)) > tolerance * size:
         return None
     return np.asarray(body.R_BP[:, axis] * (-1.0 if moment_P[axis] < 0 else 1.0))

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from .attitude import Array
-from .check import positive_integer, positive_number
-from .declarations import Candidacy, Claims, Cost
+from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
+from .declarations import Candidacy, Claims, Cost, settings_text
 from .errors import BadInput
 from .scene import Scene
-from .trajectory import Trajectory
+from .trajectory import Bounds, Trajectory, accept
 from .version import VERSION
 
 Run = Callable[[], Trajectory]
@@ -39,11 +39,19 @@ class Grid:
     """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
+
+    Raises
+    ------
+    BadInput
+        dt is not a finite number above 0, n_steps or every is not an integer of 1 to 2^53, or samples do not fit in memory.
     """
 
     dt: float
     n_steps: int
     every: int = 1
+
+    def __post_init__(self) -> None:
+        check_grid(self.dt, self.n_steps, self.every)
 
     @property
     def steps(self) -> Array:
@@ -75,14 +83,22 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     Raises
     ------
     BadInput
-        dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
+        dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1 or more, or
+        the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
     if step > end:
         raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
-    return Grid(step, max(1, math.ceil(end / step * (1 - 1e-9))), positive_integer("sample_every", sample_every))
+    n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
+    if n_steps > MOST_STEPS:
+        raise BadInput(
+            "dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps"
+        )
+    every = min(positive_integer("sample_every", sample_every), n_steps)
+    require_memory("sample_every", n_steps, every)
+    return Grid(step, n_steps, every)
 
 
 class Method(ABC):
@@ -143,6 +159,13 @@ class Method(ABC):
         """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
         return frozenset()
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        """Return how far orthonormality, and the invariants in `conserves`, may be off in a run that is called ok.
+
+        By default 0.001 and 0.1, meant for engines at loose tolerances: whoever conserves something should say how well.
+        """
+        return Bounds(drift=1e-3, orthonormality=0.1)
+
     @property
     def cost(self) -> Cost:
         """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
@@ -164,6 +187,18 @@ class Method(ABC):
         of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
         prepared apart may overlap, in threads; nobody calls one run twice at a time.
         """
+
+    def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
+        """Return what a run of this method gave if it may be called ok, else what is good of it, with the failure.
+
+        Every run of every method goes through here. To be ok, a run has to give a `Trajectory` of the scene with all samples of
+        the grid, arrays of float64 of the right shapes, at the right times, finite, and within `bounds`.
+        """
+        return accept(found, scene, grid, self, self.bounds(scene, grid))
+
+    def solve(self, scene: Scene, grid: Grid) -> Trajectory:
+        """Return the trajectory on a grid, checked, whatever its outcome."""
+        return self.check(scene, grid, self.prepare(scene, grid)())
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
@@ -198,7 +233,7 @@ class Method(ABC):
         BadInput
             dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
         """
-        return self.prepare(scene, grid_for(scene, dt, t_end, sample_every))()
+        return self.solve(scene, grid_for(scene, dt, t_end, sample_every))
 
 
 @lru_cache(maxsize=256)
@@ -213,10 +248,3 @@ def _maker(kind: type) -> str:
         return f"{package}=={metadata.version(package)}"
     except metadata.PackageNotFoundError:
         return package
-
-
-@lru_cache(maxsize=1024)
-def settings_text(value: Any) -> str:
-    """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
-    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
-    return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)

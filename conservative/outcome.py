@@ -1,9 +1,13 @@
-"""How a run ended: a kind out of a fixed list, and the fields that belong to it. Text is made of it only where it is shown."""
+"""How a run ended, what it cost in work, and what was chosen for it.
+
+An end is a kind out of a fixed list, and the fields that belong to it. Text is made of it only where it is shown.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 
 class OutcomeKind(StrEnum):
@@ -13,6 +17,10 @@ class OutcomeKind(StrEnum):
     NOT_CONVERGED = "not converged"
     WRONG_BRANCH = "wrong branch"
     DIVERGED = "diverged"
+    NOT_CONSERVED = "not conserved"
+    """Orthonormality, or an invariant that the method names, left the bound that the method states."""
+    INVALID = "invalid result"
+    """What a method gave has the wrong shape, type, times or number of samples."""
     TIMEOUT = "timeout"
     CRASHED = "crashed"
     UNSUPPORTED = "unsupported"
@@ -63,3 +71,44 @@ class Outcome:
 
 OK = Outcome(OutcomeKind.OK)
 """The outcome of every run that reaches its end."""
+
+
+@dataclass(frozen=True)
+class Counters:
+    """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
+
+    None means that the method does not have the thing or its engine does not tell.
+    """
+
+    steps: int
+    stages: int | None = None
+    iterations: int | None = None
+    evaluations: int | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `integrate(scene, error=...)` chose.
+
+    Attributes
+    ----------
+    method, dt
+        The `Method` that made the trajectory, and its step, s.
+    error
+        Attitude error asked for over the run, rad.
+    estimate
+        Estimated attitude error over the run, rad, from the same run at twice the step.
+    attempts
+        Steps tried on the whole run, s, with the estimate of each, rad.
+    """
+
+    method: Any  # a `Method`: naming the type would close a circle, as that file imports this one
+    dt: float
+    error: float
+    estimate: float
+    attempts: tuple[tuple[float, float], ...]
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimate is within what was asked for."""
+        return self.estimate <= self.error

@@ -20,12 +20,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
+from .check import describe, printable_text, real_number
 from .deferred_imports import ENGINES, METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
+
+T = TypeVar("T")
+_NAME = "a name with its settings, a text"
 
 
 def list_scenes() -> tuple[str, ...]:
@@ -67,13 +71,13 @@ def scene(text: str) -> Scene:
     NotLoadable
         It is registered, but importing what is registered fails.
     """
-    if text.endswith(".toml"):
+    if printable_text("scene", text, _NAME).endswith(".toml"):
         from .scene_files.scene_file import load
 
         return load(text)
     name, settings = _split(text)
     builder: Callable[..., Scene] = load_entry(SCENES, "scene", name)
-    return builder(**_arguments(f"scene {name}", builder, settings))
+    return _call(builder, f"scene {name}", settings)
 
 
 def method(text: str) -> Method:
@@ -88,12 +92,12 @@ def method(text: str) -> Method:
     MissingEngine
         The engine is not installed.
     """
-    name, settings = _split(text)
+    name, settings = _split(printable_text("method", text, _NAME))
     family = _load_method(name)
     if getattr(family, "family", None) != name:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
-    return family(**_arguments(f"method {name}", family, settings))
+    return _call(family, f"method {name}", settings)
 
 
 def _load_method(name: str) -> type[Method]:
@@ -131,6 +135,17 @@ def _split(text: str) -> tuple[str, list[str]]:
     return name, [item.strip() for item in rest.split(",") if item.strip()]
 
 
+def _call(target: Callable[..., T], argument: str, settings: list[str]) -> T:
+    """Return what a registered function or class makes of the settings; what it does not take is bad input."""
+    arguments = _arguments(argument, target, settings)
+    try:
+        return target(**arguments)
+    except BadInput:
+        raise
+    except (ArithmeticError, TypeError, ValueError) as error:
+        raise BadInput(argument, describe(",".join(settings)), f"settings that it takes ({error})") from error
+
+
 def _arguments(argument: str, target: Callable[..., object], settings: list[str]) -> dict[str, Any]:
     """Return keyword arguments from `key=value` items; items without a key go to the parameters in their order."""
     parameters = list(inspect.signature(target).parameters)
@@ -140,11 +155,11 @@ def _arguments(argument: str, target: Callable[..., object], settings: list[str]
         if not equals:
             key, value = parameters[position] if position < len(parameters) else item, item
         if key not in parameters:
-            raise BadInput(argument, repr(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
+            raise BadInput(argument, describe(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
         found[key] = _value(value)
         default = inspect.signature(target).parameters[key].default
-        if isinstance(default, int | float) and isinstance(found[key], str):
-            raise BadInput(argument, repr(item), f"{key}=a number, such as {default!r}, its default")
+        if isinstance(default, int | float) and real_number(found[key]) is None:
+            raise BadInput(argument, describe(item), f"{key}=a number, such as {default!r}, its default")
     return found
 
 

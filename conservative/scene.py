@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import finite_array, positive_number, rotation
+from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation
 from .errors import BadInput
 from .invariants import Invariant, axial_direction, invariants_of
 from .potentials.potential import Potential
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Settings = TypeVarTuple("Settings")
+_NAME = "a text of one character or more"
 MOST_DERIVATIONS = 64
 """Results that `Scene.derive` keeps at most."""
 
@@ -95,7 +96,9 @@ class Scene(_Fields):
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
         others: dict[str, Any] = {**details}
-        dt, more = others.pop("dt", None), tuple(others.pop("extra_invariants", ()))
+        dt, more = others.pop("dt", None), _invariants(others.pop("extra_invariants", ()))
+        for key in ("group", "source"):
+            printable_text(key, others.get(key, ""), "a text")
         step = _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s")
         R = rotation("R_WB0", R_WB0)
         super().__init__(name, body, R, rates, end, potential, step, more, **others)
@@ -158,15 +161,26 @@ class Scene(_Fields):
 
 
 def _check_parts(name: object, body: object, potential: object) -> None:
-    if not isinstance(name, str) or not name:
-        raise BadInput("name", repr(name), "a text of one character or more")
+    if not printable_text("name", name, _NAME):
+        raise BadInput("name", "''", _NAME)
     if not isinstance(body, RigidBody):
-        raise BadInput("body", repr(body), "a RigidBody")
-    if potential is not None and not isinstance(potential, Potential):
-        raise BadInput("potential", repr(potential), "None or a Potential such as UniformGravity")
+        raise BadInput("body", describe(body), "a RigidBody")
+    if isinstance(potential, type) or not isinstance(potential, Potential | None):
+        raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
+
+
+def _invariants(value: object) -> tuple[Invariant, ...]:
+    """Return invariants as a tuple; raise `BadInput` for what is none of them."""
+    try:
+        found: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
+    except Exception:  # no iterable, or one that fails
+        found = (value,)
+    if not all(isinstance(each, Invariant) for each in found):
+        raise BadInput("extra_invariants", describe(value), "Invariants, in a tuple or a list")
+    return found
 
 
 def _usual_step(w_WB_B0: Array, t_end: float) -> float:
     """Return the time, s, in which the body turns by a 20th of a radian, or a hundredth of the duration if that is shorter."""
     speed = float(np.linalg.norm(w_WB_B0))
-    return min(t_end / 100, 0.05 / speed) if speed > 0 else t_end / 100
+    return max(SMALLEST, min(t_end / 100, 0.05 / speed) if speed > 0 else t_end / 100)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import finite_array, finite_number, positive_number, rotation
+from .check import describe, finite_array, finite_number, positive_number, rotation
 from .errors import BadInput
 from .potentials.uniform_gravity import UniformGravity
 
@@ -205,13 +205,13 @@ def _solid(mass: float, second: tuple[float, float, float]) -> MassDistribution:
 def _lengths(argument: str, value: ArrayLike) -> list[float]:
     lengths = finite_array(argument, value, ((3,),), _SIZES)
     if lengths.min() <= 0:
-        raise BadInput(argument, repr(lengths.tolist()), _SIZES)
+        raise BadInput(argument, describe(lengths.tolist()), _SIZES)
     return lengths.tolist()
 
 
 def _mass(volume: float, mass: float | None, density: float | None) -> float:
     if mass is not None and density is not None:
-        raise BadInput("density", f"{density!r} beside mass = {mass!r}", "mass or density, not both")
+        raise BadInput("density", f"{describe(density)} beside mass = {describe(mass)}", "mass or density, not both")
     if mass is not None:
         return positive_number("mass", mass, "a finite mass above 0, kg")
     if density is None:

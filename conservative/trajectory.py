@@ -1,64 +1,26 @@
-"""What a method hands back: sampled attitudes and rates, what it cost in work, and how it ended."""
+"""What a method hands back: samples of a motion, what they cost in work, how it ended, and whether that may be called ok."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import invariants, presentation
-from .attitude import Array
-from .errors import IntegrationFailed
-from .invariants import Invariant
+from .attitude import Array, orthonormality
+from .deferred_imports import kernels
+from .errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
+from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
+from .outcome import Choice as Choice
+from .outcome import Counters as Counters
 from .scene import Scene
 
 if TYPE_CHECKING:
     import altair
     import pandas
-
-
-@dataclass(frozen=True)
-class Counters:
-    """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
-
-    None means that the method does not have the thing or its engine does not tell.
-    """
-
-    steps: int
-    stages: int | None = None
-    iterations: int | None = None
-    evaluations: int | None = None
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What `integrate(scene, error=...)` chose.
-
-    Attributes
-    ----------
-    method, dt
-        The `Method` that made the trajectory, and its step, s.
-    error
-        Attitude error asked for over the run, rad.
-    estimate
-        Estimated attitude error over the run, rad, from the same run at twice the step.
-    attempts
-        Steps tried on the whole run, s, with the estimate of each, rad.
-    """
-
-    method: Any  # a `Method`: naming the type would close a circle, as that file imports this one
-    dt: float
-    error: float
-    estimate: float
-    attempts: tuple[tuple[float, float], ...]
-
-    @property
-    def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
-        return self.estimate <= self.error
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +120,122 @@ class Trajectory:
     def __repr__(self) -> str:
         end = f"{self.t[-1]:g} s" if len(self.t) else "nothing"
         return f"Trajectory({self.scene.name!r}, {self.label!r}, {len(self)} samples to {end}, outcome={str(self.outcome)!r})"
+
+
+START_TOLERANCE = 1e-6
+"""How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
+
+
+Steps = Any
+"""A `conservative.method.Grid`: naming the type would close a circle, as that file imports this one."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Up to where a run is called ok, sample by sample: no unit.
+
+    `drift` is that of the invariants that a method names, relative to their scales; of momenta, relative to all that the energy
+    can make of them. `orthonormality` is the largest component of |R'R - 1|.
+    """
+
+    drift: float
+    orthonormality: float
+
+
+def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) -> Trajectory:
+    """Return what a run gave if it may be called ok, else what is good of it, with the failure.
+
+    Parameters
+    ----------
+    found
+        What it gave, which should be a `Trajectory`.
+    scene, steps
+        What it was asked for.
+    method, bounds
+        The `Method`, and how well it is to keep the invariants that it names. Where it has a kernel, compiled code looks first,
+        and if that finds nothing, that is that.
+    """
+    mistake = _find_mistake(found, scene, steps)
+    kept = method.conserves
+    if mistake is None and method.kernel and found.failure is None and _is_kept(found, steps, kept, bounds):
+        return found
+    with np.errstate(all="ignore"):
+        mistake = mistake or _find_misplaced(found, steps)
+        if mistake is not None:
+            nothing = np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3))
+            return Trajectory(scene, *nothing, method.label, failure=InvalidResult(method.label, mistake))
+        return _cut_at_drift(_cut_to_finite(found), kept, bounds)
+
+
+def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
+    """Return what is wrong with the form of a result, None if nothing is."""
+    if not isinstance(found, Trajectory):
+        return f"a {type(found).__name__}, no Trajectory"
+    if found.scene is not scene:
+        return "the trajectory of another scene"
+    return _find_mistyped(found, steps)
+
+
+def _find_mistyped(found: Any, steps: Steps) -> str | None:
+    """Return which field of a `Trajectory` has another type or shape than it should, None if none has."""
+    if not isinstance(found.counters, Counters) or not isinstance(found.failure, IntegrationFailed | None):
+        return "counters or a failure of another type"
+    n = len(found.t) if found.failure is not None and isinstance(found.t, np.ndarray) else steps.n_samples
+    for name, values, shape in (("t", found.t, (n,)), ("R_WB", found.R_WB, (n, 3, 3)), ("w_WB_B", found.w_WB_B, (n, 3))):
+        if not isinstance(values, np.ndarray):
+            return f"{name} as a {type(values).__name__}"
+        if values.dtype != np.float64 or values.shape != shape:
+            return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
+    return None
+
+
+def _find_misplaced(found: Trajectory, steps: Steps) -> str | None:
+    """Return which samples are not those asked for, None if all are."""
+    t = steps.t
+    if len(found) > len(t) or not np.allclose(found.t, t[: len(found)], rtol=1e-12, atol=0):
+        return "samples at other times than those of the grid"
+    R_off = np.abs(found.R_WB[:1] - found.scene.R_WB0) > START_TOLERANCE
+    w_off = np.abs(found.w_WB_B[:1] - found.scene.w_WB_B0) > START_TOLERANCE * np.abs(found.scene.w_WB_B0).max()
+    return "a first sample that is not the start" if R_off.any() or w_off.any() else None
+
+
+def _is_kept(found: Trajectory, steps: Steps, kept: frozenset[str], bounds: Bounds) -> bool:
+    """Return whether compiled code finds all samples within the bounds and all times right."""
+    scene = found.scene
+    V = np.zeros(len(found)) if scene.potential is None else scene.potential.energy(found.R_WB)
+    J, constants = scene.derive(invariants.kernel_constants, kept)
+    times, allowed = (steps.dt, steps.every, steps.n_steps, found.t), (bounds.drift, bounds.orthonormality)
+    return bool(kernels("drifts").are_kept(*times, found.R_WB, found.w_WB_B, V, J, constants, *allowed))
+
+
+def _cut_to_finite(found: Trajectory) -> Trajectory:
+    """Return the samples before the first that is not finite, with the failure."""
+    good = finite_prefix(found.R_WB, found.w_WB_B)
+    failure = found.failure or Diverged(float(found.t[max(good - 1, 0)]))
+    return found if good == len(found) else _cut(found, good, failure)
+
+
+def _cut_at_drift(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
+    """Return the samples before the first that is beyond a bound, with the failure; those of a failed run as they are."""
+    if found.failure is not None:
+        return found
+    quantities = [("orthonormality", orthonormality(found.R_WB), bounds.orthonormality)]
+    for invariant, size in invariants.kept_sizes(found.scene, kept).items():
+        quantities.append((invariant.name, sizes(found.drift(invariant)) * (invariant.scale / size), bounds.drift))
+    good, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
+    if good == len(found):
+        return found
+    return _cut(found, good, NotConserved(float(found.t[max(good - 1, 0)]), name, float(values.max()), bound))
+
+
+def _count_within(values: Array, bound: float) -> int:
+    """Return how many leading values (n,) are within a bound."""
+    within = values <= bound
+    return len(values) if within.all() else int(np.argmin(within))
+
+
+def _cut(found: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
+    return replace(found, t=found.t[:n], R_WB=found.R_WB[:n], w_WB_B=found.w_WB_B[:n], failure=failure)
 
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:

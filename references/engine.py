@@ -10,6 +10,7 @@ Source of the mass model: our own, see `mass_model`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module, metadata
@@ -25,6 +26,33 @@ from conservative.method import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix
+
+STEP_LIMIT = 10_000_000
+"""Steps that an adaptive engine takes in a run at most: minutes of heyoka, an hour of SciPy."""
+PACE_STEPS = 1000
+"""After as many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` at that pace ends there."""
+LONG = 1e5
+"""Turns of a run, rad, from which on heyoka's pace is tried first: shorter ones stay far below the limit."""
+
+
+def limit_reason(steps: int, share: float) -> str:
+    """Return why a run that has done a share of its time, 0 to 1 and dimensionless, has to end; "" if it may go on."""
+    if steps >= STEP_LIMIT:
+        return f"step limit of {STEP_LIMIT} reached"
+    if steps % PACE_STEPS == 0 and steps > 10 * STEP_LIMIT * share:
+        return f"step limit of {STEP_LIMIT} out of reach: the first {steps} steps did {share:.1g} of the time"
+    return ""
+
+
+def pace_reason(scene: Scene, integrator: Any, t_end: float) -> str:
+    """Return why heyoka's integrator, at a scene's start, cannot get to t_end, s; "" if it may try. It moves the integrator."""
+    turns = t_end * math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
+    if turns < LONG:
+        return ""
+    for _ in range(PACE_STEPS):
+        integrator.step()
+    share = float(integrator.time) / t_end
+    return limit_reason(PACE_STEPS, share) if math.isfinite(share) else ""
 
 
 @lru_cache(maxsize=32)

@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import from_quaternion, to_quaternion
-from conservative.check import positive_integer
+from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from .engine import Axes, version
+from .engine import STEP_LIMIT, Axes, limit_reason, pace_reason, version
 from .heyoka_equations import forms
 from .heyoka_equations.torques import FIELDS, Field, Number
 
@@ -86,10 +86,10 @@ class Precise(Method):
         t = _reals(grid.steps.tolist(), self.bits) * _real(grid.dt, self.bits)
 
         def run() -> Trajectory:
-            outcome, steps, found = solve(t)
+            reason, steps, found = solve(t, scene)
             doubles = np.array([[float(x) for x in row] for row in found]).reshape(-1, 7)
             R_WB, work = from_quaternion(doubles[:, :4]), Counters(steps)
-            return axes.trajectory(grid, self.label, R_WB, doubles[:, 4:], work, f"heyoka: {outcome.name}")
+            return axes.trajectory(grid, self.label, R_WB, doubles[:, 4:], work, reason)
 
         return run
 
@@ -135,7 +135,7 @@ def states(
     _check_bits(bits)
     field = None if moment_B is None else FIELDS[UniformGravity]
     solve = _solver(inertia, q0, w0, field, () if moment_B is None else moment_B, bits)
-    _, _, found = solve(_reals([0, *t], bits))
+    _, _, found = solve(_reals([0, *t], bits), None)
     with _digits(bits) as mp:
         rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in found[1:]]
     return [row[:4] for row in rows], [row[4:] for row in rows]
@@ -144,7 +144,7 @@ def states(
 def _check_bits(bits: object) -> None:
     allowed = "an integer from 53 (double precision) to 4096"
     if not 53 <= positive_integer("bits", bits, allowed) <= 4096:
-        raise BadInput("bits", repr(bits), allowed)
+        raise BadInput("bits", describe(bits), allowed)
 
 
 @dataclass(frozen=True)
@@ -178,8 +178,11 @@ def _compile(form: forms.Form, bits: int) -> forms.Integrators:
 
 def _solver(
     inertia: Sequence[Any], q0: Any, w0: Any, field: Field | None, values: Sequence[Number], bits: int
-) -> Callable[[Reals], tuple[Any, int, Reals]]:
-    """Return the function that takes times, the first 0, to outcome, number of steps and states (n, 7)."""
+) -> Callable[[Reals, Scene | None], tuple[str, int, Reals]]:
+    """Return the function of times, the first 0, that gives how it ended, the number of steps and states (n, 7).
+
+    With a scene, what would not get to the end within the limit of steps is not begun.
+    """
     with _digits(bits + 32) as mp:
         J = _tensor(mp, inertia)
         quaternion = [_mpf(mp, x) for x in q0]
@@ -189,12 +192,16 @@ def _solver(
         parameters = _reals(used, bits)
     integrators = _compile(form, bits)
 
-    def solve(t: Reals) -> tuple[Any, int, Reals]:
+    def solve(t: Reals, scene: Scene | None) -> tuple[str, int, Reals]:
         with integrators.borrow() as integrator:
-            integrator.time = _real(0, bits)
-            integrator.state[:], integrator.pars[:] = start, parameters
-            outcome, _, _, steps, _, found = integrator.propagate_grid(t)
-        return outcome, int(steps), found
+            integrator.pars[:] = parameters
+            integrator.time, integrator.state[:] = _real(0, bits), start
+            reason = pace_reason(scene, integrator, float(t[-1])) if scene else ""
+            integrator.time, integrator.state[:] = _real(0, bits), start
+            if reason:
+                return reason, 0, start[None]
+            outcome, _, _, steps, _, found = integrator.propagate_grid(t, max_steps=STEP_LIMIT)
+        return limit_reason(int(steps), 1.0) or f"heyoka: {outcome.name}", int(steps), found
 
     return solve
 

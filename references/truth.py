@@ -79,7 +79,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
         A package that a truth needs is not installed.
     """
     first, second, allowed = _pair(scene)
-    trajectory = first.prepare(scene, grid)()
+    trajectory = first.solve(scene, grid)
     if trajectory.failure is not None:
         raise trajectory.failure
     end, fastest = float(grid.t[-1]), float(np.linalg.norm(trajectory.w_WB_B, axis=-1).max())
@@ -87,7 +87,7 @@ def reference(scene: Scene, grid: Grid) -> Truth:
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end
         agreement = scene.derive(_agreement, first, second, until)  # grids change more often than scenes
     else:
-        until, agreement = end, difference(trajectory, second.prepare(scene, grid)())
+        until, agreement = end, difference(trajectory, second.solve(scene, grid))
     # Times are products rounded to double in one truth and not in the other.
     allowed += np.finfo(float).eps * fastest * until
     names = (first.label, second.label)
@@ -117,4 +117,4 @@ def _pair(scene: Scene) -> tuple[Method, Method, float]:
 def _agreement(scene: Scene, first: Method, second: Method, until: float) -> float:
     """Return the difference over the first `until` s."""
     grid = Grid(until / CHECKED_SAMPLES, CHECKED_SAMPLES)
-    return difference(first.prepare(scene, grid)(), second.prepare(scene, grid)())
+    return difference(first.solve(scene, grid), second.solve(scene, grid))

@@ -5,6 +5,7 @@ A row is a call, the argument that the message must name, a piece of what was go
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative import registry
+from conservative.attitude import rotation_about
 from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.model_files import body_from_mjcf
 from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
@@ -20,17 +23,28 @@ from conservative.references.exact import method
 from conservative.references.precise import Precise
 from conservative.reports.cli.main import main
 
-NAN, INF = math.nan, math.inf
+NAN, INF, HUGE = math.nan, math.inf, 10**400
 ONE = np.eye(3)
 BODY = cv.RigidBody((1.0, 2.0, 2.5))
 BRICK = cv.scenes.brick_flip()
 TOP = cv.scenes.lagrange_top()
+TURN = rotation_about((1, 2, 3), 0.7)
+FLAT = TURN @ np.diag((1e-14, 1, 1)) @ TURN.T
+HOOK = np.array([0.0, 0.1, 0.4])
 SHEAR = ONE + 1e-3 * np.outer((1, 0, 0), (0, 1, 0))
 
 
 def scene(**changed):
     arguments = {"name": "s", "body": BODY, "R_WB0": ONE, "w_WB_B0": (0, 0, 1), "t_end": 1.0} | changed
     return cv.Scene(**arguments)
+
+
+def field(**changed):
+    arguments = {
+        "energy": lambda R: (R[2] @ HOOK) ** 4,
+        "gradient": lambda R: np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK),
+    }
+    return cv.FunctionPotential(**arguments | changed)
 
 
 API = [
@@ -104,7 +118,61 @@ API = [
     (lambda: Precise(bits=10), "bits", "10", "53"),
     (lambda: method.free_body(BODY, SHEAR, (0, 0, 1), [0.0]), "R_WB0", "0.001", "rotation"),
     (lambda: method.free_body(BODY, ONE, (0, 0, 1), [0.0, NAN]), "t", "nan", "finite"),
+    # numbers that no float can follow, and those out of range
+    (lambda: cv.RigidBody((HUGE, 1, 1)), "inertia", "1000", "three positive moments"),
+    (lambda: cv.RigidBody((1e101, 1, 1)), "inertia", "1e+101", "the largest 0 or of magnitude 1e-100 to 1e+100"),
+    (lambda: cv.RigidBody((1e-101, 0, 0)), "inertia", "1e-101", "1e-100"),
+    (lambda: cv.RigidBody(("1", "2", "3")), "inertia", "'1'", "three positive moments"),
+    (lambda: cv.RigidBody(FLAT), "inertia", "e-15", "ratio up to 1e+13"),
+    (lambda: scene(t_end=HUGE), "t_end", "1000", "above 0"),
+    (lambda: scene(t_end=10**5000), "t_end", "a value of type int", "above 0"),
+    (lambda: scene(w_WB_B0=(Fraction(HUGE), 0, 0)), "w_WB_B0", "Fraction", "three finite rates"),
+    (lambda: cv.UniformGravity(-1e-200, (0, 0, 1)), "weight", "-1e-200", "0 or of magnitude"),
+    (lambda: cv.shapes.box((1, 2, 3), mass=HUGE), "mass", "1000", "above 0"),
+    (lambda: cv.integrate(BRICK, HUGE), "dt", "1000", "above 0"),
+    (lambda: cv.integrate(BRICK, 0.01, t_end=Fraction(1, HUGE)), "t_end", "Fraction", "above 0"),
+    (lambda: cv.Gauss(stages=10**5000), "stages", "a value of type int", "1 to 10"),
+    (lambda: cv.scenes.lagrange_top(height=1e-100), "inertia", "0.0", "positive"),
+    (lambda: Heyoka(tol=1e-99), "tol", "1e-99", "from 1e-20"),
+    # resources
+    (lambda: cv.integrate(BRICK, 1e-15), "sample_every", "5999999994000000 steps", "samples fit in memory"),
+    (lambda: cv.integrate(BRICK, 1e-18), "dt", "6e+18 steps", "6.66e-16 s or more"),
+    (lambda: cv.Grid(0.01, 10**12), "every", "1000000000001 samples", "samples fit in memory"),
+    (lambda: cv.Grid(0.01, 2**60, 2**60), "n_steps", "1152921504606846976", "2^53"),
+    (lambda: cv.Grid(NAN, 10), "dt", "nan", "above 0"),
+    (lambda: cv.Grid(0.01, 0), "n_steps", "0", "1 to 2^53"),
+    (lambda: cv.Grid(0.01, 10, "2"), "every", "'2'", "1 to 2^53"),
+    # settings and parts that are of no use at all
+    (lambda: cv.Reduced([]), "order", "[]", "2, 4, 6, 8, 10"),
+    (lambda: cv.Reduced(composition=[]), "composition", "[]", "None or"),
+    (lambda: cv.Gauss(frame=np.zeros(2)), "frame", "array", "'auto'"),
+    (lambda: cv.MoserVeselov(order={}), "order", "{}", "'exact'"),
+    (lambda: scene(extra_invariants=1.0), "extra_invariants", "1.0", "Invariants"),
+    (lambda: scene(extra_invariants=[1.0]), "extra_invariants", "[1.0]", "Invariants"),
+    (lambda: scene(potential=cv.UniformGravity), "potential", "UniformGravity", "a Potential"),
+    (lambda: scene(group=3), "group", "3", "a text"),
+    (lambda: scene(name="a\0b"), "name", "x00", "a text"),
+    (lambda: cv.Invariant("i", "J", 0.0, len), "scale", "0.0", "above 0"),
+    (lambda: cv.Invariant("i", "J", 1.0, None), "evaluate", "None", "a function"),
+    (lambda: body_from_mjcf("a\0b", "arm"), "path", "x00", "without NUL"),
+    # functions of potentials
+    (lambda: field(energy=lambda R: "one"), "energy", "'one'", "a real number"),
+    (lambda: field(energy=lambda R: [1.0]), "energy", "[1.0]", "a real number"),
+    (lambda: field(energy=lambda R: 1 / 0), "energy", "ZeroDivisionError", "a real number"),
+    (lambda: field(energy=lambda R: NAN), "energy", "nan", "a real number"),
+    (lambda: field(energy=lambda R: HUGE), "energy", "OverflowError", "a real number"),
+    (lambda: field(gradient=lambda R: None), "gradient", "None", "a matrix (3, 3)"),
+    (lambda: field(gradient=lambda R: 1j * ONE), "gradient", "1.j", "a matrix (3, 3)"),
+    (lambda: field(gradient=lambda R: [1, 2, 3]), "gradient", "shape (3,)", "a matrix (3, 3)"),
+    (lambda: field(axis_W=(0, 0, 2)), "axis_W", "2.0", "a unit vector"),
+    (lambda: field(axis_W=(0, NAN, 1)), "axis_W", "nan", "a unit vector"),
+    (lambda: field(axis_W=(1, 0, 0)), "axis_W", "a torque of", "symmetric"),
+    (lambda: field(scale=INF), "scale", "inf", "above 0"),
     # names
+    (lambda: registry.scene("a\0.toml"), "scene", "x00", "a text"),
+    (lambda: registry.method(3), "method", "3", "a text"),
+    (lambda: registry.scene("brick_flip:none"), "scene brick_flip", "'none'", "a number"),
+    (lambda: registry.scene(f"brick_flip:{HUGE}"), "scene brick_flip", "1000", "a number"),
     (lambda: registry.scene("brick_flipp"), "scene", "'brick_flipp'", "'brick_flip' (nearest)"),
     (lambda: registry.scene("brick_flip:wobble=1"), "scene brick_flip", "wobble", "disturbance"),
     (lambda: registry.method("mujocco"), "method", "'mujocco'", "'mujoco' (nearest)"),
@@ -152,6 +220,10 @@ COMMANDS = [
     Line("report --scenes nope", "scene", "'nope'", "one of"),
     Line("report --methods reduced,nope", "method", "'nope'", "one of"),
     Line("report --out kept.txt", "out", "kept.txt", "folder"),
+    Line("run brick_flip --csv a\0.csv", "--csv", "x00", "without NUL"),
+    Line("report --out a\0", "--out", "x00", "without NUL"),
+    Line("run a\0.toml", "scene", "x00", "a text"),
+    Line("run brick_flip --dt 1e-15", "sample_every", "5999999994000000 steps", "fit in memory"),
     Line("reprot", "reprot", "reprot", "report"),
 ]
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from conservative.errors import NotWritten
 from conservative.files import write_text
 
 from ..measures.origin import commit, machine
@@ -104,8 +105,7 @@ class Gate:
         text = dashboards.markdown(self.verdict)
         write_text(self.folder / dashboards.SUMMARY, text, "results")
         if summary := os.environ.get("GITHUB_STEP_SUMMARY"):
-            with Path(summary).open("a", encoding="utf-8") as file:
-                file.write(text)
+            _append(Path(summary), text)
         return self.verdict
 
     def _confirm(self, before: baseline.Baseline, found: Results) -> Results:
@@ -131,6 +131,15 @@ class Gate:
         """Exit with 2 where there is no baseline, and never with 0 without a verdict."""
         if self.without_baseline or (self.verdict is None and session.exitstatus == 0):
             session.exitstatus = 2
+
+
+def _append(path: Path, text: str) -> None:
+    """Add to a file that others add to as well. Raise `NotWritten` where that cannot be."""
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise NotWritten("GITHUB_STEP_SUMMARY", path, error) from None
 
 
 def row_id(item: pytest.Item) -> str:

@@ -14,7 +14,7 @@ from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
 from conservative.integration import integrate
 from conservative.method import Grid, Method
-from conservative.methods.automatic import bound_rate
+from conservative.methods.units import bound_rate
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
@@ -79,7 +79,7 @@ def sample_closed_form(scene: Scene) -> Callable[[Grid], Array]:
 
     @lru_cache(maxsize=MOST_GRIDS)
     def attitudes(grid: Grid) -> Array:
-        return Exact().prepare(scene, grid)().R_WB
+        return Exact().solve(scene, grid).R_WB
 
     return attitudes
 
@@ -101,7 +101,7 @@ def measure_amplification(conditions: Conditions) -> Amplification:
     for end in sorted({min(until, conditions.short), until}):
         n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
         grid = Grid(end / n, n, max(1, n // DENSE))
-        pair = [method.prepare(each, grid)() for each in (scene, off)]
+        pair = [method.solve(each, grid) for each in (scene, off)]
         shared = min(map(len, pair))
         times.append(pair[0].t[:shared])
         factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)

@@ -19,8 +19,10 @@ from conservative.methods.automatic import ASYMPTOTIC, SAFETY
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
-from ..studies.case import Case, Success, attempt
+from ..studies.case import Case, Success
 from ..studies.selection import tolerance_setting
+from ..studies.study import HANG_LIMIT
+from ..studies.time_limit import attempt_within
 from .extrapolation import Amplification, Drift, ErrorLaw, Scaling, extrapolate_drifts, fit_law
 
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
@@ -98,6 +100,8 @@ class Conditions:
         Largest angular speed, rad/s.
     amplification
         What becomes of a disturbance.
+    time_limit
+        Time, s, after which a probe is ended.
     """
 
     scene: Scene
@@ -110,6 +114,7 @@ class Conditions:
     truth_until: float
     rate: float
     amplification: Amplification
+    time_limit: float = HANG_LIMIT
 
     @property
     def short(self) -> float:
@@ -163,7 +168,7 @@ class Conditions:
         samples = self.window(self.spacing if adaptive else dt, cost, long)
         each = 1 if adaptive else round(samples.dt / dt)
         grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
-        outcome = attempt(Case("recommendation", self.scene, method, grid))
+        outcome = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
         length = samples.dt * samples.n_steps
         if not isinstance(outcome, Success):
             why = outcome.outcome

@@ -11,6 +11,7 @@ from conservative.method import Method, Role
 from conservative.scene import Scene
 
 from ..studies import selection
+from ..studies.study import HANG_LIMIT
 
 COST_LIMIT = 1.0
 """Wall time per simulated second, s/s, that a setting may cost: as fast as the body itself."""
@@ -51,6 +52,7 @@ class Question:
     methods: tuple[Method, ...]
     missing: tuple[str, ...]
     cost_limit: float
+    time_limit: float = HANG_LIMIT
 
 
 def ask(
@@ -59,6 +61,7 @@ def ask(
     duration: float | None = None,
     engine_names: Iterable[str] | None = None,
     cost_limit: float = COST_LIMIT,
+    time_limit: float = HANG_LIMIT,
 ) -> Question:
     """Return what is asked, or say what is wrong with it.
 
@@ -74,6 +77,8 @@ def ask(
         Engines, such as `("mujoco",)`; default all that are installed.
     cost_limit
         Wall time per simulated second, s/s, that a setting may cost.
+    time_limit
+        Wall time, s, after which the run of an engine is ended.
 
     Raises
     ------
@@ -85,7 +90,8 @@ def ask(
     positive_number("error", error, "a finite attitude error above 0, rad")
     end = scene.t_end if duration is None else positive_number("duration", duration, "a finite duration above 0, s")
     positive_number("cost_limit", cost_limit, "a finite wall time per simulated second above 0, s/s")
+    positive_number("time_limit", time_limit, "a finite duration above 0, s")
     found = list_engines(engine_names)
     missing = tuple(method.name for method in found if isinstance(method, selection.Missing))
     methods = tuple(method for method in found if not isinstance(method, selection.Missing))
-    return Question(scene, error, end, methods, missing, cost_limit)
+    return Question(scene, error, end, methods, missing, cost_limit, time_limit)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from conservative.method import Grid, Method, Role
 from conservative.outcome import Outcome
@@ -19,7 +19,8 @@ from conservative.references.truth import Truth
 
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Success, attempt, fail_unsupported
+from ..studies.case import Case, Success, fail_unsupported
+from ..studies.time_limit import attempt_here
 from .advice import Advice, advise
 from .motion import choose_ours, prepare_conditions
 from .probe import STEPS, Conditions
@@ -78,6 +79,7 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     """
     progress(0.0, "the motion and its truth")
     conditions, truth = prepare_conditions(asked.scene, asked.error, asked.duration, asked.cost_limit)
+    conditions = replace(conditions, time_limit=asked.time_limit)
     own, step = choose_ours(conditions, conditions.target * min(1.0, conditions.short / conditions.duration))
     roles: dict[str, Role] = {}
     refinements: dict[str, Refinement | Outcome] = {}
@@ -123,7 +125,7 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Ou
         n = max(1, round(length / probe.dt))
         adaptive = selection.tolerance_setting(probe.method) is not None
         grid = Grid(length, 1) if adaptive else Grid(probe.dt, n, n)
-        outcome = attempt(Case("recommendation", conditions.scene, probe.method, grid))
+        outcome = attempt_here(conditions.time_limit, Case("recommendation", conditions.scene, probe.method, grid))
         if isinstance(outcome, Success):
             runs[line], lengths[line] = outcome.run, grid.dt * grid.n_steps
     found = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)

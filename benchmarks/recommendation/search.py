@@ -13,6 +13,7 @@ from conservative.attitude import Array
 from conservative.errors import BadInput
 from conservative.method import Method
 from conservative.methods.automatic import ASYMPTOTIC, ATTEMPTS, stops_falling
+from conservative.outcome import OutcomeKind
 
 from ..measures.convergence_order import MIN_POINTS
 from ..studies.selection import at_tolerance, tolerance_setting
@@ -110,7 +111,9 @@ def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
 
 def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
     adaptive = tolerance_setting(probes[0].method) is not None
-    while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target and not at_round_off(probes):
+    while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target:
+        if at_round_off(probes) or was_ended(probes[-1]):
+            break
         finer = (_tighten_tolerance if adaptive else _shorten_step)(conditions, probes, aim(probes[-1]))
         if finer is None:
             break
@@ -121,6 +124,11 @@ def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: b
 def at_round_off(probes: Sequence[Probe]) -> bool:
     """Whether finer settings have stopped helping where they once did: round-off."""
     return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
+
+
+def was_ended(probe: Probe) -> bool:
+    """Whether a probe went on beyond its limit; what is finer would, too."""
+    return probe.outcome.kind is OutcomeKind.TIMEOUT
 
 
 def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:

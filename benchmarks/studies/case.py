@@ -88,7 +88,7 @@ def fail_unsupported(reason: str) -> Failure:
 
 
 def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Prepare and run a case once.
+    """Prepare and run a case once, and check what it gave (`Method.check`); calls of the run afterwards are not checked.
 
     Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become an outcome.
     Exceptions out of our own methods are bugs and are not caught.
@@ -102,7 +102,8 @@ def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
         reason = case.method.unsupported(case.scene)
         if reason:
             return fail_unsupported(reason)
-        done = Success(*prepare_and_run(lambda: case.method.prepare(case.scene, case.grid)))
+        run, found, cost = prepare_and_run(lambda: case.method.prepare(case.scene, case.grid))
+        done = Success(run, case.method.check(case.scene, case.grid, found), cost)
     except MissingEngine as error:
         if not skip_missing:
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from conservative.method import Method
@@ -12,11 +13,11 @@ from ..measures import errors
 from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import wall_time
 from . import step_ladder
 from .case import Case, Failure, Success, attempt, drop_step, fail_unsupported
 from .selection import Missing
 from .study import Progress, Study
+from .time_limit import attempt_within
 
 ORDERS = {
     Measure.ATTITUDE_MAX: (Measure.ORDER, Measure.ORDER_STDERR),
@@ -25,6 +26,10 @@ ORDERS = {
 """What an order is fitted to, and the measures of the order and of its standard error."""
 ERRORS = (Measure.ATTITUDE_MAX, Measure.ATTITUDE_FINAL, Measure.RATES_MAX)
 """What is measured at every step."""
+FEWEST_POINTS = 4
+"""Points that even a slow method gets, as far as `LINE_LIMIT` allows."""
+LINE_LIMIT = 8
+"""Time for all the points of a slow method's line, in units of the longest single run that a study plans for."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -59,7 +64,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     found: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
-    for case, outcome in attempt_each(cases, study.longest_run, study.skip_missing):
+    for case, outcome in attempt_each(study, cases):
         if isinstance(outcome, Failure):
             yield from case.blanks(blanks(*ERRORS), outcome.outcome)
             continue
@@ -71,21 +76,42 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         yield from fit(cases[0], measure, found[measure])
 
 
-def attempt_each(cases: list[Case], longest: float, skip_missing: bool) -> Iterator[tuple[Case, Success | Failure]]:
-    """Yield the outcome of each case, coarse to fine; what would take more than `longest` s is skipped and says so."""
+def attempt_each(study: Study, cases: list[Case]) -> Iterator[tuple[Case, Success | Failure]]:
+    """Yield the outcome of each case, coarse to fine; what there is no time for is skipped and says so.
+
+    A slow method gets fewer points: the coarsest `FEWEST_POINTS`, where all together fit into its time, and of finer ones those
+    that the study's longest run has room for. After a run that was ended there is none that is finer.
+    """
+    times: list[float] = []
     per_step = 0.0
     for case in cases:
         expected = per_step * case.grid.n_steps
-        if expected > longest:
-            reason = f"would take about {expected:.2g} s, more than {longest:g} s"
+        if not fits(study, times, expected):
+            longest = f"would take about {expected:.2g} s, more than {study.longest_run:g} s"
+            reason = longest if expected < math.inf else "a coarser run was ended"
             yield case, Failure(Outcome(OutcomeKind.SKIPPED, reason))
             continue
-        outcome = attempt(case, skip_missing)
-        if isinstance(outcome, Success):
-            # The very first call may include compilation, so that only a short one is taken for the cost of a run.
-            first = outcome.cost.first_call
-            per_step = (first if per_step or first < longest / 4 else wall_time(outcome.run)) / case.grid.n_steps
+        outcome = attempt_within(study.hang_limit, case, study.skip_missing)
         yield case, outcome
+        if isinstance(outcome, Success):
+            times.append(cost_of_run(study, case, outcome, first=not times))
+            per_step = times[-1] / case.grid.n_steps
+        elif outcome.outcome.kind is OutcomeKind.TIMEOUT:
+            per_step = math.inf
+
+
+def fits(study: Study, times: list[float], expected: float) -> bool:
+    """Whether a run that is expected to take a time, s, is made after others that took `times`, s."""
+    needed = len(times) < FEWEST_POINTS and sum(times) + expected <= LINE_LIMIT * study.longest_run
+    return needed or expected <= study.longest_run
+
+
+def cost_of_run(study: Study, case: Case, done: Success, first: bool) -> float:
+    """Return the wall time, s, of a run: of another call where the very first one may have included compilation."""
+    if not first or done.cost.first_call < study.longest_run / 4:
+        return done.cost.first_call
+    again = attempt_within(study.hang_limit, case, study.skip_missing)
+    return min(each.cost.first_call for each in (done, again) if isinstance(each, Success))
 
 
 def fit(case: Case, measure: Measure, errors_by_step: dict[float, float]) -> list[Measurement]:

@@ -19,7 +19,7 @@ from .case import Case
 from .paper import accuracy
 from .selection import Missing
 from .study import Progress, Study
-from .time_limit import attempt_within
+from .time_limit import attempt_apart
 
 TURN = 60.0
 """Length of the runs, rad turned at the rate of the start. Limited, because multi-precision truth costs seconds."""
@@ -64,4 +64,4 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
-            yield from accuracy(case, attempt_within(LIMIT, case, study.skip_missing), truth)
+            yield from accuracy(case, attempt_apart(LIMIT, case, study.skip_missing), truth)

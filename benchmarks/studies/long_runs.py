@@ -14,8 +14,9 @@ from conservative.trajectory import Trajectory
 
 from ..measures.errors import measure_drifts
 from ..measures.measure import Measure, Value
-from .case import Case, Failure, attempt
+from .case import Case, Failure, Success
 from .study import Finding, Progress, Study
+from .time_limit import attempt_within
 
 DURATIONS = 10.0
 """Length of a run in durations of its scene."""
@@ -32,7 +33,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     for i, scene in enumerate(study.scenes):
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
-            yield from long_run(case_for(study.name, scene, method), study.skip_missing)
+            case = case_for(study.name, scene, method)
+            yield from long_run(case, attempt_within(study.hang_limit, case, study.skip_missing))
 
 
 def case_for(study: str, scene: Scene, method: Method) -> Case:
@@ -40,15 +42,8 @@ def case_for(study: str, scene: Scene, method: Method) -> Case:
     return Case(study, scene, method, grid_for(scene, scene.dt, scene.t_end * DURATIONS))
 
 
-def long_run(case: Case, skip_missing: bool) -> Iterator[Finding]:
-    """Yield the rows of one run, then its lines.
-
-    Raises
-    ------
-    MissingEngine
-        The engine is not installed, and `skip_missing` is False.
-    """
-    outcome = attempt(case, skip_missing)
+def long_run(case: Case, outcome: Success | Failure) -> Iterator[Finding]:
+    """Yield the rows of one run, then its lines."""
     if isinstance(outcome, Failure):
         values = [Value(Measure.DRIFT_MAX, np.nan, invariant.name) for invariant in case.scene.invariants]
         yield from case.blanks(values, outcome.outcome)

@@ -12,8 +12,9 @@ from conservative.trajectory import Counters, Trajectory
 from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Failure, Success, attempt
+from .case import Case, Failure, Success
 from .study import Progress, Study
+from .time_limit import attempt_within
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
@@ -33,7 +34,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             progress(i * len(study.methods) + j, total, f"{scene.name}: {method.name}")
             for grid, truth in zip(grids, truths, strict=True):
                 case = Case(study.name, scene, method, grid)
-                yield from accuracy(case, attempt(case, study.skip_missing), truth.trajectory)
+                outcome = attempt_within(study.hang_limit, case, study.skip_missing)
+                yield from accuracy(case, outcome, truth.trajectory)
                 if method.order is None:
                     break  # accuracy does not depend on dt, nor does what the samples show
 

@@ -49,7 +49,7 @@ class PaperFigure:
         """Return the case and the trajectory of a method by name, at a step, s; raise what a run raises that failed."""
         method: Method = registry.method(name)
         case = Case(self.study, self.scene, method, grid_for(self.scene, dt))
-        trajectory = method.prepare(self.scene, case.grid)()
+        trajectory = method.solve(self.scene, case.grid)
         if trajectory.failure is not None:
             raise trajectory.failure
         return case, trajectory

@@ -16,8 +16,9 @@ from conservative.outcome import OK
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved, wall_time
-from .case import Case, Success, attempt, fail_unsupported
-from .study import Progress, Study
+from .case import Case, Success, fail_unsupported
+from .study import HANG_LIMIT, Progress, Study
+from .time_limit import attempt_here, attempt_within, is_known_to_end
 
 MEASURES = (
     Measure.TIME_PER_STEP,
@@ -29,6 +30,8 @@ MEASURES = (
 )
 CALL = 0.004
 """Target duration of a timed call, s: long enough that the overhead of a call stays a few per cent."""
+TRIAL = 8
+"""Steps of the run that tells how slow a foreign method is."""
 LONGEST = 2**16
 """Largest factor by which the number of steps of a timed run is raised."""
 UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
@@ -39,16 +42,31 @@ def keep_end(grid: Grid, times: int = 1) -> Grid:
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
-def lengthen(case: Case, done: Success) -> tuple[Case, Success]:
+def shorten(study: Study, case: Case) -> Case:
+    """Return the case with as many steps as the study plans to wait for; fewer than asked for only of a slow foreign method."""
+    few = replace(case, grid=keep_end(replace(case.grid, n_steps=min(TRIAL, case.grid.n_steps))))
+    if is_known_to_end(case.method):
+        return case
+    trials = [attempt_within(study.hang_limit, few, skip_missing=True) for _ in range(2)]  # the first may compile
+    spent = [trial.cost.first_call for trial in trials if isinstance(trial, Success)]
+    if not spent:
+        return few
+    affordable = int(few.grid.n_steps * study.longest_run / max(min(spent), 1e-9))
+    n = min(case.grid.n_steps, max(few.grid.n_steps, affordable))
+    return replace(case, grid=Grid(case.grid.dt, n, n))
+
+
+def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT) -> tuple[Case, Success]:
     """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
 
-    The number is found in several rounds, because a short call is mostly overhead and says little of its steps.
+    No run may take more than `limit` s. The number is found in several rounds, because a short call is mostly overhead and says
+    little of its steps.
     """
     bare, times = case, 1
     while times < LONGEST and (spent := wall_time(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
         longer = replace(bare, grid=keep_end(bare.grid, times))
-        found = attempt(longer)
+        found = attempt_here(limit, longer)
         if not isinstance(found, Success):
             break
         case, done = longer, found
@@ -79,10 +97,10 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
             scene.forget()  # so that the scene is converted again; compiled code stays warm
-            case = Case(study.name, scene, method, grid)
-            outcome = attempt(case, study.skip_missing)
+            case = shorten(study, Case(study.name, scene, method, grid))
+            outcome = attempt_here(study.hang_limit, case, study.skip_missing)
             if isinstance(outcome, Success):
-                ready[method.name] = TimedRun(*lengthen(case, outcome), outcome)
+                ready[method.name] = TimedRun(*lengthen(case, outcome, study.hang_limit), outcome)
             else:
                 yield from case.blanks(blanks(*MEASURES), outcome.outcome)
         progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} methods")

@@ -17,9 +17,10 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.samples import Samples
-from .case import Case, Failure, attempt
+from .case import Case, Failure
 from .long_runs import case_for
 from .study import Progress, Study
+from .time_limit import attempt_within
 
 SAMPLES = 700
 """Samples of a curve at most."""
@@ -37,7 +38,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
     for k, (scene, method) in enumerate(pairs):
         progress(k, len(pairs), f"{scene.name}: {method.name}")
         case = case_for(study.name, scene, method)
-        outcome = attempt(case, study.skip_missing)
+        outcome = attempt_within(study.hang_limit, case, study.skip_missing)
         if not isinstance(outcome, Failure):
             yield from curve(case, outcome.trajectory)
 

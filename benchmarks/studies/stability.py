@@ -8,7 +8,7 @@ A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| that of th
                      or, of any method and while the body turns by no more than pi, where angles are not ambiguous: the first
                      step ends further from the true attitude than a body that did not move
     diverged         the state is not finite from a time on, or the energy is off by more than its own scale
-    timeout          the run took longer than `LIMIT` s
+    timeout          the run of an engine took longer than `LIMIT` s, and was ended
     unsupported      the method does not have the scene, or not the step
     crashed          an engine raised an exception of its own
 
@@ -35,7 +35,7 @@ from ..measures.measurement import Measurement
 from .case import Case, Failure, drop_step
 from .selection import Missing
 from .study import Progress, Study
-from .time_limit import attempt_within
+from .time_limit import attempt_apart
 
 SCENES = (
     "brick_flip",
@@ -117,7 +117,7 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
 
 def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
     """Return how a method does at a size of its steps, with `limit` s of time."""
-    done = attempt_within(limit, case, study.skip_missing)
+    done = attempt_apart(limit, case, study.skip_missing)
     if isinstance(done, Failure):
         return done.outcome
     return detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK

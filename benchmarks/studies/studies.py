@@ -48,11 +48,15 @@ CROSSED = tuple(name for name in MAKERS if name not in HARD)
 
 
 def cross_studies(
-    scenes: tuple[Scene, ...], methods: tuple[Method, ...], quick: bool = False, skip_missing: bool = False
+    scenes: tuple[Scene, ...],
+    methods: tuple[Method, ...],
+    quick: bool = False,
+    skip_missing: bool = False,
+    time_limit: float | None = None,
 ) -> tuple[Study, ...]:
     """Return the studies of the same scenes and methods, in the order of `CROSSED`; they share their truths."""
     truths = Truths()
-    return tuple(Study(name, scenes, methods, quick, skip_missing, truths) for name in CROSSED)
+    return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in CROSSED)
 
 
 def list_hard_studies(methods: tuple[Method, ...], skip_missing: bool = False) -> tuple[Study, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from conservative.check import positive_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role
 from conservative.references.truth import Truth, reference
@@ -18,6 +19,10 @@ Progress = Callable[[int, int, str], None]
 """Called before each piece of work: pieces done, pieces in all, and what comes next."""
 MOST_TRUTHS = 32
 """Motions that `Truths` keeps: some six for each scene of a report."""
+HANG_LIMIT = 60.0
+"""Shortest time, s, after which a run that does not end is ended: a first run may compile."""
+HANG_FACTOR = 10.0
+"""How many times longer than what a study plans with a run may take before it is ended."""
 FindTruth = Callable[[Scene, Grid], Truth]
 Finding = Measurement | Samples
 """What a study yields: rows of the table, and lines of pictures."""
@@ -53,11 +58,13 @@ class Study:
         Rows with the outcome "missing" instead of `MissingEngine`.
     truth
         Where the exact motion comes from; studies of the same scenes can share what they find.
+    time_limit
+        Longest single run, s, that the study plans for; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
 
     Raises
     ------
     BadInput
-        There is nothing to cross.
+        There is nothing to cross, or the limit is not a finite duration above 0.
     """
 
     name: str
@@ -66,6 +73,7 @@ class Study:
     quick: bool = False
     skip_missing: bool = False
     truth: FindTruth = field(default_factory=Truths)
+    time_limit: float | None = None
 
     @property
     def rounds(self) -> int:
@@ -79,8 +87,13 @@ class Study:
 
     @property
     def longest_run(self) -> float:
-        """Time, s, of the longest single run that the study waits for on the way to shorter steps."""
-        return 0.15 if self.quick else 0.6
+        """Time, s, of the longest single run that the study plans for: on the way to shorter steps, and of a timed call."""
+        return self.time_limit or (0.15 if self.quick else 0.6)
+
+    @property
+    def hang_limit(self) -> float:
+        """Time, s, after which a run is ended."""
+        return max(HANG_LIMIT, HANG_FACTOR * self.longest_run)
 
     @property
     def competitors(self) -> tuple[Method, ...]:
@@ -91,6 +104,8 @@ class Study:
         for argument in ("scenes", "methods"):
             if not getattr(self, argument):
                 raise BadInput(argument, "none", "one or more")
+        if self.time_limit is not None:
+            positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
 
 
 Maker = Callable[[Study, Progress], Iterator[Finding]]

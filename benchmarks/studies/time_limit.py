@@ -1,59 +1,102 @@
-"""A limit on how long one run may take, so that one engine at an extreme rate does not hold up a study."""
+"""A limit on how long one run may take, so that no engine holds up a study: what goes on beyond it is ended."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
-from typing import TypeVar
+from dataclasses import replace
+from functools import partial
+from weakref import WeakKeyDictionary
 
+from conservative.errors import BadInput
+from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.pickling import NotTransferable
+from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from .case import Case, Failure, Success, attempt
+from .selection import Missing
 
-T = TypeVar("T")
-
-
-class TimeLimitExceeded(TimeoutError):
-    """A piece of work took longer than it was given. Attribute: `limit` (s)."""
-
-    def __init__(self, limit: float) -> None:
-        self.limit = limit
-        super().__init__(f"abandoned after {limit:g} s")
+_ended: WeakKeyDictionary[Scene, dict[Method, tuple[float, int]]] = WeakKeyDictionary()
+"""Limit, s, and steps of the last run that was ended, by scene and method: nobody waits for the same twice."""
 
 
-def run_within(limit: float, work: Callable[[], T]) -> T:
-    """Return what `work` returns, or raise what it raises, if that takes no longer than `limit` s.
+def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Return the outcome of a case that may take `limit` s of wall time, if it is not known to end; see `attempt_apart`."""
+    return (attempt if is_known_to_end(case.method) else partial(attempt_apart, limit))(case, skip_missing)
 
-    It runs in a thread. Work that is abandoned goes on in the background, as Python cannot end a thread, and dies with the
-    process. What keeps the interpreter locked, as our own kernels do, cannot be abandoned before it is done, and is then late.
+
+def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Return the outcome of a case that may take `limit` s of wall time; see `attempt`.
+
+    What is not our own may go on for ever, or end the process that it is in: it runs in another one, which is ended after the
+    limit. The trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called.
 
     Raises
     ------
-    TimeLimitExceeded
-        It takes longer.
+    MissingEngine
+        The engine is not installed, and `skip_missing` is False.
     """
-    found: list[T] = []
-    raised: list[BaseException] = []
-
-    def worker() -> None:
-        try:
-            found.append(work())
-        except BaseException as error:
-            raised.append(error)
-
-    thread = threading.Thread(target=worker, daemon=True)
-    thread.start()
-    thread.join(limit)
-    if thread.is_alive():
-        raise TimeLimitExceeded(limit)
-    if raised:
-        raise raised[0]
-    return found[0]
-
-
-def attempt_within(limit: float, case: Case, skip_missing: bool) -> Success | Failure:
-    """Return the outcome of a case that is waited for `limit` s; see `attempt`."""
+    if is_bounded(case.method):
+        return attempt(case, skip_missing)
+    known = _ended.get(case.scene, {}).get(case.method)
+    if known and limit <= known[0] and case.grid.n_steps >= known[1]:
+        return Failure(Outcome(OutcomeKind.TIMEOUT, f"a run of {known[1]} steps was ended after {known[0]:g} s"))
     try:
-        return run_within(limit, lambda: attempt(case, skip_missing))
+        done = run_within(limit, partial(_attempt, case), (case.scene,))
     except TimeLimitExceeded as late:
+        _ended.setdefault(case.scene, {})[case.method] = limit, case.grid.n_steps
         return Failure(Outcome(OutcomeKind.TIMEOUT, str(late)))
+    except WorkerDied as death:
+        return Failure(Outcome(OutcomeKind.CRASHED, str(death)))
+    except NotTransferable:
+        return attempt(case, skip_missing)
+    if isinstance(done, Failure) and done.outcome.kind is OutcomeKind.MISSING:
+        return attempt(case, skip_missing)
+    return replace(done, run=_prepare_later(case)) if isinstance(done, Success) else done
+
+
+def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Return the outcome of a case whose run is to be timed in this process.
+
+    A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
+    """
+    tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
+    return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
+
+
+def is_known_to_end(method: Method) -> bool:
+    """Whether the run of a method ends: of ours, and of engines that take a known number of steps and that we know."""
+    return is_bounded(method) or (_is_ours(method) and method.order is not None)
+
+
+def is_bounded(method: Method) -> bool:
+    """Whether a run ends for certain: our own kernels take a known number of steps, and truths limit themselves."""
+    return bool(method.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
+
+
+def _is_ours(method: Method) -> bool:
+    return type(method).__module__.startswith("conservative.")
+
+
+def _attempt(case: Case) -> Success | Failure:
+    """Return how a case ends, without its run, which stays where it is."""
+    done = attempt(case, skip_missing=True)
+    return replace(done, run=_stay) if isinstance(done, Success) else done
+
+
+def _stay() -> Trajectory:
+    raise BadInput("run", "a run of another process", "a run that was prepared here")
+
+
+def _prepare_later(case: Case) -> Callable[[], Trajectory]:
+    """Return the run of a case, which is prepared when it is first called."""
+    prepared: list[Callable[[], Trajectory]] = []
+
+    def run() -> Trajectory:
+        if not prepared:
+            prepared.append(case.method.prepare(case.scene, case.grid))
+        return prepared[0]()
+
+    return run

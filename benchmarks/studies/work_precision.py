@@ -14,11 +14,12 @@ from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved
 from . import step_ladder
-from .case import Case, Failure, Success, attempt
+from .case import Case, Failure, Success
 from .convergence import attempt_each
 from .selection import at_tolerance, series, tolerance_setting
 from .speed import CALL, TimedRun, keep_end, lengthen
 from .study import Progress, Study
+from .time_limit import attempt_here
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 ROUNDS = 5
@@ -34,7 +35,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
             truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-            for case, outcome in attempt_each(points(study, scene, method), study.longest_run, study.skip_missing):
+            for case, outcome in attempt_each(study, points(study, scene, method)):
                 yield from error_rows(case, outcome, truth)
                 good += [case] * isinstance(outcome, Success)
         progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} points")
@@ -75,9 +76,9 @@ def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
     ready: dict[str, TimedRun] = {}
     for case in cases:
         bare = replace(case, grid=keep_end(case.grid))
-        outcome = attempt(bare)
+        outcome = attempt_here(study.hang_limit, bare)
         if isinstance(outcome, Success):
-            ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome), outcome)
+            ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome, study.hang_limit), outcome)
         else:
             yield from case.blanks(blanks(Measure.TIME), outcome.outcome)
     runs = {key: timed.done.run for key, timed in ready.items()}

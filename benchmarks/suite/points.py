@@ -117,7 +117,7 @@ def measure(point: Point) -> dict[str, GatedValue]:
     """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
     exact = point.truths(point.scene, point.grid).trajectory
     runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
-    found = [_measure_run(point.method.prepare(scene, point.grid)(), exact) for scene in runs]
+    found = [_measure_run(point.method.solve(scene, point.grid), exact) for scene in runs]
     values = {name: GatedValue(found[0][name], _range([each[name] for each in found])) for name in found[0]}
     return values | (fit_order(point) if point.scene.name in PAPER else {})
 

@@ -123,7 +123,7 @@ def measure_drifts(method: Method, scenes: list[Scene], dt: float, steps: int) -
     found: dict[str, list[Array]] = {}
     grid = Grid(dt, steps, steps // BLOCKS)
     for scene in scenes:
-        trajectory = method.prepare(scene, grid)()
+        trajectory = method.solve(scene, grid)
         if trajectory.failure is not None:
             raise trajectory.failure
         for invariant in scene.invariants:

@@ -31,6 +31,10 @@ kernel: Any = partial(njit, cache=True, error_model="numpy")
 SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
 """Options of small functions in the inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
 
+entry: Any = partial(kernel, nogil=True)
+"""How what runs long is compiled: other threads go on meanwhile. Giving the interpreter's lock up and taking it again is dear
+where many threads want it, so that what Python calls many times a step keeps it."""
+
 small: Any = partial(kernel, **SMALL)
 """How those are compiled. Contraction is safe in compensated sums, which have no product to contract with."""
 

@@ -1,6 +1,6 @@
-"""A field given by Python functions, called from the compiled loop through a C pointer.
+"""A field given by Python functions, called from the compiled loop.
 
-For each evaluation the loop writes the inputs into a new buffer, and the callback writes the outputs behind them. All of the
+For each evaluation the loop writes the inputs into a new buffer, and what it calls writes the outputs behind them. All of the
 arithmetic is Python's, in `conservative.potentials.python_function`: nothing but these few lines is compiled.
 """
 
@@ -11,21 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from ..errors import PotentialFailed
 from . import COMPILED, kernel
 from .fields import body_torque, energy, finite_derivative, finite_torque, implements
 
 BODY_TORQUE, FINITE_TORQUE, FINITE_DERIVATIVE, ENERGY = 0, 1, 2, 3
-FAILED = 1
 STATE, N_INPUTS, N_OUTPUTS = 9, 27, 90
 """Index of the state in a buffer, and numbers of inputs and outputs."""
 
 
 class Function(NamedTuple):
-    """Address of a C function int64(int64 what, int64 address of a buffer), which returns FAILED or 0; rows of the frame R_BP.
+    """Address of a Python object that is called with what to do and the address of a buffer; rows of the frame R_BP.
 
     A buffer holds R_BP (9), the state (18) and the outputs (90). BODY_TORQUE: q to T. FINITE_TORQUE: q, a to T and its
     derivative by a, column by column. FINITE_DERIVATIVE: q0, q1 to V* and its derivative by q1, row by row. ENERGY: q to V.
@@ -38,18 +36,32 @@ class Function(NamedTuple):
 
 
 @intrinsic
-def _call_compiled(typingctx, address, what, buffer):
-    """Call the C function at `address` with the int64 `what` and the address of a buffer."""
+def _call_compiled(typingctx, function, what, buffer):
+    """Call the Python object at the address `function` with the int64 `what` and the address of a buffer.
+
+    What it raises, or a handler of signals while it runs, ends the kernel and comes out of it as it is. A callback of ctypes
+    would lose what handlers raise before its first line, and go on.
+    """
 
     def code(context, builder, signature, arguments):
-        function = ir.FunctionType(ir.IntType(64), [ir.IntType(64), ir.IntType(64)])
-        return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
+        python = context.get_python_api(builder)
+        lock = python.gil_ensure()
+        kind = ir.FunctionType(python.pyobj, [python.pyobj, ir.IntType(8).as_pointer()], var_arg=True)
+        call = cgutils.get_or_insert_function(builder.module, kind, "PyObject_CallFunction")
+        numbers = context.insert_const_string(builder.module, "LL")
+        found = builder.call(call, [builder.inttoptr(arguments[0], python.pyobj), numbers, *arguments[1:]])
+        with cgutils.if_unlikely(builder, cgutils.is_null(builder, found)):
+            python.gil_release(lock)
+            context.call_conv.return_exc(builder)
+        python.decref(found)
+        python.gil_release(lock)
+        return context.get_dummy_value()
 
-    return types.int64(types.int64, types.int64, types.int64), code
+    return types.none(types.int64, types.int64, types.int64), code
 
 
-def _call_plain(address, what, buffer):
-    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(address)(what, int(buffer))
+def _call_plain(function, what, buffer):
+    ctypes.cast(int(function), ctypes.py_object).value(int(what), int(buffer))
 
 
 _call = _call_compiled if COMPILED else _call_plain
@@ -74,8 +86,7 @@ def _fill(field, q):
 @kernel
 def _evaluate(field, what, buffer):
     """Return the outputs, a view into the buffer."""
-    if _call(field.address, what, np.int64(buffer.ctypes.data)) == FAILED:
-        raise PotentialFailed
+    _call(np.int64(field.address), np.int64(what), np.int64(buffer.ctypes.data))
     return buffer[N_INPUTS:]
 
 

@@ -22,13 +22,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import kernel, small
+from . import entry, kernel, small
 from .protocol import Result, Workspace, find_ends, loosen
+from .signals import call_handlers
 from .simd import LANES, four, fuse, lane, larger_size, put, splat, spread
 from .vector import accumulate, add, cross, dot, product, scale, subtract, vertical
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
+PAUSE = 2**13
+"""Sweeps between two calls of handlers of signals; a correction by Newton's method counts as NEWTON of them."""
+NEWTON = 100
 MAX_SWEEPS = 120
 MAX_NEWTON = 25
 ROUND_OFF = 2e-17
@@ -334,7 +338,7 @@ def march(model, coefficients, workspace):
     """
     unit, J_inverse, c, L0, gamma0, q0, left = model
     s, A, E, b, b_low, h = coefficients
-    n_steps, every, q_out, L_out = workspace
+    n_steps, every, pause, q_out, L_out = workspace
     width = b.shape[0]
     U, carry = np.empty(6), np.zeros(6)
     for k in range(3):
@@ -342,7 +346,7 @@ def march(model, coefficients, workspace):
     F, D, Z = np.empty(6 * width), np.zeros(6 * width), np.empty(6 * width)
     q, q_carry, gamma, phi, phi_carry = q0, (0.0, 0.0, 0.0, 0.0), gamma0, 0.0, 0.0
     store(0, left, phi, q, gamma, unit, U, q_out, L_out)
-    row, work, change = 0, 0, 0.0
+    row, work, change, until_pause = 0, 0, 0.0, pause
     for step in range(1, n_steps + 1):
         if step == 1:
             guess_stages(A, s, h, J_inverse, c, U, F, D, Z)
@@ -353,6 +357,7 @@ def march(model, coefficients, workspace):
         if not good:
             corrections, change, good = continue_branch(A, s, h, J_inverse, c, U, F, D, Z)
             work += corrections
+            until_pause -= NEWTON * corrections
             if not good:
                 elsewhere = find_solution(A, s, h, J_inverse, c, U, F, D, Z)
                 return Result(step - 1, (step - 1) * s, work, None, change, elsewhere)
@@ -366,13 +371,17 @@ def march(model, coefficients, workspace):
         if step % every == 0 or step == n_steps:
             row += 1
             store(row, left, phi - phi_carry, q, gamma, unit, U, q_out, L_out)
+        until_pause -= sweeps
+        if until_pause <= 0 < pause:
+            until_pause = pause
+            call_handlers()
     return Result(n_steps, n_steps * s, work, None, change, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
 
 
-@kernel
+@entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])

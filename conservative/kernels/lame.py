@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import kernel
+from . import entry, kernel
 from .protocol import Result, Workspace, find_ends, loosen
+from .signals import call_handlers, end_of_block
 from .twofold import minus, over, plus, scale, times, two
 from .vector import add, cross, product
 from .vector import scale as scale_vector
@@ -20,6 +21,10 @@ TERMS = 22
 SERIES_RADIUS = 0.125
 DAMPING = 0.3
 LARGEST_POLE = 1.7
+PAUSE = 2**18
+"""Parts of steps between two calls of handlers of signals."""
+PARTS_AT_ONCE = 1024
+"""Numbers of parts tried between two such calls."""
 
 
 class Model(NamedTuple):
@@ -148,6 +153,8 @@ def split_step(g2, g3, B, h):
         if p * part * part <= LARGEST_POLE:
             return parts, p, dp, f
         parts += 1
+        if parts % PARTS_AT_ONCE == 0:
+            call_handlers()
 
 
 @kernel
@@ -210,7 +217,7 @@ def march(model, coefficients, workspace):
     """Take the steps (`protocol`), each in as many equal parts as `split_step` says, which count as stages."""
     J, kappa, q0, L0 = model
     h = coefficients.h
-    n_steps, every, q_out, L_out = workspace
+    n_steps, every, pause, q_out, L_out = workspace
     gamma = unit_vertical(q0)
     E_, z_, spin_, nu_, x0_, g2, g3, B = curve(J, kappa, gamma, L0)
     parts, p_h, dp_h, f = split_step(g2, g3, B, h)
@@ -229,38 +236,44 @@ def march(model, coefficients, workspace):
     q_out[0, :] = q0
     L_out[0, :] = L0
     row = 0
-    for step in range(1, n_steps + 1):
-        for _ in range(parts):
-            g0, g1, g2_ = gamma
-            x = nu * g2_ + x0
-            S = 0.5 * (nu * (g0 * w1 - g1 * w0) - dp_h) / (x - p_h)
-            a = ((ya * (ca + x) - da * S) * third, (yb * (cb + x) - db * S) * third)
-            b = ((da - ya * S) * third, (db - yb * S) * third)
-            d = turn(a, b, gamma, (w0, w1, w2))
-            am, bm = (ym * (cm + x) - dm * S) * third, (dm - ym * S) * third
-            m0, m1 = am * w0 + bm * (k * g1 - half * w1), am * w1 + bm * (half * w0 - k * g0)
-            w0, w1 = cos * m0 + sin * m1, cos * m1 - sin * m0
-            q = product(q, d)
-            gamma = unit_vertical(q)
-            dw, t = restore_invariants(E, z, k, rate, gamma, (w0, w1, w2))
-            w0, w1 = w0 + dw[0], w1 + dw[1]
-            # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
-            # gamma must be of unit length: left alone, an error of its length would grow from step to step.
-            size = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-            half_size = 0.5 * size
-            q = product(q, (size, half_size * t[0], half_size * t[1], half_size * t[2]))
-            gamma = scale_vector(size * size, add(gamma, cross(gamma, t)))
-        if step % every == 0 or step == n_steps:
-            row += 1
-            q_out[row, :] = q
-            L_out[row, 0], L_out[row, 1], L_out[row, 2] = J * w0, J * w1, L0[2]
+    done, block = 0, -(-pause // parts)
+    while done < n_steps:
+        last = end_of_block(done, n_steps, block)
+        for step in range(done + 1, last + 1):
+            for _ in range(parts):
+                g0, g1, g2_ = gamma
+                x = nu * g2_ + x0
+                S = 0.5 * (nu * (g0 * w1 - g1 * w0) - dp_h) / (x - p_h)
+                a = ((ya * (ca + x) - da * S) * third, (yb * (cb + x) - db * S) * third)
+                b = ((da - ya * S) * third, (db - yb * S) * third)
+                d = turn(a, b, gamma, (w0, w1, w2))
+                am, bm = (ym * (cm + x) - dm * S) * third, (dm - ym * S) * third
+                m0, m1 = am * w0 + bm * (k * g1 - half * w1), am * w1 + bm * (half * w0 - k * g0)
+                w0, w1 = cos * m0 + sin * m1, cos * m1 - sin * m0
+                q = product(q, d)
+                gamma = unit_vertical(q)
+                dw, t = restore_invariants(E, z, k, rate, gamma, (w0, w1, w2))
+                w0, w1 = w0 + dw[0], w1 + dw[1]
+                # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
+                # gamma must be of unit length: left alone, an error of its length would grow from step to step.
+                size = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+                half_size = 0.5 * size
+                q = product(q, (size, half_size * t[0], half_size * t[1], half_size * t[2]))
+                gamma = scale_vector(size * size, add(gamma, cross(gamma, t)))
+            if step % every == 0 or step == n_steps:
+                row += 1
+                q_out[row, :] = q
+                L_out[row, 0], L_out[row, 1], L_out[row, 2] = J * w0, J * w1, L0[2]
+        done = last
+        if done < n_steps:
+            call_handlers()
     return Result(n_steps, n_steps * parts, 0, None, 0.0, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
 
 
-@kernel
+@entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])

@@ -22,12 +22,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import kernel
+from . import entry, kernel
 from .protocol import Result, Workspace, find_ends, loosen
+from .signals import call_handlers, end_of_block
 from .vector import product
 
 NODES, WEIGHTS = (tuple(float(x) for x in part) for part in np.polynomial.legendre.leggauss(16))
 TERMS = 12
+PAUSE = 2**20
+"""Steps between two calls of handlers of signals."""
 RESCALE = 32
 """Steps between two rescalings of z, whose modulus changes by a factor in [1/2, 2] or so a step."""
 
@@ -308,7 +311,7 @@ def march(model, coefficients, workspace):
     cannot drift, and mc is not lost near the separatrix, where it is far below the round-off of L.
     """
     p, step = Polhode(*model.polhode), coefficients
-    n_steps, every, q_out, L_out = workspace
+    n_steps, every, pause, q_out, L_out = workspace
     S, C, D = step.S, step.C, step.D
     m, mc = p.m, p.mc
     # One whole shift, by the addition theorem from two halves.
@@ -325,34 +328,40 @@ def march(model, coefficients, workspace):
     left = product(model.q, (n * up, -n * y, n * x, 0.0))
     store(0, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
     row, until_rescale, until_sample = 0, RESCALE, every
-    for step_number in range(1, n_steps + 1):
-        r = 1.0 / (1.0 - mS1 * (s * s))
-        s1, c1 = (s * CD1 + S1 * (c * d)) * r, (c * C1 - SD1 * (s * d)) * r
-        f = 1.5 - 0.5 * (s1 * s1 + c1 * c1)
-        s1, c1 = s1 * f, c1 * f
-        d1 = math.sqrt(mc + m * (c1 * c1))
-        q0, q1, q2, q3 = y0 + y0s * (s * s1), y1 * (c + c1), y2 * (s + s1), y3 * (d + d1)
-        x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
-        re, im = q0 * up - y * q1 + x * q2, q3 * up + y * q2 + x * q1
-        z_re, z_im = z_re * re - z_im * im, z_re * im + z_im * re
-        s, c, d = s1, c1, d1
-        until_rescale -= 1
-        if until_rescale == 0:
-            until_rescale = RESCALE
-            n = 1.0 / math.hypot(z_re, z_im)
-            z_re, z_im = z_re * n, z_im * n
-        until_sample -= 1
-        if until_sample == 0 or step_number == n_steps:
-            until_sample = every
-            row += 1
-            store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
+    done = 0
+    while done < n_steps:
+        last = end_of_block(done, n_steps, pause)
+        for step_number in range(done + 1, last + 1):
+            r = 1.0 / (1.0 - mS1 * (s * s))
+            s1, c1 = (s * CD1 + S1 * (c * d)) * r, (c * C1 - SD1 * (s * d)) * r
+            f = 1.5 - 0.5 * (s1 * s1 + c1 * c1)
+            s1, c1 = s1 * f, c1 * f
+            d1 = math.sqrt(mc + m * (c1 * c1))
+            q0, q1, q2, q3 = y0 + y0s * (s * s1), y1 * (c + c1), y2 * (s + s1), y3 * (d + d1)
+            x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
+            re, im = q0 * up - y * q1 + x * q2, q3 * up + y * q2 + x * q1
+            z_re, z_im = z_re * re - z_im * im, z_re * im + z_im * re
+            s, c, d = s1, c1, d1
+            until_rescale -= 1
+            if until_rescale == 0:
+                until_rescale = RESCALE
+                n = 1.0 / math.hypot(z_re, z_im)
+                z_re, z_im = z_re * n, z_im * n
+            until_sample -= 1
+            if until_sample == 0 or step_number == n_steps:
+                until_sample = every
+                row += 1
+                store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
+        done = last
+        if done < n_steps:
+            call_handlers()
     return Result(n_steps, n_steps, 0, None, 0.0, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
 
 
-@kernel
+@entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])

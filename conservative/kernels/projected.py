@@ -17,14 +17,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import kernel, small
+from . import entry, kernel, small
 from .fields import body_torque, energy, in_body
 from .protocol import Result, Workspace, find_ends, loosen
+from .signals import call_handlers, end_of_block
 from .simd import LANES, four, fuse, join, lane, put, splat, spread
 from .vector import add, cross, dot, product, scale, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
+PAUSE = 2**14
+"""Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
 ROUND_OFF = 2.0**-51
 """Largest relative defect that counts as none."""
@@ -163,7 +166,7 @@ def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
     J_inverse, field, axis, scales, q, L = model
     weights, columns, starts, h = coefficients
-    n_steps, every, q_out, L_out = workspace
+    n_steps, every, pause, q_out, L_out = workspace
     weights = weights.copy()
     weights[: starts[-2]] *= h
     stages = len(starts) - 2
@@ -171,25 +174,31 @@ def march(model, coefficients, workspace):
     q_out[0, :], L_out[0, :] = q, L
     kept = values(J_inverse, field, axis, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
-    for step in range(1, n_steps + 1):
-        q, L = take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes)
-        q, L, more, defect = project(J_inverse, field, axis, kept, scales, q, L)
-        corrections += more
-        if not defect < LEFT:
-            done = (step - 1) * stages
-            return Result(step - 1, done, corrections, done, defect, False)
-        until_sample -= 1
-        if until_sample == 0 or step == n_steps:
-            until_sample = every
-            row += 1
-            q_out[row, :], L_out[row, :] = q, L
+    done = 0
+    while done < n_steps:
+        last = end_of_block(done, n_steps, pause)
+        for step in range(done + 1, last + 1):
+            q, L = take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes)
+            q, L, more, defect = project(J_inverse, field, axis, kept, scales, q, L)
+            corrections += more
+            if not defect < LEFT:
+                work = (step - 1) * stages
+                return Result(step - 1, work, corrections, work, defect, False)
+            until_sample -= 1
+            if until_sample == 0 or step == n_steps:
+                until_sample = every
+                row += 1
+                q_out[row, :], L_out[row, :] = q, L
+        done = last
+        if done < n_steps:
+            call_handlers()
     return Result(n_steps, n_steps * stages, corrections, n_steps * stages, defect, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
 
 
-@kernel
+@entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])

@@ -24,11 +24,14 @@ from . import small
 class Workspace(NamedTuple):
     """Samples to fill: of attitudes q (n, 4), of any length, and momenta L (n, 3), kg m^2/s, both in principal axes.
 
-    They are the start, every `every`-th of n_steps steps, and the last.
+    They are the start, every `every`-th of n_steps steps, and the last. After about `pause` units of work handlers of signals
+    are called (`signals`), 0: never. What a unit is, and how many there are in 20 ms or so, the constant `PAUSE` of a kernel's
+    file says. Results are the same whatever it is, bit for bit.
     """
 
     n_steps: int
     every: int
+    pause: int
     q: Any
     L: Any
 

@@ -23,13 +23,17 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from . import kernel, small
+from . import entry, kernel, small
 from .fields import body_torque, finite_torque
 from .protocol import Result, Workspace, find_ends, loosen
+from .signals import call_handlers, end_of_block
 from .vector import accumulate, add, apply, cross, dot, inverse, product, scale, subtract, times
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
+PAUSE = 2**17
+"""Stages between two calls of handlers of signals; one that `continue_branch` solves counts as DEAR of them."""
+DEAR = 64
 MAX_ITERATIONS = 30
 FEW = 4
 """Newton is trusted with at most so many corrections."""
@@ -215,37 +219,47 @@ def march(model, coefficients, workspace):
     continuous branch; the size then is the residual where the branch ends.
     """
     J, J_inverse, field = model.J, model.J_inverse, model.field
-    n_steps, every, q_out, L_out = workspace
+    n_steps, every, pause, q_out, L_out = workspace
     lengths = coefficients.lengths
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
     q_out[0, :] = model.q
     L_out[0, :] = model.L
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
-    at, row, corrections = (1, 0), 0, 0
+    at, row, corrections, history = (1, 0), 0, 0, no_history()
+    block = -(-pause // len(lengths))
+    left = block
     while True:
-        at, row, more, size, state = take_steps(
-            lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out
+        first = at[0]
+        last = end_of_block(first - 1, n_steps, left)
+        at, row, more, size, state, history = take_steps(
+            lengths, n_steps, last, every, J, J_inverse, field, tolerance, at, row, state, history, q_out, L_out
         )
         corrections += more
         step, stage = at
         if step > n_steps:
             return Result(n_steps, n_steps * len(lengths), corrections, None, size, False)
-        q, q_carry, L, L_carry = state
-        h = lengths[stage]
-        a, gain, more, size, found = continue_branch(h, J, J_inverse, field, q, L, L_carry, tolerance)
-        corrections += more
-        if not found:
-            elsewhere = find_solution(h, J, J_inverse, field, q, L)
-            return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
-        L, L_carry = add_momentum(L, L_carry, gain)
-        q, q_carry = turn_attitude(a, q, q_carry)
-        at, state = (step, stage + 1), (q, q_carry, L, L_carry)
+        if step <= last:
+            q, q_carry, L, L_carry = state
+            h = lengths[stage]
+            a, gain, more, size, found = continue_branch(h, J, J_inverse, field, q, L, L_carry, tolerance)
+            corrections += more
+            if not found:
+                elsewhere = find_solution(h, J, J_inverse, field, q, L)
+                return Result(step - 1, (step - 1) * len(lengths), corrections, None, size, elsewhere)
+            L, L_carry = add_momentum(L, L_carry, gain)
+            q, q_carry = turn_attitude(a, q, q_carry)
+            at, state, history = (step, stage + 1), (q, q_carry, L, L_carry), no_history()
+            left -= DEAR
+        left -= step - first
+        if left <= 0 < pause:
+            left = block
+            call_handlers()
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
 
 
-@kernel
+@entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
@@ -253,8 +267,8 @@ def enter(*loose):
 
 
 @kernel
-def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row, state, q_out, L_out):
-    """Take steps from a step and stage on, to the end or to a stage whose solution is not trusted; return where that is.
+def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at, row, state, history, q_out, L_out):
+    """Take steps from a step and stage on, up to step `last` or a stage whose solution is not trusted; return where that is.
 
     What is rare is left to `march`, so that this loop has the registers for itself: a call in it costs a quarter more.
     """
@@ -262,11 +276,8 @@ def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row,
     q, q_carry, L, L_carry = state
     corrections, size = 0, 0.0
     until_sample = every - (first_step - 1) % every
-    # One stage a step: the last six solutions are equally spaced in time, and their extrapolation beats the explicit guess.
-    unknown = (math.nan, math.nan, math.nan)
-    past = (unknown, unknown, unknown, unknown, unknown, unknown)
-    known = 0
-    for step in range(first_step, n_steps + 1):
+    known, past = history
+    for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
             h = lengths[stage]
             if known >= 6:
@@ -276,7 +287,7 @@ def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row,
             a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:
-                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry)
+                return (step, stage), row, corrections, size, (q, q_carry, L, L_carry), (known, past)
             if len(lengths) == 1:
                 change = subtract(a, past[0])
                 known = known + 1 if dot(change, change) <= SMOOTH * dot(a, a) else 0
@@ -290,7 +301,17 @@ def take_steps(lengths, n_steps, every, J, J_inverse, field, tolerance, at, row,
             row += 1
             q_out[row, :] = q
             L_out[row, :] = L
-    return (n_steps + 1, 0), row, corrections, size, (q, q_carry, L, L_carry)
+    return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry), (known, past)
+
+
+@small
+def no_history():
+    """How many of the last solutions are known, none, and the last six, newest first.
+
+    With one stage a step they are equally spaced in time, and their extrapolation beats the explicit guess.
+    """
+    unknown = (math.nan, math.nan, math.nan)
+    return 0, (unknown, unknown, unknown, unknown, unknown, unknown)
 
 
 @small

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
-from . import kernel
+from . import entry
+from .signals import call_handlers, end_of_block
 from .vector import product
 
+BLOCK = 2**18
+"""Samples between two calls of handlers of signals."""
 
-@kernel
+
+@entry
 def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
     """Fill R_WB (n, 3, 3) and w_WB_B (n, 3) from the first n of q (., 4), of any length, and L (., 3), at times t (.,).
 
@@ -16,30 +20,36 @@ def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
     principal and body axes are the same. Either leaves out its products. Returns how many of the first are finite.
     """
     finite = 0
-    for i in range(len(R_WB)):
-        rates = (L[i, 0] * J_inverse[0], L[i, 1] * J_inverse[1], L[i, 2] * J_inverse[2])
-        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        if spin is not None:
-            cos, sin = math.cos(0.5 * spin[0] * t[i]), math.sin(0.5 * spin[0] * t[i])
-            w, x, y, z = product((w, x, y, z), (cos, 0.0, 0.0, sin))
-            c, s = 1.0 - 2.0 * sin * sin, 2.0 * sin * cos
-            rates = (c * rates[0] + s * rates[1], c * rates[1] - s * rates[0], L[i, 2] * spin[1])
-        s = 2.0 / (w * w + x * x + y * y + z * z)
-        rows = (
-            (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
-            (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)),
-            (s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)),
-        )
-        size = 0.0
-        for j in range(3):
-            if R_BP is None:
-                R_WB[i, j, 0], R_WB[i, j, 1], R_WB[i, j, 2] = rows[j]
-                w_WB_B[i, j] = rates[j]
-            else:
-                for k in range(3):
-                    R_WB[i, j, k] = rows[j][0] * R_BP[k, 0] + rows[j][1] * R_BP[k, 1] + rows[j][2] * R_BP[k, 2]
-                w_WB_B[i, j] = R_BP[j, 0] * rates[0] + R_BP[j, 1] * rates[1] + R_BP[j, 2] * rates[2]
-            size += abs(R_WB[i, j, 0]) + abs(R_WB[i, j, 1]) + abs(R_WB[i, j, 2]) + abs(w_WB_B[i, j])
-        if finite == i and math.isfinite(size):
-            finite = i + 1
+    done, n = 0, len(R_WB)
+    while done < n:
+        last = end_of_block(done, n, BLOCK)
+        for i in range(done, last):
+            rates = (L[i, 0] * J_inverse[0], L[i, 1] * J_inverse[1], L[i, 2] * J_inverse[2])
+            w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+            if spin is not None:
+                cos, sin = math.cos(0.5 * spin[0] * t[i]), math.sin(0.5 * spin[0] * t[i])
+                w, x, y, z = product((w, x, y, z), (cos, 0.0, 0.0, sin))
+                c, s = 1.0 - 2.0 * sin * sin, 2.0 * sin * cos
+                rates = (c * rates[0] + s * rates[1], c * rates[1] - s * rates[0], L[i, 2] * spin[1])
+            s = 2.0 / (w * w + x * x + y * y + z * z)
+            rows = (
+                (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
+                (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)),
+                (s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)),
+            )
+            size = 0.0
+            for j in range(3):
+                if R_BP is None:
+                    R_WB[i, j, 0], R_WB[i, j, 1], R_WB[i, j, 2] = rows[j]
+                    w_WB_B[i, j] = rates[j]
+                else:
+                    for k in range(3):
+                        R_WB[i, j, k] = rows[j][0] * R_BP[k, 0] + rows[j][1] * R_BP[k, 1] + rows[j][2] * R_BP[k, 2]
+                    w_WB_B[i, j] = R_BP[j, 0] * rates[0] + R_BP[j, 1] * rates[1] + R_BP[j, 2] * rates[2]
+                size += abs(R_WB[i, j, 0]) + abs(R_WB[i, j, 1]) + abs(R_WB[i, j, 2]) + abs(w_WB_B[i, j])
+            if finite == i and math.isfinite(size):
+                finite = i + 1
+        done = last
+        if done < n:
+            call_handlers()
     return finite

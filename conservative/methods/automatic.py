@@ -28,6 +28,7 @@ from ..errors import AccuracyNotReached, IntegrationFailed, MissingEngine, Unsup
 from ..method import Grid, Method, Role
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
+from .units import bound_rate
 
 SAFETY = 0.5
 """Share of the wanted error that steps are chosen for."""
@@ -117,11 +118,6 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
     return (_count_work(method, trajectory) / duration if math.isfinite(estimate) else math.inf), grid.dt
 
 
-def bound_rate(scene: Scene) -> float:
-    """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
-    return math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-
-
 def _count_work(method: Method, trajectory: Trajectory) -> float:
     """Return a count of work: corrections and steps, weighted by what they cost beside those of the other candidates."""
     return method.cost.correction * (trajectory.counters.iterations or 0) + method.cost.step * trajectory.counters.steps
@@ -131,19 +127,19 @@ def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int
     """Return a grid of an even number of steps of at most dt."""
     if spacing is None:
         n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
-        return Grid(t_end / n, n, sample_every)
+        return Grid(t_end / n, n, min(sample_every, n))
     each = 2 * max(1, math.ceil(spacing / dt / 2 * (1 - 1e-9)))
     n = each * math.ceil(t_end / spacing * (1 - 1e-9))
-    return Grid(spacing / each, n, each * sample_every)
+    return Grid(spacing / each, n, min(each * sample_every, n))
 
 
 def _run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
     """Return the estimated error, rad, inf where a run fails, and the trajectory of a run, from one more at twice the step."""
-    fine = method.prepare(scene, grid)()
+    fine = method.solve(scene, grid)
     # Half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
     stride = 1 + grid.every % 2
     try:
-        coarse = method.prepare(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))()
+        coarse = method.solve(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))
     except (IntegrationFailed, MissingEngine, Unsupported):
         return math.inf, fine
     if not (fine.ok and coarse.ok):

@@ -15,7 +15,9 @@ from ..declarations import Claims
 from ..errors import NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Counters, Trajectory
+from ..trajectory import Bounds, Counters, Trajectory
+from .bounds import bounds_of
+from .units import in_own_units
 
 MAX_ITERATIONS = 20
 Linearisation = Callable[[Array, Array], tuple[Array, Array]]
@@ -54,10 +56,14 @@ class Convected(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis"})
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid, self.tol, None)
+
     @classmethod
     def picture_settings(cls) -> tuple[Convected, ...]:
         return (cls(),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         from ..kernels.convected import G, conjugate_momentum
 

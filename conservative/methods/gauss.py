@@ -10,17 +10,20 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, triple
-from ..check import choice, positive_integer
+from ..check import choice, describe, positive_integer
 from ..declarations import README, Candidacy, Claims, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.gauss_legendre import MOST_STAGES, tableau
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start, quadruple
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Gauss(Method):
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"
         if positive_integer("stages", self.stages, allowed) > MOST_STAGES:
-            raise BadInput("stages", self.stages, allowed)
+            raise BadInput("stages", describe(self.stages), allowed)
         choice("frame", self.frame, FRAMES)
 
     @property
@@ -71,6 +74,9 @@ class Gauss(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     @property
     def cost(self) -> Cost:
@@ -93,6 +99,7 @@ class Gauss(Method):
     def audit_settings(cls) -> tuple[Gauss, ...]:
         return (cls(2),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernels("gauss"), model, find_coefficients(self.stages, grid.dt))

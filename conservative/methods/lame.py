@@ -36,12 +36,19 @@ from typing import Any, ClassVar
 
 from ..declarations import README, Candidacy, Claims
 from ..deferred_imports import kernels
+from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import bound_rate, in_own_units
+
+MOST_RADIANS = 1e6
+"""Largest turn in a step, rad, by all the energy there is: it takes as many parts, and half of the digits of the phase."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class Lame(Method):
 
     Accuracy does not depend on dt: one step is about 1e-15 off in attitude, and such errors add up. Energy, momenta and
     orthonormality are kept to round-off. A step longer than about half a period of nutation is taken in equal parts, which
-    `Counters.stages` counts.
+    `Counters.stages` counts; one in which the body could turn by more than 10^6 rad is refused with `BadInput`.
 
     References: F. Klein and A. Sommerfeld, Theorie des Kreisels, for alpha and beta as elliptic functions of the second kind;
     E. T. Whittaker and G. N. Watson, Modern Analysis, chapters 20 and 23, for p and Lame's equation.
@@ -71,12 +78,32 @@ class Lame(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "axial momentum"})
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
+
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
             return "needs uniform gravity"
         return frame_unsupported("non_spinning", scene) and "body and field symmetric about one axis"
 
+    def longest_step(self, scene: Scene) -> float:
+        return MOST_RADIANS / bound_rate(scene)
+
     def prepare(self, scene: Scene, grid: Grid) -> Run:
+        """Return the run of a scene, as `Method.prepare` has it.
+
+        Raises
+        ------
+        BadInput
+            The step is longer than `longest_step`, s.
+        """
+        longest = self.longest_step(scene)
+        if grid.dt > longest:
+            raise BadInput("dt", f"{grid.dt:g}", f"a turn of {MOST_RADIANS:g} rad at most: up to {longest:g} s")
+        return self._prepare(scene, grid)
+
+    @in_own_units
+    def _prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 

@@ -9,13 +9,17 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
+from ..check import choice, length
 from ..declarations import README, Candidacy, Claims
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
+from .units import converted, find_units, in_own_units
 
 ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
 LONGEST, LONGEST_EXACT = 1.5, 6.0
@@ -67,13 +71,16 @@ class MoserVeselov(_Fields, Method):
     kernel: ClassVar[str] = "moser_veselov"
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
-        if order is not None and (isinstance(order, bool) or order not in ORDERS):
-            raise BadInput("order", repr(order), "one of " + ", ".join(repr(order) for order in ORDERS))
+        if order is not None:
+            choice("order", order, ORDERS)
         super().__init__(None if order == "exact" else order)
 
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         return None if scene.free else "it is for free bodies"
@@ -98,6 +105,14 @@ class MoserVeselov(_Fields, Method):
         return (cls(4),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
+        require_short_step(scene, grid.dt, exact=self.order is None)
+        try:
+            return self._prepare(scene, grid)
+        except BadInput:  # in units of our own
+            raise BadInput("dt", f"{grid.dt:g}, for which {self.name} has no step", "a shorter step") from None
+
+    @in_own_units
+    def _prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model, coefficients = scene.derive(calibrate, self, grid.dt)
         return prepare_run(scene, grid, label, start, kernels("moser_veselov"), model, coefficients)
 
@@ -108,13 +123,12 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, Princ
     Raises
     ------
     BadInput
-        dt is too long.
+        The form of the quaternion has no step of this length.
     """
-    require_short_step(scene, dt, exact=method.order is None)
     kernel, (start, polhode) = kernels("moser_veselov"), scene.derive(find_polhode)
     step = kernel.exact_step(polhode, dt) if method.order is None else kernel.preprocessed_step(polhode, dt, method.order)
     if not (math.isfinite(step.r0) and step.C > SMALLEST_CN):
-        raise BadInput("dt", f"{dt:g}, for which {method.name} has no step", "a shorter step")
+        raise BadInput("dt", f"{dt:g}", "a shorter step")
     return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
@@ -122,19 +136,20 @@ def require_short_step(scene: Scene, dt: float, exact: bool) -> None:
     """Raise `BadInput` unless dt, s, is below `step_limit`."""
     bound = step_limit(scene, exact)
     if dt >= bound:
-        turn = float(np.linalg.norm(scene.w_WB_B0)) * dt
+        turn = length(scene.w_WB_B0) * dt
         rule = f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"|w| dt < {LONGEST:g}"
         raise BadInput("dt", f"{dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
 
 
 def step_limit(scene: Scene, exact: bool) -> float:
     """Return the step, s, from which on steps are refused; infinite for a body at rest."""
-    speed = float(np.linalg.norm(scene.w_WB_B0))
+    speed = length(scene.w_WB_B0)
     if speed == 0:
         return math.inf
     if not exact:
         return LONGEST / speed
-    nu = abs(scene.derive(find_polhode)[1].nu)
+    units = find_units(scene, scene.dt)
+    nu = abs(scene.derive(converted, units).derive(find_polhode)[1].nu) / units.time
     return min(LONGEST_EXACT / speed, LONGEST_SHIFT / nu if nu > 0 else math.inf)
 
 

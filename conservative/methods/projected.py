@@ -13,9 +13,12 @@ from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,9 @@ class Projected(Method):
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
+
     @property
     def cost(self) -> Cost:
         return Cost(step=340.0, correction=80.0)
@@ -53,6 +59,7 @@ class Projected(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
         coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, grid.dt)

@@ -13,10 +13,13 @@ from ..declarations import README, Candidacy, Claims, Cost, SameErrors
 from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
+from ..trajectory import Bounds
+from .bounds import bounds_of
 from .coefficients.compositions import BEST, composition_of
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
+from .units import in_own_units
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,9 @@ class Reduced(Method):
         kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
         return kept | {"energy"} if self.frame == "body" else kept
 
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid, self.tol)
+
     @property
     def cost(self) -> Cost:
         return Cost(step=10.0, correction=50.0)
@@ -103,6 +109,7 @@ class Reduced(Method):
     def picture_settings(cls) -> tuple[Reduced, ...]:
         return (cls(),)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model = scene.derive(convert, self)
         coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from threading import get_ident, main_thread
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,12 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
     `start` is what its samples, in principal axes, are turned back with.
     """
     n, n_steps, Result = grid.n_samples, grid.n_steps, kernels("protocol").Result
-    # Of the workspace only q and L are new in each run. Its count is checked by `enter`, that of the result by its class.
+    # Of the workspace, the last three are of each run. Its count is checked by `enter`, that of the result by its class.
     enter = partial(kernel.enter, *model, *coefficients, n_steps, grid.every)
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        result = Result(*enter(q, L))
+        result = Result(*enter(kernel.PAUSE if in_main_thread() else 0, q, L))
         done = result.done
         t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.count_samples(done), q, L)
         if failure is None and done < n_steps:
@@ -37,6 +38,11 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
         return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
 
     return run
+
+
+def in_main_thread() -> bool:
+    """Whether this is the thread that Python calls handlers of signals in."""
+    return get_ident() == main_thread().ident
 
 
 def turn_back(

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .. import registry
-from ..check import positive_integer
+from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
-from ..trajectory import Trajectory
+from ..trajectory import Bounds, Trajectory
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Substepped(Method):
         positive_integer("most", self.most)
         allowed = "the name of a method of ours with a step, such as 'reduced:order=4'"
         if not isinstance(self.method, str) or self.method.partition(":")[0] == self.family:
-            raise BadInput("method", repr(self.method), allowed)
+            raise BadInput("method", describe(self.method), allowed)
         if self.inner.order is None or self.inner.role != Role.OURS:
-            raise BadInput("method", repr(self.method), allowed)
+            raise BadInput("method", describe(self.method), allowed)
 
     @property
     def inner(self) -> Method:
@@ -61,6 +61,9 @@ class Substepped(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return self.inner.conserves
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return self.inner.bounds(scene, Grid(grid.dt / self.most, grid.n_steps * self.most))
 
     def unsupported(self, scene: Scene) -> str | None:
         return self.inner.unsupported(scene)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import finite_array, positive_number, read_only
+from ..check import build_unchecked, finite_array, positive_number, power_of_two, read_only
 from ..errors import BadInput
 
 _UNIT = 4 * np.finfo(float).eps
@@ -81,6 +81,12 @@ class GravityGradient(_Fields):
     def scale(self) -> float:
         """Return the largest V, J."""
         return self.rate**2 / 2 * float(np.linalg.eigvalsh(self.inertia)[-1])
+
+    def in_units(self, energy: float) -> GravityGradient:
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        rate = power_of_two(self.rate)
+        inertia = self.inertia * rate * rate / energy
+        return build_unchecked(GravityGradient, rate=self.rate / rate, inertia=inertia, direction_W=self.direction_W)
 
     @property
     def axis_W(self) -> Array:

@@ -2,16 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..attitude import Array
-from ..errors import BadInput
+from ..check import describe, real_array
+from ..errors import PotentialFailed
 
 EnergyFunction = Callable[[Array], float]
 GradientFunction = Callable[[Array], Array]
+
+
+@contextmanager
+def _blamed() -> Iterator[None]:
+    """Turn whatever goes wrong in a function that is not ours into `PotentialFailed`, with that as its cause."""
+    try:
+        yield
+    except Exception as error:
+        raise PotentialFailed(error) from error
+
+
+@dataclass(frozen=True)
+class Product:
+    """A function of a matrix (3, 3) times a constant: called, it gives the product, a number or a matrix."""
+
+    function: Callable[[Array], Any]
+    factor: float
+
+    def __call__(self, R: Array) -> Any:
+        """Return the product, in the function's unit."""
+        return self.function(R) * self.factor
 
 
 @dataclass(frozen=True)
@@ -21,8 +45,14 @@ class Energy:
     function: EnergyFunction
 
     def at(self, R: Array) -> float:
-        """Return V, J, at a matrix (3, 3)."""
-        return float(self.function(R.copy()))
+        """Return V, J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives no real number."""
+        with _blamed():
+            found = self.function(R.copy())
+            if type(found) is float:
+                return found
+            if isinstance(found, bool | str | bytes) or np.ndim(found):
+                raise TypeError(f"the energy is {describe(found)}, not a real number")
+            return float(found)
 
     def __call__(self, R_WB: Array) -> Array:
         """Return V, (...), in J."""
@@ -37,11 +67,13 @@ class Gradient:
     function: GradientFunction
 
     def at(self, R: Array) -> Array:
-        """Return dV/dR, (3, 3), in J, at a matrix (3, 3). Raise `BadInput` where the function gives another shape."""
-        gradient = np.asarray(self.function(R.copy()), dtype=float)
-        if gradient.shape != (3, 3):
-            raise BadInput("gradient", f"shape {gradient.shape}", "a function that returns a matrix (3, 3)")
-        return gradient
+        """Return dV/dR, (3, 3), in J, at a matrix (3, 3). Raise `PotentialFailed` where the function raises or gives none."""
+        with _blamed():
+            found = self.function(R.copy())
+            gradient = real_array(found)
+            if gradient is None or gradient.shape != (3, 3):
+                raise TypeError(f"the gradient is {describe(found)}, not a matrix (3, 3) of real numbers")
+            return gradient
 
     def __call__(self, R_WB: Array) -> Array:
         """Return dV/dR, (..., 3, 3), in J."""

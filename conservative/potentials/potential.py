@@ -23,6 +23,10 @@ class Potential(Protocol):
     the functions of `conservative.kernels.fields`: follow the example of `conservative/potentials/point_to_point.py` and
     `conservative/kernels/point_fields.py`. Whatever it is, `finite_derivative` must satisfy its identity to round-off, since
     energy is conserved to no better than that.
+
+    A potential may have one method more, `in_units(energy)`, which returns the same field with energies in units of `energy`, a
+    power of two, J. With it our methods do scenes of any size, as they integrate in units in which a scene is of order one;
+    without it such scenes are integrated as they are.
     """
 
     def energy(self, R_WB: Array) -> Array:

@@ -6,25 +6,24 @@ import ctypes
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import Array, cayley, from_quaternion, rotation_about, triple
-from ..check import positive_number, read_only
+from ..attitude import ROTATION_TOLERANCE, Array, cayley, from_quaternion, rotation_about, triple
+from ..check import build_unchecked, describe, finite_array, positive_number
 from ..errors import BadInput, PotentialFailed
-from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Size
+from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
 
 _PROBE = rotation_about((1.0, -2.0, 0.5), 0.9)
 _DIFFERENCE = 1e-5
 _NEWTON_DIFFERENCE = 1e-7
 _AGREEMENT = 1e-4
+_AXIS = "a unit vector (3,), world axes, about which the field is symmetric"
 _ROUND_OFF = 8 * 2.0**-53
 N_INPUTS, N_OUTPUTS = 27, 90
 """Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
-_CFunction = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +81,11 @@ class FunctionPotential(_Fields):
     ) -> None:
         for name, function in (("energy", energy), ("gradient", gradient)):
             if not callable(function):
-                raise BadInput(name, repr(function), "a function of a matrix (3, 3)")
+                raise BadInput(name, describe(function), "a function of a matrix (3, 3)")
         V = energy if isinstance(energy, Energy) else Energy(energy)
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient)
         _check_gradient(V, G)
-        axis = None if axis_W is None else read_only(np.array(axis_W, dtype=float))
-        super().__init__(V, G, _size(scale, G), axis)
+        super().__init__(V, G, _size(scale, G), None if axis_W is None else _check_axis(axis_W, G))
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return Gonzalez's discrete gradient V*, (3, 3), in J."""
@@ -105,36 +103,63 @@ class FunctionPotential(_Fields):
             return gradient
         return gradient + lacking / np.sum(step * step) * step
 
-    @cached_property
-    def _callback(self) -> Any:
-        return _CFunction(_Callback(self))
+    def in_units(self, energy: float) -> FunctionPotential:
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        V, G = Energy(Product(self.energy.at, 1 / energy)), Gradient(Product(self.gradient.at, 1 / energy))
+        return build_unchecked(FunctionPotential, energy=V, gradient=G, scale=Size(self.scale() / energy), axis_W=self.axis_W)
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the address of a C function, which lives as long as the potential, and the frame, row by row."""
+        """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
         from ..kernels.function_field import Function
 
-        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
-        return Function(address, *(triple(row) for row in R_BP))
+        # Atomic: of threads that come here at once, each gets the one that stays.
+        callback = self.__dict__.setdefault("_callback", _Callback(self))
+        return Function(id(callback), *(triple(row) for row in R_BP))
 
 
 def _check_gradient(energy: Energy, gradient: Gradient) -> None:
     """Compare the gradient with differences of the energy at one attitude."""
-    found, differences = gradient.at(_PROBE), np.empty((3, 3))
+    found, differences = _probe("gradient", gradient, _PROBE), np.empty((3, 3))
     for index in np.ndindex(3, 3):
         aside = np.zeros((3, 3))
         aside[index] = _DIFFERENCE
-        differences[index] = (energy.at(_PROBE + aside) - energy.at(_PROBE - aside)) / (2 * _DIFFERENCE)
+        ahead, behind = (float(_probe("energy", energy, _PROBE + sign * aside)) for sign in (1, -1))
+        differences[index] = (ahead - behind) / (2 * _DIFFERENCE)
     off = np.abs(differences - found).max()
     if not off <= _AGREEMENT * max(np.abs(found).max(), np.abs(differences).max()):
         raise BadInput("gradient", f"a matrix off by {off:.3g} J from differences of the energy", "the derivative of `energy`")
 
 
+def _probe(argument: str, function: Energy | Gradient, R: Array) -> Array:
+    """Return what a function gives at one attitude (3, 3); what it raises, and what is not finite, is bad input."""
+    allowed = "a function that gives a real number, J" if argument == "energy" else "a function that gives a matrix (3, 3), J"
+    try:
+        found = function.at(R)
+    except PotentialFailed as failure:
+        raise BadInput(argument, f"a function that fails: {describe(failure.__cause__)}", allowed) from failure.__cause__
+    return finite_array(argument, found, ((), (3, 3)), f"{allowed}, at every attitude")
+
+
+def _check_axis(axis_W: ArrayLike, gradient: Gradient) -> Array:
+    """Return the axis, if it is one: a unit vector (3,) along which the field has no torque."""
+    axis = finite_array("axis_W", axis_W, ((3,),), _AXIS)
+    if abs(np.linalg.norm(axis) - 1) > ROTATION_TOLERANCE:
+        raise BadInput("axis_W", describe(axis.tolist()), _AXIS)
+    found = _probe("gradient", gradient, _PROBE)
+    torque, size = abs(_moment(np.eye(3), _PROBE, found) @ axis), np.abs(found).max()
+    if torque > _AGREEMENT * size:
+        raise BadInput("axis_W", f"{axis.tolist()}, about which the field has a torque of {torque:.3g} N m", _AXIS)
+    return axis
+
+
 def _size(scale: float | Size | None, gradient: Gradient) -> Size:
     """Return the size of V that is given, or the largest of a few gradients."""
     if scale is not None:
-        return scale if isinstance(scale, Size) else Size(positive_number("scale", scale, "a finite energy above 0, J"))
+        value = scale.value if isinstance(scale, Size) else scale
+        return Size(positive_number("scale", value, "a finite energy above 0, J"))
     half_turns = from_quaternion(np.eye(4))
-    return Size(max(float(np.linalg.norm(gradient.at(R))) for R in (_PROBE, *half_turns, *(half_turns @ _PROBE))) or 1.0)
+    attitudes = (_PROBE, *half_turns, *(half_turns @ _PROBE))
+    return Size(max(float(np.linalg.norm(_probe("gradient", gradient, R))) for R in attitudes) or 1.0)
 
 
 class _Callback:
@@ -146,18 +171,14 @@ class _Callback:
     def __init__(self, potential: FunctionPotential) -> None:
         self.potential, self.last = potential, threading.local()
 
-    def __call__(self, what: int, address: int) -> int:
+    def __call__(self, what: int, address: int) -> None:
         buffer = np.ctypeslib.as_array((ctypes.c_double * (N_INPUTS + N_OUTPUTS)).from_address(address))
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
-        try:
-            if inputs != getattr(self.last, "inputs", None):  # residual and tangent of one iteration need the same
-                self.last.outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
-                self.last.inputs = inputs
-        except BaseException as error:  # none may pass through C, KeyboardInterrupt neither
-            PotentialFailed.pending.cause = error
-            return 1
-        buffer[N_INPUTS : N_INPUTS + len(self.last.outputs)] = self.last.outputs
-        return 0
+        known, outputs = getattr(self.last, "pair", (b"", buffer))
+        if inputs != known:  # residual and tangent of one iteration need the same
+            outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
+            self.last.pair = inputs, outputs  # at once: an interrupt may come anywhere
+        buffer[N_INPUTS : N_INPUTS + len(outputs)] = outputs
 
     def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
         functions = (_body_torque, _finite_torque, _finite_derivative, _energy)

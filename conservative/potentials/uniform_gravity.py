@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import finite_array, finite_number
+from ..check import build_unchecked, finite_array, finite_number, length, power_of_two
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,12 @@ class UniformGravity(_Fields):
 
     def scale(self) -> float:
         """Return weight times lever arm, J."""
-        return float(np.linalg.norm(self.moment_B))
+        return length(self.moment_B)
+
+    def in_units(self, energy: float) -> UniformGravity:
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        lever = power_of_two(float(np.abs(self.com_B).max()))
+        return build_unchecked(UniformGravity, weight=self.weight * lever / energy, com_B=self.com_B / lever)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the moment in principal axes as the kernels want it."""

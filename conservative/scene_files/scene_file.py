@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
-from ..check import finite_array, finite_number, rotation
+from ..check import describe, finite_array, finite_number, rotation
 from ..deferred_imports import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
@@ -69,6 +70,8 @@ def load(path: str | Path) -> Scene:
     MissingEngine
         The body stands in another file whose engine is not installed.
     """
+    if not isinstance(path, str | PathLike):
+        raise BadInput("path", describe(path), "the path of a file")
     top = read(Path(path))
     top.only(_TOP)
     t_end = top.value("t_end", "a finite duration above 0, s")
@@ -182,7 +185,7 @@ def _axis_angle(axis: ArrayLike, angle: float) -> Array:
 def _direction(argument: str, value: ArrayLike, size: int, allowed: str) -> Array:
     found = finite_array(argument, value, ((size,),), allowed)
     if not found.any():
-        raise BadInput(argument, repr(value), allowed)
+        raise BadInput(argument, describe(value), allowed)
     return found / np.abs(found).max()
 
 

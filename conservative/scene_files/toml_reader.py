@@ -18,6 +18,8 @@ Built = TypeVar("Built")
 
 LARGEST = 1_000_000
 """Bytes of a file that are read at most: a scene has less than a hundredth of it."""
+MOST_LINES = 100
+"""Lines of one statement: finding its end takes the square of them, seconds at this limit."""
 
 
 class BadFile(BadInput):
@@ -128,7 +130,8 @@ def read(path: Path) -> Table:
     Raises
     ------
     BadFile
-        The file cannot be read, is not text in UTF-8, is larger than `LARGEST`, or is not TOML.
+        The file cannot be read, is not text in UTF-8, is larger than `LARGEST`, has a statement of more than `MOST_LINES`
+        lines, or is not TOML.
     """
     allowed = "a TOML file that can be read; `conservative new` writes one"
     try:
@@ -139,6 +142,8 @@ def read(path: Path) -> Table:
         raise BadFile(path, None, "", error.strerror or str(error), allowed) from None
     except UnicodeDecodeError as error:
         raise BadFile(path, content[: error.start].count(b"\n") + 1, "", "bytes that are not UTF-8", allowed) from None
+    except ValueError as error:  # a NUL in the path
+        raise BadFile(path, None, "", str(error), allowed) from None
     if len(content) > LARGEST:
         raise BadFile(path, None, "", f"more than {LARGEST} bytes", allowed)
     try:
@@ -147,14 +152,18 @@ def read(path: Path) -> Table:
         found = re.search(r"line (\d+)", str(error))
         line = int(found[1]) if found else source.rstrip().count("\n") + 1
         raise BadFile(path, line, "", f"what is not TOML: {error}", "TOML 1.0") from None
-    return Table(path, (), values, key_lines(source))
+    try:
+        return Table(path, (), values, key_lines(source))
+    except OverflowError as error:
+        raise BadFile(path, error.args[0], "", f"a statement of more than {MOST_LINES} lines", "shorter ones") from None
 
 
 def key_lines(source: str) -> dict[Key, int]:
     """Return the line, from 1, on which every key of a valid TOML text first stands.
 
     `tomllib` does not report lines. A TOML file is a sequence of statements, and no proper prefix of a statement is valid TOML,
-    so growing the text line by line until it parses finds where each ends.
+    so growing the text line by line until it parses finds where each ends. Raise `OverflowError`, with its line, for a
+    statement of more than `MOST_LINES` lines.
     """
     lines: dict[Key, int] = {}
     header: Key = ()
@@ -164,6 +173,8 @@ def key_lines(source: str) -> dict[Key, int]:
         try:
             found = tomllib.loads(statement)
         except tomllib.TOMLDecodeError:
+            if number - start >= MOST_LINES:
+                raise OverflowError(start) from None
             continue
         is_header = statement.lstrip().startswith("[")
         keys = list(_paths(found, () if is_header else header))

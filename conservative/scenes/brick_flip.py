@@ -29,11 +29,8 @@ def brick_flip(disturbance: float = DEFAULT_DISTURBANCE, spin: float = DEFAULT_S
     BadInput
         An argument is not finite, or t_end, s, is not above 0.
     """
-    rates = (
-        0.0,
-        finite_number("disturbance", disturbance, "a finite rate, rad/s"),
-        finite_number("spin", spin, "a finite rate, rad/s"),
-    )
+    disturbance = finite_number("disturbance", disturbance, "a finite rate, rad/s")
+    rates = (0.0, disturbance, finite_number("spin", spin, "a finite rate, rad/s"))
     name = "brick_flip" if disturbance == DEFAULT_DISTURBANCE else f"brick_flip_{disturbance:g}"
     return Scene(
         name,

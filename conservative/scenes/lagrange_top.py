@@ -60,11 +60,12 @@ def lagrange_top(
     positive_number("density", density)
     finite_number("gravity", gravity, "a finite number, m/s^2")
     mass, lever, J1, J3 = cone(height, density)
+    body = RigidBody((J1, J1, J3))  # first, as it refuses what has become too small to divide by
     spin = mass * gravity * lever / (J3 * precession) - (J3 - J1) / J3 * math.cos(tilt) * precession
     rates = (0.0, precession * math.sin(tilt), spin + precession * math.cos(tilt))
     return Scene(
         "lagrange_top",
-        RigidBody((J1, J1, J3)),
+        body,
         rotation_about((1, 0, 0), tilt),
         rates,
         2 * math.pi / abs(precession) * DEFAULT_PERIODS if t_end is None else t_end,

@@ -8,16 +8,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.check import choice, finite_number
+from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import gravity_or_free, symmetric_axes, version
+from ..engine import STEP_LIMIT, gravity_or_free, limit_reason, pace_reason, symmetric_axes, version
 from ..heyoka_equations import forms, formulations
 
 FRAMES = ("body", "non_spinning", "lean")
+
+SMALLEST_TOL = 1e-20
+"""A step of this tolerance has five terms more than one of 1e-16; smaller ones compile ever longer and gain nothing."""
 
 # Up to here it is cheaper (5 to 20 %) not to keep the polynomials of the steps for evaluation between their ends.
 _FEW_SAMPLES = 8
@@ -33,7 +36,7 @@ class Heyoka(Method):
     Parameters
     ----------
     tol
-        Relative error of a step, above 0 and below 1. Values below 2.2e-16 are round-off with a term or two more.
+        Relative error of a step, 1e-20 to below 1. Values below 2.2e-16 are round-off with a term or two more.
     frame
         "body": quaternion and body rates in principal axes, which is what anybody would write. "non_spinning", for a body
         symmetric about an axis, free or in a field along it: quaternion of the frame that turns with l/J1, and world momentum
@@ -58,8 +61,9 @@ class Heyoka(Method):
     module: ClassVar[str] = "heyoka"
 
     def __post_init__(self) -> None:
-        if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
-            raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
+        allowed = f"a number above 0, from {SMALLEST_TOL:g}, and below 1"
+        if not SMALLEST_TOL <= finite_number("tol", self.tol, allowed) < 1:
+            raise BadInput("tol", describe(self.tol), allowed)
         choice("frame", self.frame, FRAMES)
         version("heyoka", "heyoka")
 
@@ -84,13 +88,14 @@ class Heyoka(Method):
 
         def run() -> Trajectory:
             with integrators.borrow() as integrator:
-                integrator.time = 0.0
-                integrator.state[:] = problem.start
                 # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
                 integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-                states, steps, outcome = propagate(integrator, grid.t)
+                _reset(integrator, problem.start)
+                reason = pace_reason(scene, integrator, float(grid.t[-1]))
+                _reset(integrator, problem.start)
+                states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, grid.t)
             R_WF, w = problem.readout(grid.t[: len(states)], states)
-            return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), f"heyoka: {outcome.name}")
+            return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), reason)
 
         return run
 
@@ -104,20 +109,25 @@ class Heyoka(Method):
         return cls(1e-9), cls(1e-16)
 
 
-def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, Any]:
-    """Return states (n, m), number of steps and outcome of one call that evaluates the steps' polynomials at the samples."""
-    outcome, _, _, steps, _, states = integrator.propagate_grid(t)
-    return states, int(steps), outcome
+def _reset(integrator: Any, start: Array) -> None:
+    integrator.time = 0.0
+    integrator.state[:] = start
 
 
-def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, Any]:
+def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, str]:
+    """Return states (n, m), number of steps and how one call ended that evaluates the steps' polynomials at the samples."""
+    outcome, _, _, steps, _, states = integrator.propagate_grid(t, max_steps=STEP_LIMIT)
+    return states, int(steps), limit_reason(int(steps), 1.0) or f"heyoka: {outcome.name}"
+
+
+def _from_sample_to_sample(integrator: Any, t: Array) -> tuple[Array, int, str]:
     """Return the same, with steps cut at the samples."""
-    states, steps, outcome = np.full((len(t), len(integrator.state)), np.nan), 0, None
+    states, steps = np.full((len(t), len(integrator.state)), np.nan), 0
     states[0] = integrator.state
     for sample, time in enumerate(t[1:], start=1):
-        outcome, _, _, taken, *_ = integrator.propagate_until(time)
+        outcome, _, _, taken, *_ = integrator.propagate_until(time, max_steps=STEP_LIMIT - steps)
         steps += int(taken)
-        if not np.isfinite(integrator.state).all():
+        if steps >= STEP_LIMIT or not np.isfinite(integrator.state).all():
             break
         states[sample] = integrator.state
-    return states, steps, outcome
+    return states, steps, limit_reason(steps, 1.0) or f"heyoka: {outcome.name}"

@@ -1,28 +1,31 @@
 """Bodies out of model files, read by the engines' own parsers: MJCF by MuJoCo, URDF by Pinocchio.
 
 A body turns about its joint. What is welded to it moves with it and counts; what hangs on further joints does not. A body that
-is free turns about its centre of mass. Body axes are the file's own: those of the MJCF body or of the URDF link. Source: the
-two formats' documentation.
+is free turns about its centre of mass. Body axes are the file's own: those of the MJCF body or of the URDF link. A file is read
+in a process of its own, which has limits: an MJCF file of one line can ask for 10^5 copies of a body, and of those again.
+Source: the two formats' documentation.
 """
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+import json
+import os
+import subprocess
+import sys
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from conservative.attitude import Array
-from conservative.errors import BadInput, nearest
+from conservative.check import describe, printable_text
+from conservative.errors import BadInput, MissingEngine
 from conservative.shapes import MassDistribution
 
-from ..engine import load
+from ..engine import version
+from . import model_reader
+from .model_reader import CPU_SECONDS, ENGINES, MEMORY
 
-# Anchors of several joints of a body agree to this, relative to their distance from its origin, or the body has no fixed point.
-_SAME_POINT = 1e-9
+SECONDS = 60.0
+"""Time, s, after which a reader is ended, whatever it does: three times `CPU_SECONDS`, for busy machines."""
 
 
 def body_from_mjcf(path: str | PathLike[str], name: str) -> MassDistribution:
@@ -43,55 +46,7 @@ def body_from_mjcf(path: str | PathLike[str], name: str) -> MassDistribution:
     MissingEngine
         MuJoCo is not installed.
     """
-    mj = load("mujoco", "mujoco", "MuJoCo")
-    _require_xml(path, "mujoco")
-    try:
-        model = mj.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise _unusable(path, error, "an MJCF file that MuJoCo compiles") from None
-    names = [model.body(number).name for number in range(1, model.nbody)]
-    _require_name(path, name, names)
-    data = mj.MjData(model)
-    mj.mj_kinematics(model, data)
-    return _mujoco_body(mj, model, data, model.body(name).id)
-
-
-def _mujoco_body(mj: Any, model: Any, data: Any, body: int) -> MassDistribution:
-    """Return the body with all that is welded to it; poses are those of the model's reference configuration."""
-    origin, R_WB = data.xpos[body], data.xmat[body].reshape(3, 3)
-    parts = []
-    for part in np.flatnonzero(model.body_weldid == body):
-        R_BI = R_WB.T @ data.ximat[part].reshape(3, 3)
-        inertia = R_BI @ np.diag(model.body_inertia[part]) @ R_BI.T
-        parts.append((float(model.body_mass[part]), R_WB.T @ (data.xipos[part] - origin), inertia))
-    fixed_point = _mujoco_fixed_point(mj, model, data, body)
-    return _combine(parts, None if fixed_point is None else R_WB.T @ (fixed_point - origin))
-
-
-def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | None:
-    """Return where the body's joints hold it (3,), m, world axes; None if it is free."""
-    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    joints = range(first, first + count)
-    if any(model.jnt_type[joint] == int(mj.mjtJoint.mjJNT_FREE) for joint in joints):
-        return None
-    turning = (int(mj.mjtJoint.mjJNT_BALL), int(mj.mjtJoint.mjJNT_HINGE))  # NumPy's integers never equal the enumeration's
-    anchors = np.array([data.xanchor[joint] for joint in joints if model.jnt_type[joint] in turning])
-    if not len(anchors):
-        others = [
-            model.body(b).name for b in range(1, model.nbody) if np.isin(model.jnt_type[_joints(model, b)], turning).any()
-        ]
-        raise _not_turning(model.body(body).name, others)
-    spread = np.abs(anchors - anchors[0]).max()
-    if spread > _SAME_POINT * max(1.0, float(np.abs(anchors - data.xpos[body]).max())):
-        allowed = "a body whose ball joint or hinges go through one point"
-        raise BadInput("name", f"{model.body(body).name!r}, whose joints turn about points {spread:.3g} m apart", allowed)
-    fixed_point: Array = anchors[0]
-    return fixed_point
-
-
-def _joints(model: Any, body: int) -> slice:
-    first = int(model.body_jntadr[body])
-    return slice(first, first + int(model.body_jntnum[body]))
+    return _read("mjcf", path, name)
 
 
 def body_from_urdf(path: str | PathLike[str], name: str) -> MassDistribution:
@@ -112,66 +67,51 @@ def body_from_urdf(path: str | PathLike[str], name: str) -> MassDistribution:
     MissingEngine
         Pinocchio is not installed.
     """
-    pin = load("pinocchio", "pin", "Pinocchio")
-    _require_xml(path, "robot")
+    return _read("urdf", path, name)
+
+
+def _read(kind: str, path: object, name: object) -> MassDistribution:
+    """Return the body that a reader in a process of its own finds; raise what it says, here."""
+    _, package, engine = ENGINES[kind]
+    version(package, engine)
+    request = {"kind": kind, "path": _text_of(path), "name": printable_text("name", name, "the name of a body, a text")}
+    found = _ask({**request, "cpu_seconds": CPU_SECONDS})
+    if "bad" in found:
+        raise BadInput(*found["bad"])
+    if "missing" in found:
+        raise MissingEngine(*found["missing"])
+    return MassDistribution(found["mass"], found["com_B"], found["inertia_com"])
+
+
+def _text_of(path: object) -> str:
     try:
-        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-    except ValueError as error:
-        raise _unusable(path, error, "a URDF file that Pinocchio reads") from None
-    return _pinocchio_link(pin, model, path, name)
+        text = os.fsdecode(path)  # type: ignore[arg-type]
+    except TypeError:
+        raise BadInput("path", describe(path), "the path of a file") from None
+    if "\0" in text:
+        raise BadInput("path", describe(text), "the path of a file, without NUL")
+    return text
 
 
-def _pinocchio_link(pin: Any, model: Any, path: str | PathLike[str], name: str) -> MassDistribution:
-    """Return the link with all that is welded to it, which Pinocchio has as one; the link's axes are those of its joint."""
-    links = {frame.name: frame for frame in model.frames if frame.type == pin.FrameType.BODY}
-    _require_name(path, name, links)
-    owners = {link for link, frame in links.items() if model.frames[frame.parentFrame].type == pin.FrameType.JOINT}
-    kinds = {link: model.joints[links[link].parentJoint].shortname() for link in owners}
-    able = {
-        link for link, kind in kinds.items() if kind.startswith(("JointModelR", "JointModelSpherical", "JointModelFreeFlyer"))
-    }
-    if name not in able:
-        raise _not_turning(name, sorted(able))
-    inertia = model.inertias[links[name].parentJoint]
-    if not inertia.mass > 0:
-        raise BadInput("name", f"{name!r}, which has no mass", "a link with mass and inertia")
-    com = np.zeros(3) if kinds[name] == "JointModelFreeFlyer" else inertia.lever
-    return MassDistribution(inertia.mass, com, inertia.inertia)
-
-
-def _require_xml(path: str | PathLike[str], root: str) -> None:
-    """Raise `BadInput` unless a file can be read and is XML with the right root; the engines' parsers say less, or print it."""
-    allowed = f"a file of XML with the root element <{root}>"
+def _ask(request: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer of a reader; raise `BadInput` where its limits end it."""
+    command = [sys.executable or "python3", "-P", "-m", model_reader.__name__]
+    places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
+    environment = {**os.environ, "PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1"}
     try:
-        found = ElementTree.fromstring(Path(path).read_bytes()).tag
-    except OSError as error:
-        raise _unusable(path, error.strerror or error, allowed) from None
-    except ElementTree.ParseError as error:
-        raise _unusable(path, error, allowed) from None
-    if found != root:
-        raise _unusable(path, f"root element <{found}>", allowed)
+        done = subprocess.run(
+            command, input=json.dumps(request).encode(), capture_output=True, timeout=SECONDS, env=environment, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise _unreadable(request, f"{SECONDS:g} s") from None
+    except OSError as error:  # no memory for a process, or no Python where one is embedded
+        raise _unreadable(request, f"a reader that does not start: {error}") from None
+    if done.returncode != 0:
+        raise _unreadable(request, f"exit status {done.returncode} of the reader")
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
-def _unusable(path: str | PathLike[str], reason: object, allowed: str) -> BadInput:
-    return BadInput("path", f"{str(path)!r}: {' '.join(str(reason).split())}", allowed)
-
-
-def _require_name(path: str | PathLike[str], name: str, known: Iterable[str]) -> None:
-    if name not in known:
-        raise BadInput("name", f"{name!r}, which is not in {str(path)!r}", nearest(name, known))
-
-
-def _not_turning(name: str, others: list[str]) -> BadInput:
-    allowed = "one that a joint turns" + (": " + ", ".join(others) if others else "; this file has none")
-    return BadInput("name", f"{name!r}, which no joint turns", allowed)
-
-
-def _combine(parts: list[tuple[float, Array, Array]], fixed_point: Array | None) -> MassDistribution:
-    """Return bodies of given mass, centre (3,) and inertia (3, 3) about it as one; without a fixed point about its centre."""
-    mass = sum(m for m, _, _ in parts)
-    com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
-    inertia = np.zeros((3, 3))
-    for m, c, J in parts:
-        d = c - com
-        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
-    return MassDistribution(mass, np.zeros(3) if fixed_point is None else com - fixed_point, inertia)
+def _unreadable(request: dict[str, Any], end: str) -> BadInput:
+    allowed = f"a file that {ENGINES[request['kind']][2]} reads within {CPU_SECONDS} s and {MEMORY / 2**30:g} GiB"
+    return BadInput("path", f"{request['path']!r}, whose reading ended after {end}", allowed)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
-from conservative.check import choice, finite_number
+from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.potentials.potential import torque_W
@@ -17,7 +17,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import Axes, load, principal_axes, version
+from ..engine import Axes, limit_reason, load, principal_axes, version
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
@@ -58,7 +58,7 @@ class SciPy(Method):
         choice("integrator", self.integrator, INTEGRATORS)
         allowed = f"a number from {_SMALLEST_RTOL:g} (100 rounding units) to below 1"
         if not _SMALLEST_RTOL <= finite_number("rtol", self.rtol, allowed) < 1:
-            raise BadInput("rtol", repr(self.rtol), allowed)
+            raise BadInput("rtol", describe(self.rtol), allowed)
 
     @property
     def label(self) -> str:
@@ -82,11 +82,16 @@ class SciPy(Method):
             solver.steps = 0
             if not np.isfinite(derivative(0.0, start)).all():  # SciPy would look for a first step for ever
                 return axes.trajectory(grid, self.label, from_quaternion(start[None, :4]), start[None, 4:], Counters(0))
-            with np.errstate(all="ignore"):  # a diverging run is reported by its status
-                found = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
-            q, w = found.y[:4].T, found.y[4:].T
+            try:
+                with np.errstate(all="ignore"):  # a diverging run is reported by its status
+                    found = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
+            except (ArithmeticError, ValueError) as error:  # implicit solvers refuse matrices that are not finite or singular
+                return axes.trajectory(
+                    grid, self.label, from_quaternion(start[None, :4]), start[None, 4:], Counters(solver.steps), str(error)
+                )
+            y = np.reshape(found.y, (7, -1))  # SciPy has an empty list where the first step failed
             work = Counters(solver.steps, evaluations=int(found.nfev))
-            return axes.trajectory(grid, self.label, from_quaternion(q), w, work, found.message)
+            return axes.trajectory(grid, self.label, from_quaternion(y[:4].T), y[4:].T, work, found.message)
 
         return run
 
@@ -100,10 +105,14 @@ class SciPy(Method):
 
 
 def _count_steps(solver: Any) -> Any:
-    """Return the solver class with a count of its steps, which `solve_ivp` does not tell."""
+    """Return the solver class with a count of its steps, which `solve_ivp` does not tell, and a limit to it."""
 
     def step(self: Any) -> Any:
         counting.steps += 1
+        reason = limit_reason(counting.steps, float(self.t / self.t_bound))
+        if reason:
+            self.status = "failed"
+            return reason
         return solver.step(self)
 
     counting: Any = type(solver.__name__, (solver,), {"steps": 0, "step": step})

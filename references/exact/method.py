@@ -16,14 +16,15 @@ from numpy.typing import ArrayLike
 
 from conservative.attitude import Array
 from conservative.body import RigidBody
-from conservative.check import finite_array, rotation
+from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.bounds import bounds_of
 from conservative.potentials.potential import Potential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
-from conservative.trajectory import Counters, Trajectory
+from conservative.trajectory import Bounds, Counters, Trajectory
 from conservative.version import VERSION
 
 from .digits import MP_LOCK
@@ -109,7 +110,7 @@ def lagrange_top(
     """
     start, times = _start(body, R_WB0, w_WB_B0), _times(t)
     if not isinstance(potential, UniformGravity):
-        raise BadInput("potential", repr(potential), "a UniformGravity")
+        raise BadInput("potential", describe(potential), "a UniformGravity")
     reason = _reason(body, potential)
     if reason:
         raise Unsupported("potential", f"{potential!r} with {body!r}", f"what has a closed form ({reason})")
@@ -139,6 +140,9 @@ class Exact(Method):
     @property
     def conserves(self) -> frozenset[str]:
         return frozenset({"energy", "momentum", "vertical momentum", "axial momentum"})
+
+    def bounds(self, scene: Scene, grid: Grid) -> Bounds:
+        return bounds_of(scene, grid)
 
     def unsupported(self, scene: Scene) -> str | None:
         return _reason(_pendulum(scene) or scene.body, scene.potential)
@@ -181,7 +185,7 @@ def _reason(body: RigidBody, potential: Potential | None) -> str | None:
 
 def _start(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike) -> Start:
     if not isinstance(body, RigidBody):
-        raise BadInput("body", repr(body), "a RigidBody")
+        raise BadInput("body", describe(body), "a RigidBody")
     return Start(body, rotation("R_WB0", R_WB0), finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s"))
 
 
@@ -198,10 +202,8 @@ def _motion(start: Start, potential: Potential | None) -> ClosedForm:
 
 
 def _times(t: ArrayLike) -> Array:
-    try:
-        shape = np.shape(t)
-    except ValueError:  # rows of different lengths: refused below like all that is no array
-        shape = ()
+    found = real_array(t)  # what is no array of numbers is refused below
+    shape = () if found is None else found.shape
     return finite_array("t", t, (shape,), "finite times (n,), s")
 
 

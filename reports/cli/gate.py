@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options import epilog
+from .options import FilePath, epilog
 
 TIMES = "required: fail where the baseline has no times of this machine; known: then compare all but times, and say so."
 
@@ -20,8 +20,8 @@ TIMES = "required: fail where the baseline has no times of this machine; known: 
         "conservative gate --json | jq '.verdicts[].violations'",
     ),
 )
-@click.argument("results", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--baseline", type=click.Path(path_type=Path), help="The baseline.  [default: benchmarks/baseline.json]")
+@click.argument("results", nargs=-1, type=FilePath())
+@click.option("--baseline", type=FilePath(), help="The baseline.  [default: benchmarks/baseline.json]")
 @click.option("--times", type=click.Choice(["required", "known"]), default="required", show_default=True, help=TIMES)
 @click.option(
     "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."

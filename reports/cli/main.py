@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import signal
 import sys
 from typing import Any
@@ -45,12 +47,22 @@ class Commands(click.Group):
         except KeyboardInterrupt as stop:
             kind = _Terminated if isinstance(stop, Terminated) else _Interrupted
             raise kind("; ".join(["Interrupted", *notes(stop)])) from None
+        except OSError as error:
+            raise _as_full(error) from None
         except (ValueError, ImportError, ArithmeticError) as error:
             raise _as_click(error) from None
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         kwargs.setdefault("prog_name", "conservative")
         return super().main(*args, **kwargs)
+
+
+def _as_full(error: OSError) -> Exception:
+    """Return the click exception for output that the disk has no room for; what else the system refuses is a bug, or a pipe."""
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return error
+    sys.stdout = io.StringIO()  # what could not be written is not tried again at the end of the process
+    return _UserError(f"stdout: got {error.strerror!r}; allowed: a file, a pipe or a terminal that takes all of the output")
 
 
 def _as_click(error: Exception) -> Exception:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 EXIT_CODES = """Exit codes:
@@ -10,6 +12,15 @@ EXIT_CODES = """Exit codes:
     2    the command or an input cannot be used, or an engine or a baseline is missing
     130  interrupted by Ctrl-C, 143 by SIGTERM; a report keeps what is finished, and --resume goes on
 """
+
+
+class FilePath(click.Path):
+    """A path, which no system takes with a NUL in it."""
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if "\0" in str(value):
+            self.fail(f"got {value!r}; allowed: a path without NUL", param, ctx)
+        return Path(str(value))
 
 
 def epilog(*examples: str) -> str:

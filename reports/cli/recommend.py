@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import epilog, split_names
+from .options import FilePath, epilog, split_names
 
 if TYPE_CHECKING:
     from conservative.benchmarks.recommendation.recommend import Recommendation
@@ -37,17 +37,12 @@ FILES = ("recommendation.json", "recommendation.svg")
 @click.option(
     "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
 )
+@click.option(
+    "--time-limit", type=float, default=60.0, show_default=True, help="Time, s, after which an engine's run is ended."
+)
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for recommendation.json and recommendation.svg.")
-def recommend(
-    scene: str,
-    error: float,
-    duration: float | None,
-    engine: tuple[str, ...],
-    cost_limit: float,
-    as_json: bool,
-    out: Path | None,
-) -> None:
+@click.option("--out", type=FilePath(), help="Folder for recommendation.json and recommendation.svg.")
+def recommend(scene: str, engine: tuple[str, ...], as_json: bool, out: Path | None, **limits: Any) -> None:
     """Probe our methods and every engine on SCENE, a name or a file, and say what reaches the error, at what cost and drift.
 
     What a probe cannot cover of the duration is extrapolated by a law that is told with it.
@@ -57,16 +52,14 @@ def recommend(
     from ..terminal.progress import progress
 
     with interruptible(signal.SIGTERM), progress() as step:
-        recommendation = _answer(scene, error, duration, split_names("engine", engine), cost_limit, out, step)
+        recommendation = _answer(scene, split_names("engine", engine), limits, out, step)
     if as_json:
         click.echo(json_text(recommendation))
     else:
         _show(recommendation)
 
 
-def _answer(
-    scene: str, error: float, duration: float | None, engines: list[str], cost_limit: float, out: Path | None, step: Step
-) -> Recommendation:
+def _answer(scene: str, engines: list[str], limits: dict[str, Any], out: Path | None, step: Step) -> Recommendation:
     """Return the recommendation; with `out` it is left there as JSON and as a picture, too.
 
     Raises
@@ -83,7 +76,7 @@ def _answer(
     from conservative.benchmarks.recommendation.recommend import recommend as answer
     from conservative.files import text_file
 
-    question = ask(registry.scene(scene), error, duration, engines or None, cost_limit)
+    question = ask(registry.scene(scene), engine_names=engines or None, **limits)
     with ExitStack() as files:
         streams = [files.enter_context(text_file(path, "out")) for path in _paths(out)]
         recommendation = answer(question, step)

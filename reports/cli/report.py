@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import epilog, split_names
+from .options import FilePath, epilog, split_names
 
 
 @click.command(
@@ -28,12 +28,17 @@ from .options import epilog, split_names
 @click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option(
+    "--time-limit",
+    type=float,
+    metavar="S",
+    help="Longest run to plan for, s; a slower method gets fewer points, and one that goes on for ten times that, and at "
+    "least a minute, is ended.  [default: 0.6, with --quick 0.15]",
+)
 @click.option("--png", is_flag=True, help="Pictures as PNG, too.")
 @click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
 @click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
-@click.option(
-    "--out", type=click.Path(path_type=Path), default="report", show_default=True, help="Folder, replaced as a whole."
-)
+@click.option("--out", type=FilePath(), default="report", show_default=True, help="Folder, replaced as a whole.")
 def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], methods: tuple[str, ...], **extent: Any) -> None:
     """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,9 @@ from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
-from conservative.files import text_file
+from conservative.files import remove_leftovers, write_text
 
+from ..terminal.supervision import tell
 from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms
@@ -62,17 +63,19 @@ class Checkpoint:
     results: dict[str, StudyResult] = field(default_factory=dict)
 
     def keep(self, name: str, findings: Iterable[Finding]) -> None:
-        """Keep what a study finds, in the file as well; what an earlier report left there goes."""
+        """Keep what a study finds, in the file as well; what an earlier report left there goes. Raise `NotWritten` of it."""
         every = list(findings)
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
-        self.results[name] = StudyResult(rows, lines, self.process)
-        with text_file(self.path, "out") as stream:
-            stream.write(_content(self))
+        result = StudyResult(rows, lines, self.process)
+        write_text(self.path, _content(replace(self, results={**self.results, name: result})), "out")
+        self.results[name] = result
+        tell(self.summary)
 
     def remove(self) -> None:
         """Remove the file: the report is written."""
         self.path.unlink(missing_ok=True)
+        remove_leftovers(self.path)
 
     @property
     def summary(self) -> str:

@@ -9,6 +9,7 @@ from itertools import accumulate, pairwise
 
 from conservative.benchmarks.studies import selection, studies
 from conservative.benchmarks.studies.study import Study
+from conservative.check import positive_number
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -38,7 +39,7 @@ class Plan:
     Raises
     ------
     BadInput
-        A name or a setting is unknown.
+        A name or a setting is unknown, or the limit is not a finite duration above 0.
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
@@ -49,8 +50,11 @@ class Plan:
     skip_missing: bool = False
     png: bool = False
     hard: bool = False
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
+        if self.time_limit is not None:
+            positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
         if not self.skip_missing:
             for method in self.methods:
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
@@ -61,7 +65,7 @@ class Plan:
 
         Studies of the same scenes and methods share their truths.
         """
-        crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing)
+        crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing, self.time_limit)
         return (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
 
     @property
@@ -80,8 +84,14 @@ class Plan:
 
 
 def plan_report(
-    scenes: list[str], methods: list[str], quick: bool = False, skip_missing: bool = False, png: bool = False
+    scenes: list[str],
+    methods: list[str],
+    quick: bool = False,
+    skip_missing: bool = False,
+    png: bool = False,
+    time_limit: float | None = None,
 ) -> Plan:
     """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
     values = selection.scenes(scenes) if scenes else selection.scenes()
-    return Plan(values, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard=not (scenes or quick))
+    hard = not (scenes or quick)
+    return Plan(values, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard, time_limit)

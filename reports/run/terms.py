@@ -24,6 +24,7 @@ def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
         "methods": {method.name: method.label for method in plan.methods},
         "--quick": plan.quick,
         "--skip-missing": plan.skip_missing,
+        "--time-limit": plan.time_limit,
         "source": _source_hash(),
         "machine": {key: source.machine[key] for key in ("processor", "cores")},
         "versions": {"python": source.python, **source.compared},

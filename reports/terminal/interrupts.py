@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+
+from . import supervision
+
+_AGAIN = 0.01
+"""Time, s, after which a signal is sent again."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -17,15 +24,19 @@ class Terminated(KeyboardInterrupt):
 def interruptible(number: signal.Signals) -> Iterator[None]:
     """Turn SIGINT into `KeyboardInterrupt`, SIGTERM into `Terminated`, also where another exception is made of it on the way.
 
-    Compiled code that is interrupted while it is loaded raises `SystemError`, for one.
+    Compiled code that is interrupted while it is loaded raises `SystemError`, for one. A process that is supervised leaves its
+    signals to the one that does it.
     """
+    if supervision.list_places():
+        yield
+        return
     stops: list[KeyboardInterrupt] = []
 
     def stop(number: int, frame: object) -> None:
         stops.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
         raise stops[0]
 
-    with _handle(stop, number):
+    with _handle(stop, number), _repeated(stops, number):
         try:
             yield
         except Exception as error:
@@ -34,6 +45,24 @@ def interruptible(number: signal.Signals) -> Iterator[None]:
             for note in notes(error):
                 stops[0].add_note(note)
             raise stops[0] from error
+
+
+@contextmanager
+def _repeated(stops: list[KeyboardInterrupt], number: signal.Signals) -> Iterator[None]:
+    """Send a signal again whose exception is ignored: the callback of a weak reference, as imports have them, cannot raise."""
+    before = sys.unraisablehook
+
+    def ignored(what: Any) -> None:
+        if what.exc_value in stops:
+            threading.Timer(_AGAIN, os.kill, (os.getpid(), number)).start()  # when this callback, too, is over
+        else:
+            before(what)
+
+    sys.unraisablehook = ignored
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager

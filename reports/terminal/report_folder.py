@@ -58,15 +58,15 @@ def report_folder(target: Path) -> Iterator[Path]:
             _swap(fresh, target)
 
 
-def recover(target: Path) -> None:
-    """Put back what a kill in the middle of a swap left beside a folder, and remove what nobody needs any more."""
+def recover(target: Path) -> bool:
+    """Put back what a kill in the middle of a swap left beside a folder, and remove leftovers; return whether all are gone."""
     for old in files.leftovers(target, _ASIDE):
         with suppress(OSError):
             if target.exists():
                 _move_foreign(old, target)
             else:
                 old.rename(target)
-    files.remove_leftovers(target)
+    return files.remove_leftovers(target)
 
 
 def _require_place(target: Path) -> None:

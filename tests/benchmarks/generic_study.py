@@ -33,11 +33,23 @@ class Broken(cv.Method):
     def unsupported(self, scene):
         return "it cannot do anything" if self.how == "unsupported" else None
 
+    def samples(self, scene, grid, off):
+        """The start all the time, and something else in the last sample."""
+        R, w = (np.repeat(start[None], grid.n_samples, axis=0) for start in (scene.R_WB0, scene.w_WB_B0))
+        R[-1] += off
+        return cv.Trajectory(scene, grid.t, R, w, self.label)
+
     def prepare(self, scene, grid):
         if self.how == "refuses":
             raise cv.BadInput("dt", grid.dt, "a shorter step")
         if self.how == "raises":
             raise RuntimeError("planted")
+        if self.how == "gives nan":
+            return lambda: self.samples(scene, grid, np.nan)
+        if self.how == "is skewed":
+            return lambda: self.samples(scene, grid, 1.0)
+        if self.how == "gives nothing":
+            return lambda: None
         start = np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None]
         return lambda: cv.Trajectory(scene, *start, self.label, failure=cv.Diverged(0.0, "planted"))
 

@@ -140,3 +140,15 @@ def test_nothing_cannot_be_measured(exact):
     empty = Trajectory(exact.scene, exact.t[:0], exact.R_WB[:0], exact.w_WB_B[:0], "empty")
     with pytest.raises(BadInput, match="no sample"):
         measure_errors(empty, exact)
+
+
+def test_what_is_largest_in_between_is_no_final_and_no_mean_value():
+    exact = cv.integrate(HEAVY, dt=0.01)
+    bump = 1e-3 * np.sin(math.pi * exact.t / exact.t[-1])
+    turned = np.array([R @ rotation_about((1, 2, 3), angle) for R, angle in zip(exact.R_WB, bump, strict=True)])
+    found = values(changed(exact, turned, exact.w_WB_B * (1 + bump)[:, None]), exact)
+    speed = np.linalg.norm(exact.w_WB_B, axis=1)
+    assert found["attitude error max"] == pytest.approx(1e-3, rel=1e-6)
+    assert found["rate error max"] == pytest.approx((speed * bump).max() / speed.max(), rel=1e-9)
+    spoilt = ("attitude error", "rate error", "position error", "energy drift", "vertical momentum drift")
+    assert all(found[f"{name} max"] > 1e-4 and found[f"{name} final"] < 1e-12 for name in spoilt), found

@@ -1,5 +1,4 @@
 import math
-import threading
 import time
 from functools import cache
 from typing import ClassVar
@@ -12,7 +11,6 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import stability, studies
 from conservative.benchmarks.studies.study import Study
-from conservative.benchmarks.studies.time_limit import TimeLimitExceeded, run_within
 from conservative.method import Role
 from conservative.outcome import OK, OutcomeKind
 from conservative.references.exact.method import Exact
@@ -68,7 +66,7 @@ class Staged(cv.Method):
             if self.how == "crashed":
                 raise RuntimeError("planted")
             if self.how == "timeout":
-                time.sleep(stability.LIMIT + 0.3)
+                time.sleep(60)
             return cv.Trajectory(scene, grid.t, R, w, self.label, failure=failure)
 
         return run
@@ -80,7 +78,7 @@ def staged(how):
 
 @pytest.mark.parametrize("how", KINDS)
 def test_every_kind_of_failure_is_named(how, monkeypatch):
-    monkeypatch.setattr(stability, "LIMIT", 0.3)
+    monkeypatch.setattr(stability, "LIMIT", 5.0)
     found = rows(staged(how))
     assert found[how, Measure.LONGEST_STEP].value == pytest.approx(0.7)
     assert found[how, Measure.LONGEST_STEP].outcome == OK
@@ -106,17 +104,6 @@ def test_a_body_at_rest_is_measured_in_its_own_steps():
     field = cv.UniformGravity(3.0, TURN.T @ (0, 0, -0.2))  # hanging straight down, to round-off
     rest = cv.Scene("rest", cv.RigidBody((2, 2, 2)), TURN, (0, 0, 0), 1.0, field, dt=0.01)
     assert rows(cv.Reduced(), scene=rest)["reduced", Measure.LONGEST_STEP].value == pytest.approx(10.0)
-
-
-def test_waiting_has_an_end():
-    release, finished = threading.Event(), []
-    with pytest.raises(TimeLimitExceeded, match="abandoned after"):
-        run_within(0.05, lambda: finished.append(release.wait(60)))
-    assert finished == []
-    release.set()
-    assert run_within(5.0, lambda: 3) == 3
-    with pytest.raises(ZeroDivisionError):
-        run_within(5.0, lambda: 1 // 0)
 
 
 def test_the_scenes_of_the_study_are_registered():

@@ -20,13 +20,16 @@ from conservative.registry import method
 from .generic_study import SCENE, Broken, truth
 
 ABSENT = Missing("mujoco", "MuJoCo", "mujoco")
-BROKEN = tuple(Broken(how) for how in ("unsupported", "refuses", "raises", "diverges"))
 KINDS = {
     "unsupported": OutcomeKind.UNSUPPORTED,
     "refuses": OutcomeKind.UNSUPPORTED,
     "raises": OutcomeKind.CRASHED,
     "diverges": OutcomeKind.DIVERGED,
+    "gives nan": OutcomeKind.DIVERGED,
+    "is skewed": OutcomeKind.NOT_CONSERVED,
+    "gives nothing": OutcomeKind.INVALID,
 }
+BROKEN = tuple(Broken(how) for how in KINDS)
 CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "import_time")]
 """Studies with a row for every method, whatever comes of it."""
 

@@ -59,6 +59,11 @@ def test_a_run_over_its_budget_gets_three_rounds(rest):
     assert (timings["slow"].rounds, timings["fast"].rounds) == (3, 8)
 
 
+def test_a_budget_is_of_all_calls_of_a_sample(rest):
+    found = time_interleaved({"fast": lambda: rest(1e-6)}, rounds=8, min_time=1e-3, budget=5.5e-3)["fast"]
+    assert (found.rounds, found.calls) == (5, 1000)
+
+
 def test_the_collector_is_off_while_timing_and_on_afterwards(rest):
     seen = []
     time_interleaved({"look": lambda: (seen.append(gc.isenabled()), rest(1e-3))}, rounds=3, min_time=1e-6)

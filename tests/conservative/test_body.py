@@ -3,6 +3,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
+from conservative.invariants import axial_direction
 
 
 def test_moments_and_tensor_describe_the_same_body():
@@ -39,3 +40,19 @@ def test_repr_is_an_expression():
     body = cv.RigidBody((1, 2, 2.5))
     again = eval(repr(body), {"RigidBody": cv.RigidBody})
     np.testing.assert_array_equal(again.inertia, body.inertia)
+
+
+@pytest.mark.parametrize("off", [1e-3, 1e-6, 1e-9])
+def test_a_body_that_is_nearly_symmetric_has_no_axis(off):
+    nearly = cv.RigidBody((1, 1 + off, 2))
+    assert axial_direction(nearly, None) is None
+    assert axial_direction(nearly, cv.UniformGravity(1, (0, 0, 1))) is None
+    assert axial_direction(cv.RigidBody((1, 1, 2)), cv.UniformGravity(1, (off, 0, 1))) is None
+    assert axial_direction(cv.RigidBody((1, 1 + off, 1)), cv.UniformGravity(1, (0.2, 0.3, 0.4))) is None
+
+
+def test_a_body_that_is_symmetric_but_for_round_off_has_its_axis():
+    round_off = 4 * np.finfo(float).eps
+    np.testing.assert_array_equal(axial_direction(cv.RigidBody((1, 1 + round_off, 2)), None), (0, 0, 1))
+    field = cv.UniformGravity(1, (round_off, 0, -1))
+    np.testing.assert_array_equal(axial_direction(cv.RigidBody((1, 1, 2)), field), (0, 0, -1))

@@ -131,7 +131,7 @@ def test_machine_code_is_not_made_for_another_number_of_values(name: str) -> Non
 @pytest.mark.parametrize("values", [5, 7])
 def test_the_runner_takes_no_other_number_of_results(values: int) -> None:
     scene = cv.scenes.brick_flip()
-    kernel = SimpleNamespace(enter=lambda *loose: (0,) * values, FAILURE="")
+    kernel = SimpleNamespace(enter=lambda *loose: (0,) * values, FAILURE="", PAUSE=1)
     run = prepare_run(scene, cv.Grid(0.1, 1), "label", principal_start(scene), kernel, (), ())
     with pytest.raises(TypeError, match="Result"):
         run()

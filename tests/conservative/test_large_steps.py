@@ -185,6 +185,7 @@ def test_substepping_is_offered_by_name_and_never_silent() -> None:
     assert np.array_equal(short.R_WB, cv.Reduced().run(scene, 1.0, 9.0).R_WB)
     failed = cv.Substepped(most=1).run(scene, 6.0, 18.0)
     assert isinstance(failed.failure, cv.WrongBranch)
+    assert cv.Substepped(most=2).run(scene, 6.0, 18.0).ok  # as many parts as are allowed
 
 
 def test_substepping_passes_on_what_its_method_is() -> None:

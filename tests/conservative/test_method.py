@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry
+from conservative import check, registry
 from conservative.method import Grid, grid_for
 
 BRICK = cv.scenes.brick_flip()
@@ -79,3 +79,18 @@ def test_what_does_not_turn_stays():
     trajectory = cv.integrate(scene, 0.1)
     np.testing.assert_array_equal(trajectory.R_WB, np.broadcast_to(np.eye(3), (11, 3, 3)))
     np.testing.assert_array_equal(trajectory.w_WB_B, np.zeros((11, 3)))
+
+
+def test_samples_farther_apart_than_the_run_are_its_ends():
+    found = cv.integrate(BRICK, 0.1, sample_every=10**30)
+    np.testing.assert_array_equal(found.t, [0, 6])
+    assert len(cv.integrate(BRICK, error=1e-3, sample_every=10**30)) == 2
+
+
+def test_what_fits_in_memory_is_told_before_any_work(monkeypatch):
+    monkeypatch.setattr(check, "most_samples", lambda: 101)
+    with pytest.raises(cv.BadInput) as caught:
+        cv.integrate(BRICK, 0.01)
+    assert caught.value.argument == "sample_every"
+    assert caught.value.allowed.startswith("6 or more, or longer steps")
+    assert len(cv.integrate(BRICK, 0.01, sample_every=6)) == 101

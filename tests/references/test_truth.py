@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,6 +76,24 @@ def test_truths_that_differ_are_refused(monkeypatch):
     scene = cv.scenes.brick_flip()
     with pytest.raises(truth.Disagreement, match=r"scene: got 'brick_flip', on which .*exact and .*reduced differ by .* rad"):
         truth.reference(scene, Grid(0.1, 60))
+
+
+HEAVY = cv.Scene("heavy", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 1.0, cv.UniformGravity(1, (0, 0.2, 1)))
+BOWL = cv.Scene("bowl", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 1.0, Bowl())
+
+
+@pytest.mark.parametrize(("scene", "off"), [(cv.scenes.brick_flip(), 1e-11), (HEAVY, 1e-7), (BOWL, 1e-5)])
+def test_truths_that_differ_by_ten_times_what_their_errors_explain_are_refused(scene, off, monkeypatch):
+    exact = truth.difference
+    monkeypatch.setattr(truth, "difference", lambda a, b: exact(a, b) + off)
+    with pytest.raises(truth.Disagreement):
+        truth.reference(scene, Grid(0.1, 10))
+
+
+@pytest.mark.parametrize("what", ["R_WB", "w_WB_B"])
+def test_truths_have_to_agree_in_attitudes_and_in_rates(what):
+    whole = truth.Exact().prepare(cv.scenes.brick_flip(), Grid(0.1, 20))()
+    assert truth.difference(whole, replace(whole, **{what: getattr(whole, what)[::-1]})) > 0.1
 
 
 def test_a_trajectory_that_ended_early_agrees_with_nothing():

@@ -27,6 +27,13 @@ def test_audit_of_a_conserved_quantity(drift, verdict):
     assert verdicts(rows) == {"reduced keeps energy to round-off (brick_flip)": verdict}
 
 
+@pytest.mark.parametrize(("drift", "verdict"), [(5e-6, claims.HOLDS), (7e-6, claims.FAILS)])
+def test_a_bound_for_each_step_is_one_for_all_of_them_together(drift, verdict):
+    """The paper's iteration stops at 1e-8 in each of the brick's 600 steps."""
+    found = verdicts([row("paper", "convected", "energy drift max", drift, 0.01)])
+    assert found["convected keeps energy to the tolerance of its iteration in each step (brick_flip)"] == verdict
+
+
 @pytest.mark.parametrize(("error", "verdict"), [(0.1, claims.HOLDS), (0.2, claims.FAILS), (math.nan, claims.FAILS)])
 def test_audit_of_one_map_in_two_programs(error, verdict):
     rows = [row("paper", "convected", "attitude error max", 0.1), row("paper", "reduced", "attitude error max", error)]

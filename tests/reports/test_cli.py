@@ -9,10 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import integrate, registry
-from conservative.benchmarks.gate import results
-from conservative.benchmarks.gate.results import Row
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.reports.cli.main import main
+from conservative.reports.run import single_run
 
 
 def conservative(*arguments):
@@ -48,6 +47,20 @@ def test_run_equals_the_known_rates():
     assert summary["counters"]["steps"] == 600
     assert summary["drift"]["energy"] < 1e-14  # measured 4.5e-16
     assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
+
+
+def test_a_long_run_is_announced_with_the_time_of_all_its_parts(monkeypatch):
+    told = []
+    monkeypatch.setattr(single_run, "wall_time", lambda part: part() and 2.0)  # s
+    single_run.run_once("brick_flip", "reduced", 0.01, 2.0, None, told.append)
+    assert told == [2.0 * single_run.TRIAL]
+
+
+def test_run_tells_its_step_and_duration():
+    arguments = ("run", "brick_flip", "--dt", "0.005", "--t-end", "0.1")
+    assert " 0.1 s with dt = 0.005 s\n" in conservative(*arguments).stdout
+    summary = json.loads(conservative(*arguments, "--json").stdout)
+    assert (summary["dt"], summary["t_end"]) == (0.005, 0.1)
 
 
 def test_the_method_of_a_run_is_by_default_that_of_integrate():
@@ -116,6 +129,17 @@ def test_mistakes_end_in_one_clear_line(arguments, parts, tmp_path, monkeypatch)
     assert done.stdout == ""
     assert one_line(done.stderr)
     assert all(part in done.stderr for part in parts)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [("report", "--quick"), ("recommend", "brick_flip")])
+def test_a_limit_on_time_is_an_option_of_what_runs_engines(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "--time-limit" in conservative(command[0], "--help").stdout
+    done = conservative(*command, "--time-limit", "0")
+    assert done.exit_code == 2
+    assert one_line(done.stderr)
+    assert "time_limit: got 0.0; allowed: a finite duration above 0, s" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -196,33 +220,3 @@ def test_choices_are_what_a_scene_file_takes(table, tmp_path):
         path.write_text(f"t_end = 1.0\n{body}\n{potential}[start]\nw_WB_B = [0, 0, 1]\n")
         allowed = conservative("run", path).stderr.partition("one of ")[2].strip().split(", ")
         assert set(keys) == set(allowed) - {"shape", "kind", "com_B" if table == "shape" else "", "R_BS"}
-
-
-@pytest.fixture
-def gated(tmp_path, monkeypatch):
-    """A folder with a baseline of one row, and results in which an error became larger."""
-    monkeypatch.chdir(tmp_path)
-    before, after = (Row("id", "brick_flip", "reduced", "passed", values={"attitude error max": v}) for v in (1e-3, 2e-3))
-    for name, row in (("before.json", before), ("after.json", after)):
-        results.write(results.Results("a machine", {"id": row}, "a commit"), tmp_path / name)
-    return conservative("gate", "before.json", "--baseline", "kept.json", "--update", "First", "--json")
-
-
-def test_gate_as_json_has_the_violations(gated):
-    done = conservative("gate", "after.json", "--baseline", "kept.json", "--json")
-    assert done.exit_code == 1
-    (verdict,) = json.loads(done.stdout)["verdicts"]
-    assert not verdict["passed"]
-    (violation,) = verdict["violations"]
-    assert (violation["measure"], violation["scene"], violation["method"]) == ("attitude error max", "brick_flip", "reduced")
-    assert (violation["was"], violation["now"]) == ("0.001", "0.002")
-    passed = conservative("gate", "before.json", "--baseline", "kept.json", "--json")
-    assert passed.exit_code == 0
-    assert json.loads(passed.stdout)["passed"]
-
-
-def test_update_as_json_has_the_entry_of_the_history(gated):
-    told = json.loads(gated.stdout)
-    assert gated.exit_code == 0
-    assert (told["baseline"], told["rows"]) == ("kept.json", 1)
-    assert (told["entry"]["reason"], told["entry"]["added"]) == ("First", ["id"])

@@ -1,6 +1,9 @@
-"""What a signal becomes, inside a command and outside."""
+"""What a signal becomes where a process handles its signals itself, as in a notebook; for commands see test_supervision.py."""
 
 import signal
+import sys
+import time
+import weakref
 
 import pytest
 from click.testing import CliRunner
@@ -40,6 +43,41 @@ def test_an_interrupt_is_not_lost_in_another_exception(number, kind):
     with pytest.raises(kind) as caught, interruptible(number):
         lost(number)
     assert caught.value.__notes__ == ["kept"]
+
+
+class Name:
+    pass
+
+
+def test_an_interrupt_is_not_lost_where_no_exception_can_be_raised():
+    name = Name()
+    kept = weakref.ref(name, lambda gone: signal.raise_signal(signal.SIGINT))  # an import has such a callback for its lock
+
+    def work(names):
+        names.pop()
+        for _ in range(600):
+            time.sleep(0.1)
+            assert kept() is None
+
+    names = [name]
+    del name
+    with pytest.raises(KeyboardInterrupt), interruptible(signal.SIGINT):
+        work(names)
+
+
+def test_what_others_ignore_is_told_as_before(monkeypatch):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
+    name, error = Name(), ZeroDivisionError()
+
+    def fail(gone):
+        raise error
+
+    kept = weakref.ref(name, fail)
+    with interruptible(signal.SIGINT):
+        del name
+    assert kept() is None
+    assert told == [error]
 
 
 def test_what_is_ignored_stays_ignored():

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import stat
@@ -5,8 +6,8 @@ import stat
 import pytest
 
 from conservative import BadInput
-from conservative.files import text_file
-from conservative.reports.terminal.report_folder import MANIFEST, report_folder
+from conservative.errors import NotWritten
+from conservative.reports.terminal.report_folder import MANIFEST, recover, report_folder
 
 
 def write_report(folder, *names):
@@ -110,17 +111,71 @@ def test_forbidden_folder(tmp_path):
         pytest.fail("work was begun")
 
 
-def test_text_file_is_whole_or_as_before(tmp_path):
-    target = tmp_path / "run.csv"
-    with text_file(target, "csv") as stream:
-        stream.write("first")
-    with pytest.raises(KeyboardInterrupt):
-        interrupted(text_file(target, "csv"), lambda stream: stream.write("half"))
-    assert target.read_text() == "first"
-    assert tree(tmp_path) == ["run.csv"]
+# A swap takes three steps; these are the states that a kill between them leaves.
+
+DEAD = "0123456789ab"
 
 
-@pytest.mark.parametrize("place", [".", "missing/run.csv"])
-def test_text_file_that_cannot_be(tmp_path, place):
-    with pytest.raises(BadInput, match=r"csv: got .*; allowed: a file"), text_file(tmp_path / place, "csv"):
-        pytest.fail("work was begun")
+def killed(folder, *, step):
+    """Leave what a kill after a step of a swap leaves: the earlier report is `report` with notes of a person beside it."""
+    earlier, fresh = folder / "report", folder / f".report-{DEAD}"
+    earlier.mkdir()
+    write_report(earlier, "a.svg")
+    (earlier / "notes.txt").write_text("mine")
+    fresh.mkdir()
+    write_report(fresh, "b.svg")
+    if step >= 1:
+        earlier.rename(folder / f".report-{DEAD[::-1]}-old")
+    if step >= 2:
+        fresh.rename(folder / "report")
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"),
+    [(0, ["a.svg", MANIFEST, "notes.txt"]), (1, ["a.svg", MANIFEST, "notes.txt"]), (2, ["b.svg", MANIFEST, "notes.txt"])],
+)
+def test_a_kill_in_a_swap_loses_nothing(step, expected, tmp_path):
+    killed(tmp_path, step=step)
+    recover(tmp_path / "report")
+    assert tree(tmp_path / "report") == expected
+    assert tree(tmp_path) == ["report"]
+    assert (tmp_path / "report" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("step", [0, 1, 2])
+def test_the_next_report_tidies_up_after_a_kill(step, tmp_path):
+    killed(tmp_path, step=step)
+    with report_folder(tmp_path / "report") as fresh:
+        write_report(fresh, "c.svg")
+    assert tree(tmp_path / "report") == ["c.svg", MANIFEST, "notes.txt"]
+    assert tree(tmp_path) == ["report"]
+
+
+def test_two_reports_into_one_folder_leave_that_of_the_last(tmp_path):
+    with report_folder(tmp_path / "report") as first:
+        write_report(first, "a.svg")
+        with report_folder(tmp_path / "report") as second:
+            write_report(second, "b.svg")
+            assert tree(tmp_path) == sorted([first.name, second.name])
+        assert tree(tmp_path / "report") == ["b.svg", MANIFEST]
+    assert tree(tmp_path / "report") == ["a.svg", MANIFEST]
+    assert tree(tmp_path) == ["report"]
+
+
+def test_what_a_person_adds_while_a_report_is_made_stays(tmp_path):
+    with report_folder(tmp_path / "report") as fresh:
+        write_report(fresh, "a.svg")
+    with report_folder(tmp_path / "report") as fresh:
+        write_report(fresh, "b.svg")
+        (tmp_path / "report" / "notes.txt").write_text("mine")
+    assert tree(tmp_path / "report") == ["b.svg", MANIFEST, "notes.txt"]
+
+
+def test_a_full_disk_is_said_of_the_folder_and_not_of_its_temporary(tmp_path):
+    def fill():
+        with report_folder(tmp_path / "report") as fresh:
+            raise NotWritten("out", fresh / "a.svg", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+
+    with pytest.raises(BadInput, match=r"report' \(No space left on device\); allowed: a folder"):
+        fill()
+    assert tree(tmp_path) == []

@@ -9,7 +9,7 @@ from conservative.reports.tables.cells import Cell, Grade, grade_drift
 from conservative.reports.tables.work_precision import points
 
 from .made_up import row, table
-from .rows import frame
+from .rows import frame, point
 
 
 def test_verdict_names_the_cheapest_and_what_it_keeps():
@@ -19,6 +19,20 @@ def test_verdict_names_the_cheapest_and_what_it_keeps():
     assert rows[0]["cheapest"] == "reduced"
     assert "energy ✓" in rows[0]["conserves"]
     assert rows[0]["fails"] == "nowhere here"
+
+
+def test_a_line_of_tolerances_keeps_what_its_tightest_keeps():
+    names = {"scene": "brick_flip", "role": "engine", "series": "heyoka"}
+    found = [
+        finding
+        for method, error, drift in (("heyoka:tol=1e-3", 1e-2, 1e-3), ("heyoka:tol=1e-15", 1e-9, 1e-15))
+        for finding in (
+            *point("heyoka", "engine", error, 1e-6, scene="brick_flip", method=method, series_setting=""),
+            row("long_runs", method, "energy drift max", drift, **names),
+        )
+    ]
+    header, (first, *_) = overview.verdict(frame(found), points(frame(found)))
+    assert dict(zip(header, first, strict=True))["conserves"] == "energy ✓ 1.0e-15"
 
 
 def test_verdict_tells_where_the_cheapest_fails():
@@ -61,6 +75,11 @@ def test_hard_cases_are_a_matrix():
     assert header == ["method", "needle", "falling_top"]
     assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
     assert hard_cases.hard_cases(table()) is None
+
+
+def test_a_hard_case_is_graded_by_its_largest_drift():
+    found = [row("hard_cases", "reduced", "energy drift max", drift, dt) for drift, dt in ((1e-15, 0.1), (1e-2, 0.2))]
+    assert hard_cases.hard_cases(frame(found))[1][0][1].grade is Grade.BAD
 
 
 def test_longest_steps_are_a_matrix():

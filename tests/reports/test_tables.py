@@ -66,6 +66,49 @@ def test_time_is_in_steps_of_reduced_too():
     assert body[0][-1] == "9 rounds"
 
 
+def test_what_is_paid_once_is_in_the_units_of_its_columns():
+    found = [row("speed", "prepare time", 0.002), row("speed", "first call time", 0.03), row("speed", Measure.TIME, 4e-6)]
+    header, body = scene.costs_paid_once(frame(found), "made_up")
+    assert dict(zip(header, body[0], strict=True)) == {
+        "method": "reduced",
+        "prepare, ms": "2",
+        "first call, ms": "30",
+        "simulated second, µs": "4",
+    }
+
+
+def test_every_time_is_in_the_unit_of_its_column():
+    measures = (Measure.TIME_PER_STEP, Measure.TIME_PER_STEP_MEDIAN, Measure.TIME, Measure.TIME_MEDIAN)
+    found = [row("speed", measure, value) for measure, value in zip(measures, (1e-9, 2e-9, 3e-6, 4e-6), strict=True)]
+    found += [row("speed", Measure.PREPARE, 5e-3), row("speed", Measure.FIRST_CALL, 6e-3)]
+    header, ((_, *values, _),) = scene.time(frame(found), "made_up")
+    assert header[2:8] == ["step, ns, min", "median", "simulated second, µs, min", "median", "prepare, ms", "first call, ms"]
+    assert values[1:] == ["1", "2", "3", "4", "5", "6"]
+
+
+def test_errors_have_the_unit_that_they_are_measured_in():
+    found = [
+        row("paper", Measure.ATTITUDE_MAX, 1.0),
+        row("paper", Measure.ATTITUDE_FINAL, 2.0),
+        row("paper", Measure.RATES_MAX, 3.0),
+    ]
+    assert scene.accuracy(frame(found), "made_up") == (
+        [
+            "method",
+            *(
+                f"{name}, dt 0.01"
+                for name in ("attitude error max, rad", "attitude error final, rad", "rate error max, relative")
+            ),
+        ],
+        [["reduced", "1", "2", "3"]],
+    )
+
+
+def test_imports_are_in_milliseconds():
+    found = [row("import_time", Measure.IMPORT, 0.25, math.nan, method="mujoco", role="engine")]
+    assert runs.imports(frame(found)) == (["library", "role", "import, ms"], [["mujoco", "engine", "250"]])
+
+
 def order_table(found):
     table = frame(found)
     return scene.order(*(orders.fits(orders.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX)))

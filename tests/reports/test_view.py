@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from conservative import Method, Reduced, registry
-from conservative.benchmarks.measures import samples
+from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.measures.samples import Samples
 from conservative.benchmarks.studies import import_time, studies
 from conservative.benchmarks.studies.study import Study
@@ -18,6 +18,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import orders, work_precision
 
 from .made_up import curves, measurements
+from .rows import row
 
 
 def classes(base):
@@ -83,6 +84,18 @@ def test_the_view_is_computed_once_for_all_scenes(report, monkeypatch):
     assert calls.count("points") == 1
     assert calls.count("errors") == 2  # of the attitude, and of the rates
     assert calls.count("fits") == 2
+
+
+def test_orders_of_attitude_and_rates_are_fitted_to_their_own_errors(report):
+    plan, measured, source = report
+    errors = [
+        row("convergence", "reduced", measure, dt**order, dt, scene="brick_flip")
+        for measure, order in (("attitude error max", 2), ("rate error max", 3))
+        for dt in (0.1, 0.05, 0.025, 0.0125)
+    ]
+    built = view.build(plan, Measurements(measurement.frame(errors), measured.samples), source)
+    (line,) = next(scene.order[1] for scene in built.scenes if scene.name == "brick_flip")
+    assert line[:3] == ["reduced", "2.00 ± 0.00", "3.00 ± 0.00"]
 
 
 def test_each_chart_is_built_once_for_the_report_and_its_page(report, monkeypatch, tmp_path):

@@ -25,6 +25,13 @@ def test_measured_point_is_its_own_cost():
     assert found.ours == work_precision.CheapestLine("ours", 4.0)
 
 
+def test_the_cheapest_of_several_lines_counts():
+    dear = (point("dear", "ours", 1e-4, 5.0), point("dearer", "engine", 1e-4, 90.0))
+    found = contest(1e-4, *OURS, *ENGINE, *dear)
+    assert found.ours == work_precision.CheapestLine("ours", 4.0)
+    assert found.theirs.name == "engine"
+
+
 def test_between_points_the_cost_is_log_log():
     found = contest(1e-3, *OURS, *ENGINE)
     assert found.ours.time == pytest.approx(2.0, rel=1e-14)  # half way in the exponent from 1 to 4

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from ...check import choice, describe
 from ...errors import BadInput
 
 DIGITS = Fraction(1, 10**38)
@@ -242,9 +243,8 @@ def composition_of(order: int, name: str | None = None) -> Composition:
     BadInput
         There is no set of this order, no set of this name, or the one of this name has another order.
     """
-    if isinstance(order, bool) or order not in BEST:
-        raise BadInput("order", repr(order), "one of " + ", ".join(str(known) for known in BEST))
+    choice("order", order, tuple(BEST))
     allowed = [known.name for known in _ALL if known.order == order]
-    if name is not None and name not in allowed:
-        raise BadInput("composition", repr(name), f"None or, of order {order}, one of " + ", ".join(allowed))
+    if name is not None and not (isinstance(name, str) and name in allowed):
+        raise BadInput("composition", describe(name), f"None or, of order {order}, one of " + ", ".join(allowed))
     return COMPOSITIONS[BEST[order] if name is None else name]

@@ -1,11 +1,13 @@
 """A baseline: what is none, what is accepted into it, and how its times are taken and limited."""
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy import stats
 
 import conservative as cv
 from conservative.benchmarks.gate import baseline, results, yardstick
-from conservative.benchmarks.gate.results import Status
+from conservative.benchmarks.gate.results import Row, Status
 from conservative.reports.cli.main import main
 
 from .gate_rows import COMPILE_REFERENCE, SECOND, with_row
@@ -73,6 +75,25 @@ def test_the_command_compares_and_accepts(kept, untouched, tmp_path):
 def test_what_failed_cannot_be_accepted(kept, untouched, changes):
     with pytest.raises(cv.BadInput):
         baseline.update_baseline(kept, [with_row(untouched, SECOND, **changes)], "no")
+
+
+def test_the_largest_spread_that_was_measured_counts():
+    runs = [
+        results.Results(
+            "here", {"a": Row("a", "s", "m", Status.PASSED, "", "d", {"energy drift max": 1.0}, {"energy drift max": s})}
+        )
+        for s in (0.1, 0.3, 0.2)
+    ]
+    found = baseline.update_baseline(None, runs, "why").rows["a"].measures["energy drift max"]
+    assert (found.spread, found.limit) == (0.3, pytest.approx(1 + baseline.SPREADS * 0.3, rel=1e-15))
+
+
+def test_the_spread_of_times_is_a_standard_deviation():
+    ratios = np.exp(0.008 * np.array([-2, -1, 0, 0, 1, 2]))  # half of them within 0.008
+    found = baseline.time_limit(ratios.tolist(), 10)
+    assert found.spread == pytest.approx(0.008 / stats.norm.ppf(0.75), rel=1e-4)
+    quantile = stats.t.ppf(1 - baseline.FALSE_ALARMS / 10, 5)
+    assert found.limit - 1 == pytest.approx(quantile * found.spread * (1 + 1 / 6) ** 0.5, rel=1e-12)  # between the bounds
 
 
 def test_the_limit_of_a_time_follows_from_repeats():

@@ -1,0 +1,108 @@
+"""Units in which a scene is of order one: powers of two, so that going there and back rounds nothing.
+
+A motion stays what it is when moments of inertia are measured in units of M, times in units of T, and energies in units of
+M/T^2. Methods integrate in units in which the largest moment is of order one, and so is the rate that the energy makes of it:
+squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold. Exponents of the units are multiples of 16,
+rounded towards 0: a scene whose largest moment lies between 2^-16 and 2^16 kg m^2, and whose rate lies between 2^-16 and
+2^16 rad/s, keeps its own units, bit for bit. So does one with a potential that has no `in_units`.
+
+Source: dimensional analysis; see E. Buckingham, On physically similar systems (1914).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import TypeVar
+
+from ..body import RigidBody
+from ..check import build_unchecked, read_only
+from ..method import Grid, Method, Run
+from ..scene import Scene
+from ..trajectory import Trajectory
+
+AnyMethod = TypeVar("AnyMethod", bound=Method)
+Prepare = Callable[[AnyMethod, Scene, Grid], Run]
+
+COARSE = 16
+"""Exponents of units are multiples of this."""
+SHORTEST = -64
+"""Exponent of the shortest step in units of time: with less motion than that in a step, the step sets the unit."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of moments of inertia, kg m^2, and of time, s: powers of two."""
+
+    moment: float
+    time: float
+
+    def convert(self, scene: Scene) -> Scene:
+        """Return the scene in these units. Its numbers may be outside the range that constructors allow."""
+        potential, energy = scene.potential, self.moment / self.time / self.time
+        return build_unchecked(
+            Scene,
+            name=scene.name,
+            body=build_unchecked(RigidBody, inertia=read_only(scene.body.inertia / self.moment)),
+            R_WB0=scene.R_WB0,
+            w_WB_B0=read_only(scene.w_WB_B0 * self.time),
+            t_end=scene.t_end / self.time,
+            potential=potential and potential.in_units(energy),  # type: ignore[attr-defined]  # `find_units` has looked
+            dt=scene.dt / self.time,
+        )
+
+    def restore(self, found: Trajectory, scene: Scene, grid: Grid) -> Trajectory:
+        """Return the trajectory of a scene on a grid, both in SI units, that was found in these units."""
+        failure = found.failure and found.failure.at_times(self.time)
+        w_WB_B = found.w_WB_B / self.time
+        return replace(found, scene=scene, t=grid.t[: len(found)], w_WB_B=w_WB_B, failure=failure)
+
+
+SI = Units(1.0, 1.0)
+
+
+def find_units(scene: Scene, dt: float) -> Units:
+    """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not far below."""
+    if scene.potential is not None and not hasattr(scene.potential, "in_units"):
+        return SI
+    moment, rate = scene.derive(find_exponents)
+    step = math.frexp(dt)[1]
+    time = step if rate is None else min(-rate, step - SHORTEST)
+    moment, time = (COARSE * int(exponent / COARSE) for exponent in (moment, time))
+    return Units(2.0**moment, 2.0**time) if moment or time else SI
+
+
+def find_exponents(scene: Scene) -> tuple[int, int | None]:
+    """Return exponents: of the largest moment, kg m^2, and of the rate that all energy makes of it, 1/s, if there is any."""
+    moment = math.frexp(float(scene.body.moments.max()))[1]
+    energy = scene.kinetic_energy0 + (0.0 if scene.potential is None else scene.potential.scale())
+    return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
+
+
+def converted(scene: Scene, units: Units) -> Scene:
+    """Return the scene in other units."""
+    return scene if units == SI else units.convert(scene)
+
+
+def bound_rate(scene: Scene) -> float:
+    """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
+    units = find_units(scene, scene.dt)
+    of_order_one = scene.derive(converted, units)
+    return math.sqrt(2 * of_order_one.energy_scale / float(of_order_one.body.moments.min())) / units.time
+
+
+def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
+    """Make a `Method.prepare` of one that is given only scenes of order one."""
+
+    @wraps(prepare)
+    def prepare_in_units(method: AnyMethod, scene: Scene, grid: Grid) -> Run:
+        units = find_units(scene, grid.dt)
+        if units == SI:
+            return prepare(method, scene, grid)
+        steps = Grid(grid.dt / units.time, grid.n_steps, grid.every)
+        run = prepare(method, scene.derive(converted, units), steps)
+        return lambda: units.restore(run(), scene, grid)
+
+    return prepare_in_units

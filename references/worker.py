@@ -1,0 +1,221 @@
+"""Work in a process of its own, which is ended when the work takes too long or ends the process itself.
+
+Neither a thread nor a signal can end work for certain: an engine may keep the interpreter to itself for ever. A process can
+always be killed. It is started afresh and not forked, so that threads of the parent do no harm and the main module of a script
+is not run again; it stays for the next piece of work, so that imports and compiled code are paid for once. Source: our own.
+"""
+
+from __future__ import annotations
+
+import atexit
+import faulthandler
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from .pickling import NotTransferable, dump, load
+
+T = TypeVar("T")
+START_LIMIT = 120.0
+"""Time, s, that a process may take to start, on however busy a machine."""
+GRACE = 5.0
+"""How long after its limit, s, a process ends by itself: where the parent is not there any more to end it."""
+MOST_SHARED = 8
+"""Shared objects that either side keeps: the parent their bytes, the process what was made of them, compiled code included."""
+MOST_MODULES = 16
+"""Modules at most that are sent because the process cannot import them."""
+START = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]);"
+    "from conservative.references.worker import serve; serve(int(sys.argv[2]))"
+)
+_idle: list[Worker] = []
+
+
+class TimeLimitExceeded(TimeoutError):
+    """A piece of work took longer than it was given, and was ended. Attribute: `limit` (s)."""
+
+    def __init__(self, limit: float) -> None:
+        self.limit = limit
+        super().__init__(f"ended after {limit:g} s")
+
+
+class WorkerDied(RuntimeError):
+    """A piece of work ended its process, such as by a segmentation fault. Attribute: `status`, negative for a signal."""
+
+    def __init__(self, status: int) -> None:
+        self.status = status
+        super().__init__(f"signal {-status}" if status < 0 else f"its process ended with status {status}")
+
+
+def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = ()) -> T:
+    """Return what `work` returns, or raise what it raises, if that takes no longer than `limit` s; else it is ended.
+
+    It runs in another process: what it changes there changes nothing here.
+
+    Parameters
+    ----------
+    limit
+        Wall time, s, without the start of the process.
+    work
+        What to do. It may be a lambda, and hold anything that cloudpickle can make bytes of.
+    shared
+        Frozen objects that it refers to, which are sent once and kept for the next piece of work; those that it returns are
+        these very objects again. Hashable.
+
+    Raises
+    ------
+    TimeLimitExceeded
+        It takes longer.
+    WorkerDied
+        It ended its process.
+    NotTransferable
+        It, or what it returns, has parts that exist in one process only. It was not begun, or is lost.
+    MissingExtra
+        cloudpickle, of the extra `report`, is not installed.
+    """
+    by_value: list[str] = []
+    while True:
+        kept = [_bytes_of(each, tuple(by_value)) for each in shared]
+        kind, content = _ask(limit, kept, dump(work, shared, by_value))
+        if kind == "returned":
+            return load(content, shared)
+        if kind == "raised":
+            raise load(content, shared)
+        name = content.decode()
+        if kind == "lost" or name not in sys.modules or name in by_value or len(by_value) == MOST_MODULES:
+            raise NotTransferable(name)
+        by_value.append(name)  # the process cannot import it
+
+
+@lru_cache(maxsize=MOST_SHARED)
+def _bytes_of(value: object, by_value: tuple[str, ...]) -> bytes:
+    return dump(value, (), by_value)
+
+
+def _ask(limit: float, shared: list[bytes], work: bytes) -> tuple[str, bytes]:
+    """Return the answer of an idle process, or of a new one, which is idle again after that."""
+    worker = _take_idle() or Worker()
+    try:
+        answer = worker.answer(limit, dump((sys.path, limit, shared, work)))
+    except BaseException:  # KeyboardInterrupt too
+        worker.end()
+        raise
+    _idle.append(worker)
+    return answer
+
+
+def _take_idle() -> Worker | None:
+    """Return a process that waits for work; None where none does."""
+    while True:
+        try:
+            worker = _idle.pop()
+        except IndexError:
+            return None
+        if worker.parent == os.getpid() and worker.process.poll() is None:
+            return worker
+        worker.end()
+
+
+@atexit.register
+def end_idle() -> None:
+    """End all processes that wait for work: nothing is left running, and the next piece of work starts a new one."""
+    while (worker := _take_idle()) is not None:
+        worker.end()
+
+
+class Worker:
+    """A process that does one piece of work after the other."""
+
+    def __init__(self) -> None:
+        self.parent = os.getpid()
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-c", START, json.dumps(sys.path), str(theirs.fileno())],
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C is for the parent, which ends this
+            )
+        self.connection = Connection(ours.detach())
+        try:
+            self.answer(START_LIMIT, b"")
+        except BaseException:
+            self.end()
+            raise
+
+    def answer(self, limit: float, message: bytes) -> tuple[str, bytes]:
+        """Return what the process answers to a message within `limit`, in s; see `serve`.
+
+        Raises
+        ------
+        TimeLimitExceeded, WorkerDied
+            It does not.
+        """
+        try:
+            self.connection.send_bytes(message)
+            if not self.connection.poll(limit):
+                raise TimeLimitExceeded(limit)
+            kind, content = load(self.connection.recv_bytes())
+        except (EOFError, ConnectionError):
+            raise WorkerDied(self.process.wait()) from None
+        return kind, content
+
+    def end(self) -> None:
+        """End the process, whatever it does, and wait until it is gone."""
+        self.connection.close()
+        if self.parent == os.getpid():
+            self.process.kill()
+            self.process.wait()
+
+
+def serve(descriptor: int) -> None:
+    """Do one piece of work after the other, as messages from the parent say, until the parent is gone."""
+    os.dup2(2, 1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    connection = Connection(descriptor)
+    with open(os.devnull, "w") as nowhere:  # noqa: PTH123  # a stream with a descriptor
+        while True:
+            try:
+                message = connection.recv_bytes()
+            except (EOFError, ConnectionError):
+                return
+            connection.send_bytes(dump(_do(message, nowhere) if message else ("started", b"")))
+
+
+def _do(message: bytes, nowhere: Any) -> tuple[str, bytes]:
+    """Return how a piece of work ended, and the bytes of what it returned or raised.
+
+    "unknown" is a module that cannot be imported here, and "lost" why there are no bytes.
+    """
+    sys.path[:], limit, kept, work = load(message)
+    faulthandler.dump_traceback_later(limit + GRACE, exit=True, file=nowhere)
+    try:
+        shared = [_load_shared(content) for content in kept]
+        do = load(work, shared)
+    except ModuleNotFoundError as error:
+        return "unknown", (error.name or "").encode()
+    else:
+        return _answer(do, shared)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+_load_shared = lru_cache(maxsize=MOST_SHARED)(load)
+
+
+def _answer(work: Callable[[], Any], shared: Sequence[object]) -> tuple[str, bytes]:
+    try:
+        kind, found = "returned", work()
+    except Exception as error:
+        kind, found = "raised", error
+    try:
+        return kind, dump(found, shared)
+    except NotTransferable as error:
+        return "lost", str(error).encode()

@@ -1,0 +1,105 @@
+"""Engines of another package, written for the tests: one fast and good, one in plain Python and slow, and some that do harm."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+import conservative as cv
+from conservative.attitude import hat
+from conservative.method import Grid, Run
+from conservative.references.exact.method import Exact
+from conservative.trajectory import Counters
+
+
+@dataclass(frozen=True)
+class Foreign(cv.Method):
+    """What the engines here share: they are for free bodies, and of order 4."""
+
+    role: ClassVar[cv.Role] = cv.Role.ENGINE
+
+    @property
+    def order(self) -> int:
+        return 4
+
+    def unsupported(self, scene: cv.Scene) -> str | None:
+        return None if scene.free else "it is for free bodies"
+
+
+@dataclass(frozen=True)
+class Fast(Foreign):
+    """The closed form under another name, which nothing beats: some foreign engine may be the best."""
+
+    family: ClassVar[str] = "foreign_fast"
+
+    def prepare(self, scene: cv.Scene, grid: Grid) -> Run:
+        run = Exact().prepare(scene, grid)
+
+        def relabel() -> cv.Trajectory:
+            found = run()
+            return cv.Trajectory(scene, found.t, found.R_WB, found.w_WB_B, self.label, found.counters, found.failure)
+
+        return relabel
+
+
+@dataclass(frozen=True)
+class Slow(Foreign):
+    """The classical method of Runge and Kutta in plain Python, which sleeps `pause` s in each step besides."""
+
+    pause: float = 0.0
+    family: ClassVar[str] = "foreign_slow"
+
+    def prepare(self, scene: cv.Scene, grid: Grid) -> Run:
+        J, inverse, h = scene.body.inertia, np.linalg.inv(scene.body.inertia), grid.dt
+
+        def rate(state: np.ndarray) -> np.ndarray:
+            R, w = state[:3], state[3]
+            return np.vstack([R @ hat(w), inverse @ np.cross(J @ w, w)])
+
+        def run() -> cv.Trajectory:
+            state = np.vstack([scene.R_WB0, scene.w_WB_B0])
+            kept = [state]
+            for step in range(1, grid.n_steps + 1):
+                a = rate(state)
+                b = rate(state + h / 2 * a)
+                c = rate(state + h / 2 * b)
+                state = state + h / 6 * (a + 2 * b + 2 * c + rate(state + h * c))
+                time.sleep(self.pause)
+                if step % grid.every == 0 or step == grid.n_steps:
+                    kept.append(state)
+            states = np.array(kept)
+            return cv.Trajectory(scene, grid.t, states[:, :3], states[:, 3], self.label, Counters(steps=grid.n_steps))
+
+        return run
+
+
+@dataclass(frozen=True)
+class Harmful(Foreign):
+    """What does harm in the way that `how` says."""
+
+    how: str = "nan"
+    family: ClassVar[str] = "foreign_harm"
+
+    def prepare(self, scene: cv.Scene, grid: Grid) -> Run:
+        return lambda: getattr(self, self.how)(scene, grid)
+
+    def nan(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
+        n = grid.n_samples
+        return cv.Trajectory(scene, grid.t, np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), self.label)
+
+    def short(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
+        return cv.Trajectory(scene, grid.t[:2], np.stack([scene.R_WB0] * 2), np.stack([scene.w_WB_B0] * 2), self.label)
+
+    def hang(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
+        while True:
+            pass
+
+    def exit(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
+        os._exit(3)
+
+    def abort(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
+        os.abort()

@@ -1,0 +1,150 @@
+"""Studies and recommendations beside engines that are slow, hang, lie or end their process."""
+
+import math
+import threading
+
+import numpy as np
+import psutil
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import rotation_about
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import studies, study
+from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
+from conservative.benchmarks.studies.study import Study
+from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
+from conservative.method import grid_for
+from conservative.outcome import OutcomeKind
+from conservative.references import worker
+
+from .foreign_engines import Fast, Harmful, Slow
+from .generic_study import SCENE, truth
+
+HOOK = np.array([0.1, 0.2, 0.4])
+FIELD = cv.FunctionPotential(lambda R: float((R[2] @ HOOK) ** 4), lambda R: np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK))
+SPRUNG = cv.Scene(
+    "from lambdas", cv.RigidBody((1.7, 0.9, 2.3)), rotation_about((0.3, -0.8, 0.5), 1.1), (0.7, -1.3, 2.1), 2.0, FIELD
+)
+
+
+def rows(name, *methods, **settings):
+    return list(studies.rows(Study(name, (SCENE,), methods, truth=truth, **settings)))
+
+
+def copy_of(scene):
+    """The same scene as another object, as what was ended on one is not tried on it again."""
+    return scene.rename(scene.name)
+
+
+@pytest.mark.parametrize("scene", [SCENE, SPRUNG], ids=lambda scene: scene.name)
+@pytest.mark.parametrize("name", ["scipy", "mujoco:RK4", "heyoka", "pinocchio"])
+def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
+    case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
+    here, there = attempt(case), attempt_apart(60.0, case)
+    if isinstance(here, Failure):
+        assert here == there
+        return
+    again = there.run()
+    for found in (there.trajectory, again):
+        assert found.scene is scene
+        assert (found.label, found.counters) == (here.trajectory.label, here.trajectory.counters)
+        for part in ("t", "R_WB", "w_WB_B"):
+            assert np.array_equal(getattr(found, part), getattr(here.trajectory, part))
+
+
+@pytest.mark.parametrize(
+    ("how", "limit", "kind", "reason"),
+    [
+        ("hang", 0.5, OutcomeKind.TIMEOUT, "ended after 0.5 s"),
+        ("exit", 60.0, OutcomeKind.CRASHED, "its process ended with status 3"),
+        ("abort", 60.0, OutcomeKind.CRASHED, "signal 6"),
+    ],
+)
+@pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
+def test_what_an_engine_does_to_its_process_is_an_outcome(how, limit, kind, reason, attempt_so):
+    worker.end_idle()
+    before = threading.enumerate()
+    done = attempt_so(limit, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
+    assert (done.outcome.kind, done.outcome.reason) == (kind, reason)
+    assert threading.enumerate() == before
+    assert psutil.Process().children(recursive=True) == []
+
+
+def test_nobody_waits_for_the_same_twice():
+    case = Case("any", copy_of(SCENE), Harmful("hang"), grid_for(SCENE, 0.05))
+    assert attempt_within(0.2, case).outcome.reason == "ended after 0.2 s"
+    assert attempt_within(0.1, case).outcome.reason == "a run of 40 steps was ended after 0.2 s"
+    assert attempt_within(0.3, case).outcome.reason == "ended after 0.3 s"
+
+
+def test_a_method_that_cannot_be_sent_runs_here():
+    class Held(Fast):
+        lock = threading.Lock()
+
+        def prepare(self, scene, grid):
+            with self.lock:
+                return super().prepare(scene, grid)
+
+    assert isinstance(attempt_within(60.0, Case("any", SCENE, Held(), grid_for(SCENE, 0.05))), Success)
+
+
+@pytest.mark.parametrize("name", ["paper", "convergence", "speed", "work_precision", "long_runs", "sphere_curves", "stability"])
+def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
+    monkeypatch.setattr(study, "HANG_LIMIT", 0.5)
+    monkeypatch.setattr(studies.stability, "FIRST_LIMIT", 0.5)
+    scene = copy_of(SCENE)
+    found = list(studies.rows(Study(name, (scene,), (Harmful("hang"), cv.Reduced()), quick=True, truth=truth, time_limit=0.05)))
+    mine = [row for row in found if row.method == Harmful("hang").name]
+    assert {row.outcome.kind for row in mine} <= {OutcomeKind.TIMEOUT, OutcomeKind.SKIPPED, OutcomeKind.NO_ORDER}
+    assert all(math.isnan(row.value) for row in mine)
+    assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine) or name == "sphere_curves"
+    assert any(row.outcome.ok for row in found if row.method == "reduced") or name == "sphere_curves"
+
+
+def test_a_slow_engine_has_a_line_of_fewer_points():
+    slow = Slow(pause=0.002)
+    found = rows("work_precision", slow, time_limit=0.08)  # 12, 24, 48 and 96 steps, of up to 1536
+    timed = [row for row in found if row.measure is Measure.TIME and row.outcome.ok]
+    assert len(timed) >= 3
+    assert all(row.value > 0.002 / row.dt for row in timed)
+    errors = [row.value for row in found if row.measure is Measure.ATTITUDE_MAX and row.outcome.ok]
+    assert len(errors) == len(timed)
+    assert errors[-1] < errors[0] / 50
+    left = [row for row in found if not row.outcome.ok]
+    assert left
+    assert {row.outcome.kind for row in left} == {OutcomeKind.SKIPPED}
+    assert all("more than 0.08 s" in row.outcome.reason for row in left)
+
+
+def test_a_slow_engine_has_an_order():
+    found = {
+        row.measure: row for row in rows("convergence", Slow(pause=0.001), time_limit=0.05) if row.measure is Measure.ORDER
+    }
+    assert found[Measure.ORDER].value == pytest.approx(4, abs=0.5)
+
+
+def test_a_slow_engine_is_timed_over_fewer_steps():
+    found = rows("speed", Slow(pause=0.01), cv.Reduced(), quick=True, time_limit=0.1)
+    mine = {row.measure: row for row in found if row.method.startswith("foreign_slow")}
+    assert all(row.outcome.ok and row.value > 0 for row in mine.values())
+    assert mine[Measure.TIME_PER_STEP].value >= 0.01
+    steps = int(mine[Measure.TIME].detail.split()[-2])
+    assert 8 <= steps < SCENE.t_end / SCENE.dt
+    assert mine[Measure.TIME].value == pytest.approx(mine[Measure.TIME_PER_STEP].value / SCENE.dt)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, math.nan, math.inf, "long"])
+def test_a_limit_is_a_duration(limit):
+    with pytest.raises(cv.BadInput) as caught:
+        Study("speed", (SCENE,), (cv.Reduced(),), time_limit=limit)
+    assert caught.value.argument == "time_limit"
+
+
+def test_the_limits_of_a_study():
+    limits = {quick: Study("speed", (SCENE,), (cv.Reduced(),), quick) for quick in (False, True)}
+    assert (limits[False].longest_run, limits[True].longest_run) == (0.6, 0.15)
+    assert limits[False].hang_limit == 60.0
+    given = Study("speed", (SCENE,), (cv.Reduced(),), time_limit=10.0)
+    assert (given.longest_run, given.hang_limit) == (10.0, 100.0)

@@ -1,0 +1,155 @@
+"""Parts of kernels whose faults a whole run hides: carries, limits of trust, the kind of a failure, ends of series."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from mpmath import MPContext
+
+import conservative as cv
+from conservative.attitude import angle_between
+from conservative.kernels import gauss, moser_veselov, reduced
+from conservative.method import Grid
+from conservative.methods.coefficients.gauss_legendre import tableau
+from conservative.methods.gauss import convert, find_coefficients
+from conservative.methods.moser_veselov import find_polhode
+
+from .test_large_steps import free_body, heavy_body
+
+J, H = (1.0, 1.4, 2.0), 0.5
+INVERSE = tuple(1 / x for x in J)
+Q, L = (1.0, 0.0, 0.0, 0.0), (0.5, -0.4, 0.9)
+CARRY = (1e-9, -2e-9, 3e-9)
+"""As large as a carry never is: what it must be for a step to show it."""
+TIGHT = 1e-24
+
+
+def gain_of_steps(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
+    """What a step of the loop adds to a momentum that is `start` less `carry`."""
+    lengths, q_out, L_out = np.array([H]), np.empty((2, 4)), np.empty((2, 3))
+    state = (Q, (0.0, 0.0, 0.0, 0.0), tuple(start.tolist()), carry)
+    history = reduced.no_history()
+    found = reduced.take_steps(lengths, 1, 1, 1, J, INVERSE, None, TIGHT, (1, 0), 0, state, history, q_out, L_out)
+    _, _, after, left = found[4]
+    return np.array(after) - left - (start - carry)
+
+
+def gain_of_branch(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
+    """The same by continuation, and without the sum."""
+    return np.array(reduced.continue_branch(H, J, INVERSE, None, Q, tuple(start.tolist()), carry, TIGHT)[1])
+
+
+@pytest.mark.parametrize("gain", [gain_of_steps, gain_of_branch])
+def test_the_last_correction_has_what_the_sum_of_momenta_lost(gain) -> None:
+    exact = gain(np.array(L) - CARRY, (0.0, 0.0, 0.0))
+    assert np.abs(gain(np.array(L), CARRY) - exact).max() < 1e-14  # measured 2e-16
+    assert np.abs(gain(np.array(L), (0.0, 0.0, 0.0)) - exact).max() > 1e-10  # measured 3e-9: what a forgotten carry does
+
+
+def trust(size: float, near: float, momentum: tuple[float, ...] = L) -> bool:
+    """Whether Newton's method is trusted from a guess whose distance from the solution has `size` for its square over |a|^2."""
+    a = np.array(reduced.continue_branch(H, J, INVERSE, None, Q, momentum, (0.0, 0.0, 0.0), 1e-20)[0])
+    aside = np.array([0.0, 0.6, -0.8]) * np.sqrt(size) * np.linalg.norm(a)
+    guess = tuple((a + aside).tolist())
+    _, _, _, _, trusted = reduced.newton_solve(H, J, None, Q, momentum, (0.0, 0.0, 0.0), guess, near, 1e-8)
+    return bool(trusted)
+
+
+def test_newton_is_trusted_near_its_guess_alone() -> None:
+    assert trust(0.2, reduced.NEAR)
+    assert not trust(0.4, reduced.NEAR)
+    assert trust(0.005, reduced.NEAR_TANGENT)
+    assert not trust(0.03, reduced.NEAR_TANGENT)
+
+
+def test_newton_is_trusted_no_farther_from_a_solution_of_size_nothing() -> None:
+    small = tuple(1e-3 * x for x in L)  # |a| = 1.5e-4
+    a = np.linalg.norm(reduced.continue_branch(H, J, INVERSE, None, Q, small, (0.0, 0.0, 0.0), 1e-20)[0])
+    assert trust(7e-5 / a**2, 0.0, small)
+    assert not trust(3e-4 / a**2, 0.0, small)
+
+
+KINDS = (
+    (cv.Reduced(), cv.scenes.lagrange_top(), 0.50, cv.OutcomeKind.WRONG_BRANCH),
+    (cv.Reduced(), cv.scenes.lagrange_top(), 0.55, cv.OutcomeKind.NOT_CONVERGED),
+    (cv.Gauss(3), heavy_body(16), 6.0, cv.OutcomeKind.WRONG_BRANCH),
+    (cv.Gauss(3), heavy_body(12), 6.0, cv.OutcomeKind.NOT_CONVERGED),
+)
+
+
+@pytest.mark.parametrize(("method", "scene", "dt", "kind"), KINDS)
+def test_only_a_step_with_another_solution_is_of_the_wrong_branch(method, scene, dt, kind) -> None:
+    assert method.prepare(scene, Grid(dt, 1))().outcome.kind is kind
+
+
+def test_weights_of_gauss_have_a_low_part_and_it_is_added() -> None:
+    for stages in (3, 5, 10):
+        mp, table = MPContext(), tableau(stages)
+        mp.dps = 40
+        for node, high, low in zip(table.c, table.b, table.b_low, strict=True):
+            x = mp.findroot(lambda x: mp.legendre(stages, x), mp.mpf(float(2 * node - 1)))  # noqa: B023
+            exact = 1 / ((1 - x**2) * mp.diff(lambda x: mp.legendre(stages, x), x) ** 2)  # noqa: B023
+            assert abs(high + mp.mpf(low) - exact) < 1e-30
+        assert np.abs(table.b_low).max() > 0
+
+
+def test_a_step_of_gauss_adds_both_parts_of_the_weights() -> None:
+    b, low = np.array([0.25, 0.5, 0.25, 0.0]), np.array([0.0, 0.125, 0.0, 0.0])
+    F, U, carry = np.ones(24), np.zeros(6), np.zeros(6)
+    gauss.advance(0.5, b, low, F, U, carry)
+    assert U.tolist() == [0.5 * 1.125] * 6
+
+
+def test_coefficients_of_gauss_reach_the_kernel_with_their_low_parts() -> None:
+    coefficients = find_coefficients(5, 0.1)
+    assert coefficients.b_low[:5].tolist() == tableau(5).b_low.tolist()
+    assert np.any(coefficients.b_low)
+
+
+@pytest.mark.parametrize("turns", [[2.0**53, 1, 1, 1, 1, 1], [2.0**53, -0.5, -0.25, -0.5, -0.5], [1.0, 2.0**53, 1, 3, 3, 0.25]])
+def test_the_angle_of_gauss_is_a_sum_without_loss(turns: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loop in Python, with made-up integrals: each angle stored is the exact sum, rounded once."""
+    stored, left = [], iter(turns)
+    monkeypatch.setattr(gauss, "integrate_turn", lambda *_: next(left))
+    monkeypatch.setattr(gauss, "store", lambda row, turned, phi, *_: stored.append(phi))
+    march = getattr(gauss.march, "py_func", gauss.march)
+    march(convert(heavy_body(1), cv.Gauss(2))[2], find_coefficients(2, 0.01), (len(turns), 1, 0, None, None))
+    exact = Fraction(0)
+    for phi, turn in zip(stored[1:], turns, strict=True):
+        exact += Fraction(turn)
+        assert abs(Fraction(phi) - exact) <= Fraction(np.spacing(float(exact))) / 2
+
+
+@pytest.mark.parametrize(("dt", "parts"), [(0.2, 1), (0.4, 2), (0.7, 3), (1.0, 4), (1.3, 5)])
+def test_steps_past_half_a_nutation_are_divided(dt: float, parts: int) -> None:
+    """Half of one takes 0.3 s. The run is then as good as one of short steps."""
+    scene = cv.scenes.lagrange_top()
+    long = cv.Lame().prepare(scene, Grid(dt, 12))()
+    short = cv.Lame().prepare(scene, Grid(dt / 64, 12 * 64, 64))()
+    assert long.counters.stages == 12 * parts
+    assert angle_between(long.R_WB, short.R_WB).max() < 1e-11  # measured 7e-14
+
+
+def test_series_of_moser_and_veselov_have_the_terms_of_every_order() -> None:
+    """Half as many as the highest order: machine code reads what lies behind an array without a word."""
+    polhode = find_polhode(free_body(2))[1]
+    orders = [method.order for method in map(cv.MoserVeselov, range(2, 11, 2))]
+    assert max(orders) == 10
+    with pytest.raises(cv.BadInput):
+        cv.MoserVeselov(12)
+    for series in moser_veselov.calibration_series(polhode, 0.1):
+        assert len(series) >= max(orders) // 2
+
+
+@pytest.mark.parametrize("order", [2, 4, 6, 8, 10])
+def test_a_step_of_moser_and_veselov_has_the_error_of_its_order(order: int) -> None:
+    polhode = find_polhode(free_body(2))[1]
+
+    def error(h: float) -> float:
+        steps = (moser_veselov.preprocessed_step(polhode, h, order), moser_veselov.exact_step(polhode, h))
+        found, exact = (np.array(moser_veselov.normalise(step)) for step in steps)
+        return float(np.abs(found - exact).max())
+
+    assert np.log2(error(0.8) / error(0.4)) == pytest.approx(order + 1, abs=0.6)

@@ -1,0 +1,200 @@
+"""Signals and other threads during a compiled run, and blocks of steps that leave no trace in its results."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.deferred_imports import kernels
+from conservative.method import Grid, Run
+from conservative.methods.principal_axes import principal_start
+from conservative.methods.run_kernel import prepare_run
+
+HANG = 120
+"""A time, s, that only what hangs exceeds."""
+INTERRUPT = """
+import os, signal, sys, threading
+import conservative as cv
+from conservative import registry
+
+for text in sys.argv[1:]:
+    scene, method = (find(name) for find, name in zip((registry.scene, registry.method), text.split()))
+    cv.integrate(scene, 1e-9, method, 2e-8)
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        cv.integrate(scene, 1e-9, method, 1.0, sample_every=10**9)
+    except KeyboardInterrupt:
+        print(text)
+"""
+LONG_RUNS = (
+    ("brick_flip", "reduced"),
+    ("lagrange_top", "reduced:order=8"),
+    ("sprung_body", "reduced"),
+    ("lagrange_top", "gauss:stages=6"),
+    ("lagrange_top", "lame"),
+    ("brick_flip", "moser_veselov"),
+    ("sprung_body", "projected"),
+    ("lagrange_top", "substepped"),
+    ("brick_flip", "convected"),
+)
+
+
+def test_an_interrupt_ends_runs_of_a_billion_steps() -> None:
+    """The signals come from another thread, which therefore runs while the kernel does."""
+    for scene, method in LONG_RUNS:  # compiled here, it counts for no hang
+        cv.integrate(registry.scene(scene), 1e-9, registry.method(method), 2e-8)
+    runs = [f"{scene} {method}" for scene, method in LONG_RUNS]
+    command = [sys.executable, "-P", "-c", INTERRUPT, *runs]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, timeout=HANG)
+    assert done.stdout.splitlines() == runs
+
+
+class Stop(BaseException):
+    """What a handler of the tests raises."""
+
+
+@contextmanager
+def alarms(interval: float, handler: object) -> Iterator[None]:
+    """Alarms every so many seconds, and their handler."""
+    before = signal.signal(signal.SIGALRM, handler)  # type: ignore[arg-type]
+    signal.setitimer(signal.ITIMER_REAL, interval, interval)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def long_run(n_steps: int = 10**9) -> cv.Trajectory:
+    return cv.Reduced().prepare(cv.scenes.brick_flip(), Grid(1e-6, n_steps, n_steps))()
+
+
+def test_what_a_handler_raises_comes_out_as_it_is() -> None:
+    def stop(*_: object) -> None:
+        raise Stop("reason")
+
+    with pytest.raises(Stop, match="reason"), alarms(0.05, stop):
+        long_run()
+
+
+def test_a_handler_that_raises_nothing_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels("reduced"), "PAUSE", 1000)
+    calls: list[int] = []
+    with alarms(0.001, lambda number, _: calls.append(number)):
+        found = long_run(10**6)
+    assert len(calls) > 2
+    assert states(found) == states(long_run(10**6))
+
+
+def repeat(run: Run) -> None:
+    """Make so many runs that an alarm falls into one."""
+    for _ in range(1000):
+        run()
+
+
+def test_samples_without_end_are_interrupted_too() -> None:
+    """A run of few steps a sample: the most time goes into bringing the samples into body axes."""
+
+    def stop(*_: object) -> None:
+        raise Stop
+
+    run = cv.MoserVeselov().prepare(cv.scenes.brick_flip(), Grid(1e-6, 3 * 10**5))
+    reference = states(run())
+    with pytest.raises(Stop), alarms(0.002, stop):
+        repeat(run)
+    assert states(run()) == reference
+
+
+def quartic() -> cv.FunctionPotential:
+    hook = np.array([0.0, 0.1, 0.4])
+    return cv.FunctionPotential(
+        lambda R: float((R[2] @ hook) ** 4), lambda R: np.outer((0, 0, 1), 4 * (R[2] @ hook) ** 3 * hook)
+    )
+
+
+def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
+    """Signals come before, during and after the Python functions; what follows is not spoiled by a half-finished evaluation."""
+
+    def stop(*_: object) -> None:
+        raise Stop
+
+    scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic())
+    short, long = (cv.Reduced().prepare(scene, Grid(1e-6, n, n)) for n in (5, 10**6))
+    reference = states(short())
+    for k in range(20):
+        with pytest.raises(Stop), alarms(0.01 + 1e-4 * k, stop):
+            long()
+        assert states(short()) == reference
+
+
+def test_a_time_limit_in_another_thread_is_kept() -> None:
+    """The run is let go on: a thread that is a daemon ends with its process."""
+    started = threading.Event()
+
+    def work() -> None:
+        started.set()
+        long_run(5 * 10**7)
+
+    long_run(10)
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    started.wait()
+    thread.join(0.1)
+    assert thread.is_alive()
+
+
+def states(trajectory: cv.Trajectory) -> tuple[bytes, bytes, object, str]:
+    return trajectory.R_WB.tobytes(), trajectory.w_WB_B.tobytes(), trajectory.counters, str(trajectory.outcome)
+
+
+BLOCKS = (
+    *((scene, method, 1) for scene, method in LONG_RUNS if registry.method(method).kernel),
+    ("lagrange_top", "reduced", 30),
+    ("lagrange_top", "reduced", 55),
+    ("asymmetric_top", "reduced:order=4", 12),
+    ("lagrange_top", "gauss:stages=2", 40),
+    ("lagrange_top", "lame", 60),
+    ("brick_flip", "gauss:stages=3", 60),
+)
+
+
+@pytest.mark.parametrize(("scene", "method", "factor"), BLOCKS)
+def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short steps, long ones that the solver reaches in parts, and steps that fail."""
+    chosen, motion = registry.method(method), registry.scene(scene)
+    dt = min(factor * motion.dt, 0.9 * chosen.longest_step(motion))
+    run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.kernel)
+    monkeypatch.setattr(kernel, "PAUSE", 0)
+    whole = states(run())
+    for pause in (1, 2, 7, 100):
+        monkeypatch.setattr(kernel, "PAUSE", pause)
+        assert states(run()) == whole
+
+
+@pytest.mark.parametrize("name", sorted({family.kernel for family in registry.list_families().values() if family.kernel}))
+def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Kernel:
+        PAUSE, FAILURE, pauses = kernels(name).PAUSE, "", []
+
+        def enter(self, n_steps: int, every: int, pause: int, q: np.ndarray, L: np.ndarray) -> tuple[object, ...]:
+            self.pauses.append(pause)
+            q[:], L[:] = 1.0, 1.0
+            return n_steps, n_steps, 0, None, 0.0, False
+
+    scene, kernel = cv.scenes.brick_flip(), Kernel()
+    run = prepare_run(scene, Grid(0.1, 3), "label", principal_start(scene), kernel, (), ())
+    run()
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(run).result()
+    assert kernel.pauses == [kernel.PAUSE, 0]
+    assert kernel.PAUSE > 1000

@@ -1,0 +1,158 @@
+"""The same motion in units of any size is the same motion, and ordinary scenes keep their own units."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, rotation_about
+from conservative.errors import NotConverged
+from conservative.invariants import sizes
+from conservative.method import Grid, Method
+from conservative.methods.units import SI, bound_rate, find_units
+from conservative.registry import list_scenes, method
+from conservative.registry import scene as registered
+
+TURN = rotation_about((3, -1, 2), 1.3)
+MOMENTS = {"top": (1.3, 1.3, 0.6)}
+HOOK = np.array([0.3, 0.1, 0.4])
+UNITS = [(1e80, 1.0, 1.0), (1e-80, 1.0, 1.0), (1.0, 1e45, 1.0), (1e-80, 1e-40, 1e-30), (1e90, 1e-3, 1e60), (1e-6, 1e-2, 1e-2)]
+"""Units of moments, kg m^2, times, s, and lengths, m."""
+
+
+def field(kind: str, J: np.ndarray, energy: float, time: float, length: float) -> Any:
+    arm = np.array([0.3, -0.4, 0.9]) * length
+    anchor = np.array([2.0, -0.4, 0.2]) * length
+    return {
+        "free": lambda: None,
+        "top": lambda: cv.UniformGravity(2 * energy / length, TURN @ np.array([0, 0, 0.9]) * length),
+        "heavy": lambda: cv.UniformGravity(2 * energy / length, arm),
+        "spring": lambda: cv.LinearSpring(2 * energy / length / length, arm, anchor, 0.3 * length),
+        "attraction": lambda: cv.PointAttraction(2 * energy * length, arm, anchor),
+        "gradient": lambda: cv.GravityGradient(1.2 / time, J, (1, 2, 3)),
+        "function": lambda: cv.FunctionPotential(
+            lambda R: energy * (R[2] @ HOOK) ** 4, lambda R: energy * np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK), energy
+        ),
+    }[kind]()
+
+
+def scene(kind: str, moment: float = 1.0, time: float = 1.0, length: float = 1.0) -> cv.Scene:
+    """A generic motion in turned axes."""
+    J = TURN @ np.diag(MOMENTS.get(kind, (1.3, 0.7, 1.9))) @ TURN.T * moment
+    potential = field(kind, J, moment / time / time, time, length)
+    w = np.array([0.8, -0.5, 1.1]) / time
+    return cv.Scene(kind, cv.RigidBody(J), rotation_about((1, 2, 3), 0.7), w, 3 * time, potential, dt=0.05 * time)
+
+
+RUNS = [
+    *(("reduced", kind) for kind in ("free", "top", "heavy", "spring", "attraction", "gradient")),
+    *(("convected:tol=1e-9", kind) for kind in ("free", "heavy")),
+    *(
+        ("gauss", "heavy"),
+        ("lame", "top"),
+        ("moser_veselov", "free"),
+        ("projected", "heavy"),
+        ("exact", "free"),
+        ("exact", "top"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "kind"), RUNS)
+def test_a_motion_is_the_same_in_units_of_any_size(name: str, kind: str) -> None:
+    integrate = method(name)
+    expected = integrate.solve(scene(kind), Grid(0.05, 30))
+    assert expected.ok
+    for moment, time, length in UNITS:
+        other = scene(kind, moment, time, length)
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            found = integrate.solve(other, Grid(0.05 * time, 30))
+        assert found.ok, (moment, time, length, found.outcome)
+        assert found.scene is other
+        bound = 1e-12 if name != "convected:tol=1e-9" else 1e-6
+        assert angle_between(expected.R_WB, found.R_WB).max() <= bound
+        assert np.abs(found.w_WB_B * time - expected.w_WB_B).max() <= bound
+        for invariant in other.invariants:
+            assert sizes(found.drift(invariant)).max() <= bound * 1e3 or invariant.name not in integrate.conserves
+
+
+def test_a_function_potential_is_the_same_in_other_units() -> None:
+    expected, found = (cv.Reduced().solve(scene("function", *u), Grid(0.05 * u[1], 4)) for u in ((1.0, 1.0), (1e80, 1e30)))
+    assert found.ok
+    assert angle_between(expected.R_WB, found.R_WB).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", sorted(list_scenes()))
+def test_registered_scenes_keep_their_units(name: str) -> None:
+    assert find_units(registered(name), registered(name).dt) == SI
+
+
+def test_units_are_powers_of_two_to_the_sixteenth() -> None:
+    for unit in UNITS:
+        units = find_units(scene("heavy", *unit), 0.05 * unit[1])
+        for value, size in ((units.moment, unit[0]), (units.time, unit[1])):
+            mantissa, exponent = math.frexp(value)
+            assert (mantissa, (exponent - 1) % 16) == (0.5, 0)
+            assert 2**-17 < size / value < 2**17
+
+
+def test_a_potential_that_cannot_be_rescaled_is_taken_as_it_is() -> None:
+    class Foreign:
+        def __init__(self, inner: Any) -> None:
+            self.inner = inner
+
+        def __getattr__(self, name: str) -> Any:
+            if name in ("in_units", "inner"):
+                raise AttributeError(name)
+            return getattr(self.inner, name)
+
+    heavy = scene("heavy", 1e8, 1e-3)
+    theirs = heavy.rename("theirs", potential=Foreign(heavy.potential))
+    assert find_units(heavy, heavy.dt) != SI == find_units(theirs, heavy.dt)
+    assert cv.Reduced().solve(theirs, Grid(heavy.dt, 10)).ok
+
+
+def failing(time: float) -> NotConverged:
+    found = cv.Convected(1e-9).solve(scene("heavy", time * time, time), Grid(20 * time, 4))
+    assert isinstance(found.failure, NotConverged)
+    return found.failure
+
+
+def test_failures_say_the_time_in_seconds() -> None:
+    ordinary, tiny = failing(1.0), failing(2.0**-80)
+    assert (tiny.step, type(tiny), tiny.time * 2.0**80) == (ordinary.step, type(ordinary), ordinary.time)
+
+
+def test_limits_of_steps_and_rates_are_in_seconds() -> None:
+    ordinary, tiny = scene("free"), scene("free", 1e90, 2.0**-100)
+    assert cv.MoserVeselov().longest_step(tiny) == pytest.approx(cv.MoserVeselov().longest_step(ordinary) * 2.0**-100)
+    assert bound_rate(tiny) == pytest.approx(bound_rate(ordinary) * 2.0**100)
+    with pytest.raises(cv.BadInput, match=r"dt: got 1e-28"):
+        cv.integrate(tiny, 1e-28, cv.MoserVeselov(), t_end=1e-27)
+
+
+@pytest.mark.parametrize("integrate", [cv.Reduced(), cv.Lame(), cv.Gauss()])
+def test_what_hardly_moves_in_a_step_has_no_division_by_zero(integrate: Method) -> None:
+    for unit in ((1.0, 1e40, 1.0), (1e-60, 1e20, 1e-30), (1e90, 1e60, 1e30)):
+        slow = scene("top", *unit)
+        found = integrate.solve(slow, Grid(1e-90, 5))
+        # Where a step turns the body by less than 1e-100 rad, squares of rates vanish in `Lame`, which says so.
+        assert found.ok or isinstance(integrate, cv.Lame), found.outcome
+        np.testing.assert_allclose(found.w_WB_B, np.tile(slow.w_WB_B0, (len(found), 1)), rtol=1e-12)
+
+
+def test_scales_of_invariants_neither_overflow_nor_vanish() -> None:
+    for size in (1e100, 1e-100):
+        body = cv.RigidBody(np.array([1.0, 0.7, 0.9]) * size)
+        for w in ((size, 0.5 * size, 0), (0, 0, 0)):
+            falling = cv.Scene("extreme", body, np.eye(3), w, 1.0, cv.UniformGravity(size, (size, 0, 0)))
+            assert all(0 < invariant.scale < math.inf for invariant in falling.invariants)
+
+
+def test_a_step_of_a_million_turns_is_refused() -> None:
+    with pytest.raises(cv.BadInput, match="dt: got 1e"):
+        cv.integrate(scene("top"), 1e30, cv.Lame(), t_end=1e30)

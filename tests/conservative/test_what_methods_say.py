@@ -1,0 +1,190 @@
+"""What methods of ours say of themselves, value by value, and what they refuse."""
+
+import math
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.declarations import Candidacy
+from conservative.methods import moser_veselov
+from conservative.methods.coefficients import explicit
+from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
+
+from .exact_motion import free, in_field, top
+
+TOP, FREE, GRAVITY, SPRUNG = top(), free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity"), in_field("spring")
+AXIS = "momentum along the field's axis"
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "order", "conserves"),
+    [
+        (cv.Reduced(), "reduced", 2, {"energy", "momentum", "vertical momentum", AXIS}),
+        (cv.Reduced(4, frame="auto"), "reduced:order=4,frame=auto", 4, {"momentum", "vertical momentum", AXIS}),
+        (cv.Convected(), "convected", 2, {"energy", "momentum", "vertical momentum", AXIS}),
+        (cv.Gauss(3), "gauss:stages=3", 6, {"energy", "momentum", "vertical momentum", "axial momentum"}),
+        (cv.MoserVeselov(4), "moser_veselov:order=4", 4, {"energy", "momentum", "axial momentum"}),
+        (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
+        (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
+        (cv.Projected(), "projected", 8, {"energy", "vertical momentum", AXIS}),
+        (
+            cv.Substepped("reduced:order=4"),
+            "substepped:method=reduced:order=4",
+            4,
+            {"energy", "momentum", "vertical momentum", AXIS},
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_order_and_invariants(method, name, order, conserves):
+    assert (method.name, method.order, method.conserves, method.role) == (name, order, conserves, cv.Role.OURS)
+
+
+def test_candidates_and_their_cost():
+    assert (cv.Lame.candidacy, cv.Reduced.candidacy) == (Candidacy(1, exact=True), Candidacy(4, "implicit"))
+    assert (cv.MoserVeselov.candidacy.rank, cv.MoserVeselov.candidacy.exact) == (0, True)
+    assert (cv.Projected.candidacy.rank, cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (2, 3, "implicit")
+    costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
+    assert costs == [(10, 50), (50, 60), (340, 80)]
+    assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
+    assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
+
+
+def test_settings_that_are_shown():
+    assert [each.order for each in cv.Reduced.variants()] == [2, 4, 6, 8, 10]
+    assert [each.order for each in cv.Reduced.suite_settings()] == [2, 4, 6]
+    assert cv.Reduced.picture_settings() == (cv.Reduced(),)
+    assert cv.Reduced.step_goals == (("mujoco:Euler", 25), ("mujoco:RK4", 100), ("convected", 100))
+    assert cv.Reduced.claims.comparisons[0].tolerance == 1e-3
+    assert [each.stages for each in cv.Gauss.variants()] == [2, 4, 6, 8]
+    assert [each.stages for each in cv.Gauss.suite_settings()] == [2, 6]
+    assert [each.stages for each in cv.Gauss.audit_settings()] == [2]
+    assert [each.order for each in cv.MoserVeselov.variants()] == [2, 4, 6, 8, 10, None]
+    assert [each.order for each in cv.MoserVeselov.suite_settings()] == [2, None]
+    assert [each.order for each in cv.MoserVeselov.audit_settings()] == [4]
+    assert cv.Convected.picture_settings() == (cv.Convected(),)
+    assert (cv.Convected().tol, cv.Reduced().tol, cv.Gauss().stages, cv.Substepped().most) == (1e-8, 1e-20, 6, 64)
+    assert cv.Convected.claims.drift_per_step == 1e-8
+
+
+@pytest.mark.parametrize(
+    ("make", "argument"),
+    [
+        (lambda: cv.Gauss(0), "stages"),
+        (lambda: cv.Gauss(11), "stages"),
+        (lambda: cv.Gauss(2, "own"), "frame"),
+        (lambda: cv.Reduced(3), "order"),
+        (lambda: cv.Reduced(12), "order"),
+        (lambda: cv.Reduced(True), "order"),
+        (lambda: cv.Reduced(4, "one_step"), "composition"),
+        (lambda: cv.Reduced(tol=0), "tol"),
+        (lambda: cv.Reduced(frame="own"), "frame"),
+        (lambda: cv.Convected(-1), "tol"),
+        (lambda: cv.MoserVeselov(3), "order"),
+        (lambda: cv.MoserVeselov(True), "order"),
+        (lambda: cv.MoserVeselov(12), "order"),
+        (lambda: cv.Substepped(most=0), "most"),
+        (lambda: cv.Substepped("substepped"), "method"),
+        (lambda: cv.Substepped("lame"), "method"),
+        (lambda: cv.Substepped(3), "method"),
+        (lambda: Composition("odd", 3, "", ("1",)), "order"),
+        (lambda: Composition("none", 0, "", ("1",)), "order"),
+        (lambda: Composition("sum", 2, "", ("0.3", "0.5")), "half"),
+        (lambda: Composition("cubes", 4, "", ("0.3", "0.4")), "half"),
+        (lambda: explicit.ExplicitTableau("", 1, ((), ()), (0.5, 0.5)), "A"),
+        (lambda: explicit.ExplicitTableau("", 2, ((), (0.6,)), (0.0, 1.0)), "b"),
+        (lambda: explicit.ExplicitTableau("", 1, ((),), (1.0 + 1e-12,)), "b"),
+        (lambda: explicit.ExplicitTableau("", 3, ((), (2 / 3,), (2 / 3, 0.0)), (1 / 4, 0.0, 3 / 4)), "b"),
+    ],
+)
+def test_what_is_refused(make, argument):
+    with pytest.raises(cv.BadInput) as raised:
+        make()
+    assert raised.value.argument == argument
+
+
+def test_what_is_at_the_edge_of_what_is_allowed():
+    assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
+    assert cv.Substepped(most=1).most == 1
+    heun = explicit.ExplicitTableau("", 3, ((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4))
+    assert heun.c == pytest.approx((0, 1 / 3, 2 / 3))
+    factors, columns, starts = heun.packed
+    assert (factors.tolist(), columns.tolist()) == ([1 / 3, 2 / 3, 1 / 4, 3 / 4], [0, 1, 0, 2])
+    assert starts.tolist() == [0, 0, 1, 2, 4]
+    assert [composition_of(order).order for order in BEST] == list(BEST)
+    assert composition_of(4, "forest_ruth_3") is COMPOSITIONS["forest_ruth_3"]
+
+
+def test_what_methods_do_not_support():
+    said = [method.unsupported(scene) for method, scene in ((cv.Gauss(), SPRUNG), (cv.Lame(), SPRUNG), (cv.Lame(), GRAVITY))]
+    assert said[0].startswith("collocation keeps quadratic invariants")
+    assert said[1:] == ["needs uniform gravity", "body and field symmetric about one axis"]
+    assert cv.MoserVeselov().unsupported(GRAVITY) == "it is for free bodies"
+    assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
+    assert cv.Reduced(frame="non_spinning").unsupported(FREE).startswith("frame non_spinning needs")
+    assert cv.Substepped("gauss").unsupported(SPRUNG) == said[0]
+    for method, scene in (
+        (cv.Gauss(), FREE),
+        (cv.Lame(), TOP),
+        (cv.MoserVeselov(), FREE),
+        (cv.Projected(), SPRUNG),
+        (cv.Reduced(), FREE),
+    ):
+        assert method.unsupported(scene) is None
+
+
+def test_the_longest_step_of_moser_veselov():
+    speed = np.linalg.norm(FREE.w_WB_B0)
+    assert cv.MoserVeselov(4).longest_step(FREE) == pytest.approx(0.99 * 1.5 / speed)
+    nu = abs(moser_veselov.find_polhode(FREE)[1].nu)
+    limit = min(6.0 / speed, 2 * math.acos(0.2) / nu)
+    assert moser_veselov.step_limit(FREE, exact=True) == pytest.approx(limit)
+    assert moser_veselov.step_limit(free((1, 1.4, 2), (0, 0, 0)), exact=True) == math.inf
+    ball = free((1, 1, 1), (0, 0, 2))
+    assert moser_veselov.step_limit(ball, exact=True) == pytest.approx(3.0)
+    for exact, order in ((True, "exact"), (False, 4)):
+        bound = moser_veselov.step_limit(FREE, exact)
+        with pytest.raises(cv.BadInput, match="dt"):
+            cv.MoserVeselov(order).prepare(FREE, cv.Grid(bound, 1, 1))
+    assert cv.MoserVeselov().prepare(FREE, cv.Grid(0.999 * moser_veselov.step_limit(FREE, exact=True), 1, 1))
+
+
+@pytest.mark.parametrize("J", [(1.0, 1.4, 2.0), (2.0, 1.0, 1.4), (1.0, 1.0, 2.0), (2.0, 1.0, 1.0), (1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("L", [(1.0, 0.1, 0.1), (-0.1, -1.0, 0.2), (0.1, 0.2, -1.0), (0.0, 0.0, 0.0)])
+def test_axes_of_the_polhode(J, L):
+    J, L = np.array(J), np.array(L)
+    R = moser_veselov.polhode_axes(J, L)
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(R) == pytest.approx(1)
+    own, momentum = np.abs(R.T) @ J, R.T @ L
+    assert momentum[2] >= 0
+    assert sorted(J)[1] == own[1]
+    above = momentum @ momentum - np.sum(momentum**2 / own) * own[1]
+    assert above * (own[2] - own[0]) >= 0
+
+
+def test_the_papers_method_stops_where_it_cannot_go_on():
+    long = cv.Convected(1e-10).prepare(GRAVITY, cv.Grid(6.0, 4, 1))()
+    assert long.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
+    assert long.counters.steps == long.outcome.step - 1 == len(long) - 1
+    assert long.outcome.residual > 1e-10
+    assert long.outcome.time == pytest.approx((long.outcome.step - 1) * 6.0)
+
+
+def test_substeps_double_until_the_steps_are_solved():
+    grid = cv.Grid(0.6, 4, 2)
+    scene = cv.scenes.lagrange_top()
+    found = cv.Substepped().prepare(scene, grid)()
+    parts = found.counters.steps // 4
+    assert parts in (2, 4, 8, 16, 32)
+    assert found.label == f"{cv.Substepped().label}, {parts} parts a step"
+    np.testing.assert_allclose(found.t, grid.t)
+    same = cv.Reduced().prepare(scene, cv.Grid(0.6 / parts, 4 * parts, 2 * parts))()
+    np.testing.assert_array_equal(found.R_WB, same.R_WB)
+    assert not cv.Reduced().prepare(scene, cv.Grid(1.2 / parts, 2 * parts, parts))().ok
+    assert cv.Substepped(most=parts).prepare(scene, grid)().ok
+    few = cv.Substepped(most=parts // 2).prepare(scene, grid)()
+    assert few.outcome.kind in (cv.OutcomeKind.NOT_CONVERGED, cv.OutcomeKind.WRONG_BRANCH)
+    easy = cv.Substepped().prepare(scene, cv.Grid(0.001, 4, 2))()
+    assert (easy.label, easy.counters.steps) == (cv.Substepped().label, 4)

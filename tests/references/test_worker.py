@@ -1,0 +1,201 @@
+"""Work with a limit: it is ended, its end is an outcome, and nothing goes on behind it."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+import conservative as cv
+from conservative.references import worker
+from conservative.references.pickling import NotTransferable, dump, load
+from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
+
+from ..environments import run_python
+
+LONG = 60.0
+"""Time, s, that no test here needs, on however busy a machine."""
+
+
+def hang():
+    while True:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def no_process_before():
+    worker.end_idle()
+
+
+def children():
+    return psutil.Process().children(recursive=True)
+
+
+def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running():
+    before = threading.enumerate()
+    with pytest.raises(TimeLimitExceeded, match=r"ended after 0\.2 s"):
+        run_within(0.2, hang)
+    assert threading.enumerate() == before
+    assert children() == []
+
+
+def test_work_that_keeps_the_interpreter_to_itself_is_ended():
+    with pytest.raises(TimeLimitExceeded):
+        run_within(0.2, lambda: ctypes.PyDLL(None).sleep(600))  # PyDLL does not release the interpreter
+    assert children() == []
+
+
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [
+        (lambda: ctypes.string_at(0), f"signal {signal.SIGSEGV.value}"),
+        (os.abort, f"signal {signal.SIGABRT.value}"),
+        (lambda: os.kill(os.getpid(), signal.SIGKILL), f"signal {signal.SIGKILL.value}"),  # as when memory runs out
+        (lambda: os._exit(3), "its process ended with status 3"),
+    ],
+)
+def test_the_death_of_its_process_is_told(work, said):
+    with pytest.raises(WorkerDied) as caught:
+        run_within(LONG, work)
+    assert str(caught.value) == said
+    assert children() == []
+    assert run_within(LONG, lambda: 3) == 3
+
+
+def test_what_it_returns_or_raises_comes_back():
+    local = {"factor": 7}
+    assert run_within(LONG, lambda: 6 * local["factor"]) == 42
+    with pytest.raises(ZeroDivisionError):
+        run_within(LONG, lambda: 1 // 0)
+
+    def refuse():
+        raise cv.BadInput("dt", 0, "above 0")
+
+    with pytest.raises(cv.BadInput) as caught:
+        run_within(LONG, refuse)
+    assert (caught.value.argument, caught.value.got, caught.value.allowed) == ("dt", 0, "above 0")
+
+
+def test_one_process_does_one_piece_of_work_after_the_other():
+    assert run_within(LONG, os.getpid) == run_within(LONG, os.getpid) != os.getpid()
+    (process,) = children()
+    worker.end_idle()
+    assert not process.is_running()
+
+
+def test_threads_have_processes_of_their_own():
+    found = []
+    threads = [
+        threading.Thread(target=lambda k=k: found.append(run_within(LONG, lambda: (time.sleep(0.2), k)[1]))) for k in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(found) == [0, 1, 2]
+
+
+def test_an_interrupt_ends_the_work():
+    timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+    run_within(LONG, int)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        run_within(LONG, hang)
+    timer.join()
+    assert children() == []
+
+
+def test_what_cannot_be_sent_is_refused_and_the_process_stays():
+    lock = threading.Lock()
+    with pytest.raises(NotTransferable, match="lock"):
+        run_within(LONG, lambda: lock)
+    with pytest.raises(NotTransferable, match="lock"):
+        run_within(LONG, lambda: __import__("threading").Lock())
+    assert run_within(LONG, lambda: 3) == 3
+
+
+def test_what_is_shared_is_the_same_object_again():
+    scene = cv.scenes.brick_flip()
+    again, renamed = run_within(LONG, lambda: (scene, scene.rename("other")), (scene,))
+    assert again is scene
+    assert renamed.body is not scene.body
+    assert np.array_equal(renamed.body.inertia, scene.body.inertia)
+
+
+def test_frozen_values_stay_frozen_and_leave_behind_what_they_keep():
+    scene = cv.scenes.brick_flip()
+    assert scene.energy_scale
+    scene.derive(lambda scene: threading.Lock())
+    copy = load(dump(scene))
+    assert "_derivations" not in vars(copy)
+    assert not copy.R_WB0.flags.writeable
+    assert copy.R_WB0.flags.c_contiguous == scene.R_WB0.flags.c_contiguous
+    assert copy.energy_scale == scene.energy_scale
+
+
+def test_a_module_that_the_process_cannot_import_is_sent(tmp_path, monkeypatch):
+    (tmp_path / "beside_the_script.py").write_text(
+        "import math\n\ndef double(x):\n    return _twice(x) + math.floor(0.5)\n\ndef _twice(x):\n    return 2 * x\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    import beside_the_script
+
+    double = beside_the_script.double
+    monkeypatch.undo()
+    assert run_within(LONG, lambda: double(21)) == 42
+    del sys.modules["beside_the_script"]
+
+
+SCRIPT = """
+import threading
+from conservative.references.worker import TimeLimitExceeded, run_within
+
+print("main module")
+
+class Local:
+    def answer(self):
+        return 42
+
+print(run_within(60, lambda: Local().answer()))
+try:
+    run_within(0.2, lambda: [None for _ in iter(int, 1)])
+except TimeLimitExceeded as late:
+    print(late)
+"""
+
+
+def test_a_script_needs_no_guard_of_its_main_module(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    code, out, error = run_python(
+        "import runpy, sys; runpy.run_path(sys.argv[1], run_name='__main__')", str(tmp_path / "script.py")
+    )
+    assert (code, error) == (0, "")
+    assert out.splitlines() == ["main module", "42", "ended after 0.2 s"]
+
+
+ORPHAN = """
+import sys, threading, time
+from conservative.references import worker
+worker.GRACE = 0.0
+worker.run_within(60, int)
+print(worker._idle[0].process.pid, flush=True)
+if sys.argv[1] == "busy":
+    worker.run_within(2.0, lambda: [None for _ in iter(int, 1)])
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("how", ["idle", "busy"])
+def test_the_process_does_not_outlive_a_parent_that_is_killed(how):
+    with subprocess.Popen([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, text=True) as parent:
+        process = psutil.Process(int(parent.stdout.readline()))
+        time.sleep(0.5)
+        parent.kill()
+    gone, _ = psutil.wait_procs([process], timeout=LONG)
+    assert gone == [process]

@@ -1,0 +1,75 @@
+"""What charts draw is in the unit that their axes name."""
+
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from conservative import Reduced
+from conservative.benchmarks.measures.measure import Measure
+from conservative.reports.charts import figures, recommendation, spheres
+from conservative.reports.charts.style import power_axis
+from conservative.reports.tables import orders, work_precision
+
+from .rows import frame, point, row, table
+
+
+def axes(spec):
+    """Yield channel, field and title of every axis of a chart."""
+    for channel in ("x", "y"):
+        found = spec.get("encoding", {}).get(channel, {})
+        if found.get("axis"):
+            yield channel, found["field"], found["axis"]["title"]
+    for key in ("layer", "vconcat", "hconcat"):
+        for part in spec.get(key, ()):
+            yield from axes(part)
+
+
+def drawn(spec, field):
+    return sorted({each[field] for rows in spec["datasets"].values() for each in rows if field in each})
+
+
+def test_time_against_error_is_in_microseconds_and_radians():
+    points = work_precision.points(table(point("a", "ours", 1e-3, 2e-6, 0.2), point("a", "ours", 1e-6, 5e-6, 0.1)))
+    spec = figures.work_precision(points, work_precision.front(points), "made_up").to_dict()
+    assert set(axes(spec)) == {
+        ("x", "error", "largest attitude error over the run, rad"),
+        ("y", "microseconds", "wall time per simulated second, µs"),
+    }
+    assert drawn(spec, "microseconds") == pytest.approx([2.0, 5.0], rel=1e-12)
+    assert drawn(spec, "error") == [1e-6, 1e-3]
+
+
+def test_convergence_is_in_seconds_and_radians():
+    rows = [row("convergence", "a", Measure.ATTITUDE_MAX, dt**2, dt) for dt in (0.4, 0.2, 0.1)]
+    errors = orders.errors(frame(rows), Measure.ATTITUDE_MAX)
+    spec = figures.convergence(errors, orders.fit_ends(orders.fits(errors)), "made_up").to_dict()
+    assert set(axes(spec)) == {("x", "dt", "step, s"), ("y", "error", "largest attitude error over the run, rad")}
+
+
+def test_drift_is_relative_over_seconds():
+    drifts = pd.DataFrame({"family": "a", "name": "a", "t": [1.0, 2.0], "quantity": "energy", "drift": [0.0, 1e-9]})
+    spec = figures.drift(drifts, "made_up").to_dict()
+    (panel,) = spec["vconcat"]
+    assert panel["encoding"]["x"]["title"] == "t, s"
+    assert panel["encoding"]["y"]["axis"]["title"] == "largest so far, relative"
+    assert drawn(spec, "shown") == [figures.FLOOR, 1e-9]
+
+
+def test_the_cost_of_a_recommendation_is_in_microseconds():
+    probe = SimpleNamespace(method=Reduced(), dt=0.25, setting=0.25)
+    advice = [SimpleNamespace(reached=reached, best=probe, cost=3e-6, line="reduced") for reached in (True, False)]
+    found = recommendation.costs(SimpleNamespace(advice=advice))
+    assert found.to_dict("records") == [{"name": "reduced", "setting": "dt = 0.25 s", "cost": pytest.approx(3.0)}]
+
+
+def test_what_is_behind_the_sphere_is_pale():
+    curve = pd.DataFrame({"name": "a", "family": "a", "x": [1.0, 0.0], "y": [0.0, 1.0], "z": [0.0, 0.0]})
+    fade = spheres.chart(curve)["layer"][1]["encoding"]["opacity"]
+    assert fade["condition"]["test"] == "datum.near < 0"  # `near` is towards the eye
+    assert fade["condition"]["value"] < fade["value"]
+
+
+@pytest.mark.parametrize(("low", "high", "powers"), [(0.05, 200.0, [0.1, 1.0, 10.0, 100.0]), (1.0, 100.0, [1.0, 10.0, 100.0])])
+def test_a_logarithmic_axis_has_a_label_at_each_power_of_ten(low, high, powers):
+    assert power_axis("title", low, high).values == pytest.approx(powers)

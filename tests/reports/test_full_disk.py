@@ -1,0 +1,98 @@
+"""Commands on a disk that is full: one line that names what cannot be written, and what was there is as it was."""
+
+import json
+
+import pytest
+
+from conservative.benchmarks.gate import baseline, pytest_gate, results
+from conservative.benchmarks.gate.results import Row
+from conservative.errors import NotWritten
+
+from ..environments import run_python
+
+LIMITED = """
+import os, resource, sys
+limit, folder = int(sys.argv.pop(1)), sys.argv.pop(1)
+os.chdir(folder)
+with open("stdout", "w") as out:
+    os.dup2(out.fileno(), 1)
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))  # the system refuses what goes beyond, as a full disk does
+sys.argv[0] = "conservative"
+from conservative.reports.cli.launch import launch
+launch()
+"""
+SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "moser_veselov:order=2"]
+UPDATE = ["gate", "results.json", "--baseline", "baseline.json", "--update", "More rows"]
+COMMANDS = {
+    "run --csv": (2000, "csv: got 'run.csv' (", ["run", "brick_flip", "--csv", "run.csv"]),
+    "report": (2000, "out: got 'report.partial.json' (", SMALL),
+    "gate --update": (1000, "baseline: got 'baseline.json' (", UPDATE),
+    "new": (500, "stdout: got '", ["new"]),
+    "list": (500, "stdout: got '", ["list"]),
+    "list --json": (500, "stdout: got '", ["list", "--json"]),
+    "run --json": (500, "stdout: got '", ["run", "brick_flip", "--json"]),
+}
+
+
+def found(*values):
+    rows = {f"id {k}": Row(f"id {k}", "brick_flip", "reduced", "passed", values={"e": value}) for k, value in enumerate(values)}
+    return results.Results("a machine", rows, "a commit")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with files of every kind that a command replaces."""
+    baseline.write(baseline.update_baseline(None, [found(1e-3)], "First"), tmp_path / "baseline.json")
+    results.write(found(*[1e-3] * 40), tmp_path / "results.json")
+    (tmp_path / "run.csv").write_text("before")
+    return tmp_path
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.name != "stdout"}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder):
+    limit, words, arguments = COMMANDS[command]
+    before = contents(folder)
+    code, _, err = run_python(LIMITED, str(limit), str(folder), *arguments)
+    assert code == 2
+    assert err.startswith(f"Error: {words}")
+    assert "File too large" in err
+    assert "; allowed: a file" in err
+    assert err.count("\n") == 1
+    assert contents(folder) == before
+
+
+def test_a_report_without_room_does_not_say_that_it_kept_what_it_could_not(folder):
+    _, _, err = run_python(LIMITED, "2000", str(folder), *SMALL)
+    assert "are finished" not in err
+
+
+@pytest.mark.parametrize("write", ["results.write(found, Path('results.json'))", "dashboards.write(found, Path())"])
+def test_results_are_whole_or_as_before(write, folder):
+    (folder / "bencher.json").write_text("before")
+    (folder / "custom_smaller_is_better.json").write_text("before")
+    before = contents(folder)
+    code = f"""
+import os, resource, sys
+from pathlib import Path
+from conservative.benchmarks.gate import dashboards, results
+from conservative.errors import NotWritten
+os.chdir(sys.argv[1])
+found = results.read(Path('results.json'))
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+try:
+    {write}
+except NotWritten as error:
+    print(error.argument)
+"""
+    assert run_python(code, str(folder)) == (0, "results\n", "")
+    assert contents(folder) == before
+    assert json.loads(before["results.json"])["machine"] == "a machine"
+
+
+def test_the_summary_of_a_workflow_that_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(NotWritten, match=r"GITHUB_STEP_SUMMARY: got .*Is a directory"):
+        pytest_gate._append(tmp_path, "text")

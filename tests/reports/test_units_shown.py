@@ -1,0 +1,85 @@
+"""Costs, drifts and times in tables are in the unit of their header, and the right way up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.benchmarks.measures.measure import Measure
+from conservative.outcome import OK
+from conservative.reports.run import single_run
+from conservative.reports.tables import overview, recommendation, runs, scene
+from conservative.reports.tables.work_precision import CheapestLine, Contest, points
+from conservative.trajectory import Trajectory
+
+from .made_up import table
+from .rows import frame, row
+
+
+def test_verdict_is_in_microseconds():
+    header, (line, *_) = overview.verdict(table(), points(table()))
+    shown = dict(zip(header, line, strict=True))
+    assert shown["µs per simulated s"] == "3.16"  # between 1 and 10 at errors of 1e-2 and 1e-4
+    assert shown["best of ours"] == "reduced: 3.16 µs"
+    assert shown["best engine"] == "scipy DOP853: 100 µs"
+
+
+def test_contests_are_in_microseconds():
+    header, body = scene.contests([Contest("made_up", 1e-3, CheapestLine("a", 2e-6), CheapestLine("b", 8e-6))])
+    assert header[2] == header[4] == "µs per s"
+    assert body == [["1e-03", "a", "2", "b", "8", "4"]]
+
+
+def advice(reached):
+    probe = SimpleNamespace(
+        method=cv.Reduced(), dt=0.25, setting=0.25, drifts=(), expected=2e-5, error=1e-5, holds=7.0, length=3.0, outcome=OK
+    )
+    return SimpleNamespace(best=probe, reached=reached, cost=4e-6, line="reduced", order=None, probes=(probe,))
+
+
+def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds():
+    answer = SimpleNamespace(conditions=SimpleNamespace(cost_limit=1.0), advice=(advice(True), advice(False)))
+    reaching, failing, probes = recommendation.tables(answer)
+    assert dict(zip(reaching.header, reaching.rows[0], strict=True)) == {
+        "method": "reduced",
+        "setting": "dt = 0.25 s",
+        "µs per simulated s": "4",
+        "error to expect, rad": "2.0e-05",
+        "drift to expect": "kept",
+    }
+    shown = dict(zip(failing.header, failing.rows[0], strict=True))
+    assert (shown["µs per simulated s"], shown["keeps the error for"], shown["to expect, rad"]) == ("4", "7 s", "2.0e-05")
+    assert dict(zip(probes.header, probes.rows[0], strict=True))["run, s"] == "3"
+
+
+def test_truths_are_told_with_their_agreement():
+    found = [row("paper", "exact", Measure.AGREEMENT, 2.5e-15, 0.01, role="truth", label="exact and heyoka")]
+    header, body = runs.truths(frame(found))
+    assert header[1:] == ["dt, s", "truths", "largest angle between them, rad"]
+    assert body == [["made_up", "0.01", "exact and heyoka", "2.5e-15"]]
+
+
+@pytest.fixture
+def bumped():
+    """A run whose energy is off by 2e-3 in the middle and right in the end."""
+    exact = cv.integrate(cv.scenes.brick_flip(), 0.1)
+    bump = 1 + 1e-3 * np.sin(np.pi * np.arange(len(exact)) / (len(exact) - 1))
+    return Trajectory(exact.scene, exact.t, exact.R_WB, exact.w_WB_B * bump[:, None], "bumped")
+
+
+def test_the_largest_drift_is_shown_and_not_the_last(bumped):
+    assert bumped.drift(bumped.scene.invariants[0])[-1] < 1e-12
+    assert "2.00e-03 (relative)" in bumped._repr_html_()
+    summary = single_run.summarize(bumped, cv.Reduced(), 0.1)
+    assert summary["drift"]["energy"] == pytest.approx(2.001e-3, rel=1e-6)
+    assert "2.00e-03 (relative)" in single_run.summary_text(summary)
+    assert (summary["last"]["t"], summary["last"]["energy"]) == (bumped.t[-1], bumped.energy[-1])
+
+
+def test_columns_of_samples_are_what_they_are_called(bumped):
+    found = bumped.to_pandas()
+    np.testing.assert_array_equal(found["energy"], bumped.energy)
+    np.testing.assert_array_equal(found[[f"momentum_W_{axis}" for axis in "123"]], bumped.momentum_W)
+    np.testing.assert_array_equal(found[[f"w_WB_B_{axis}" for axis in "123"]], bumped.w_WB_B)
+    np.testing.assert_array_equal(found["R_WB_13"], bumped.R_WB[:, 0, 2])
