@@ -158,7 +158,10 @@ def _arguments(argument: str, target: Callable[..., object], settings: list[str]
             raise BadInput(argument, describe(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
         found[key] = _value(value)
         default = inspect.signature(target).parameters[key].default
-        if isinstance(default, int | float) and real_number(found[key]) is None:
+        if isinstance(default, bool):
+            if not isinstance(found[key], bool):
+                raise BadInput(argument, describe(item), f"{key}=true or {key}=false")
+        elif isinstance(default, int | float) and real_number(found[key]) is None:
             raise BadInput(argument, describe(item), f"{key}=a number, such as {default!r}, its default")
     return found
 

@@ -13,6 +13,8 @@ from time import perf_counter_ns
 from typing import Any
 
 from conservative.check import positive_integer, positive_number
+from conservative.errors import IntegrationFailed
+from conservative.outcome import OK, Outcome
 
 MIN_ROUNDS = 3
 """Rounds that even a run over its budget gets: fewer have no median."""
@@ -20,12 +22,16 @@ MIN_ROUNDS = 3
 
 @dataclass(frozen=True)
 class Timing:
-    """Wall time of one call, s: the minimum and the median over `rounds` samples of `calls` calls each."""
+    """Wall time of one call, s: the minimum and the median over `rounds` samples of `calls` calls each.
+
+    Of a run that failed while it was timed, as an engine in another process can, both are NaN, and `outcome` says how.
+    """
 
     minimum: float
     median: float
     rounds: int
     calls: int
+    outcome: Outcome = OK
 
     def __str__(self) -> str:
         return f"{self.rounds} rounds x {self.calls} calls"
@@ -94,16 +100,44 @@ def time_interleaved(
     """
     positive_integer("rounds", rounds)
     positive_number("min_time", min_time, "a finite duration above 0, s")
-    calls = {name: count_calls(run, min_time) for name, run in runs.items()}
-    samples: dict[str, list[float]] = {name: [] for name in runs}
+    timed = {name: _TimedRun(run, min_time, budget) for name, run in runs.items()}
     shuffled = random.Random(seed)
     with without_collector():
         for _ in range(rounds):
             for name in shuffled.sample(list(runs), len(runs)):
-                taken = samples[name]
-                if len(taken) < MIN_ROUNDS or sum(taken) * (1 + 1 / len(taken)) * calls[name] <= budget:
-                    taken.append(wall_time(runs[name], calls[name]) / calls[name])
-    return {name: Timing(min(taken), statistics.median(taken), len(taken), calls[name]) for name, taken in samples.items()}
+                timed[name].take_sample()
+    return {name: each.timing() for name, each in timed.items()}
+
+
+class _TimedRun:
+    """Takes samples of a run within its budget, until it fails."""
+
+    def __init__(self, run: Callable[[], Any], min_time: float, budget: float) -> None:
+        self._run, self._budget = run, budget
+        self._taken: list[float] = []
+        self._calls, self._outcome = 1, OK
+        with self._noting_failure():
+            self._calls = count_calls(run, min_time)
+
+    def take_sample(self) -> None:
+        """Take one more sample."""
+        taken = self._taken
+        affordable = len(taken) < MIN_ROUNDS or sum(taken) * (1 + 1 / len(taken)) * self._calls <= self._budget
+        if affordable and self._outcome.ok:
+            with self._noting_failure():
+                taken.append(wall_time(self._run, self._calls) / self._calls)
+
+    def timing(self) -> Timing:
+        """Return what was found."""
+        values = self._taken if self._outcome.ok else [math.nan]
+        return Timing(min(values), statistics.median(values), len(self._taken), self._calls, self._outcome)
+
+    @contextmanager
+    def _noting_failure(self) -> Iterator[None]:
+        try:
+            yield
+        except IntegrationFailed as failure:
+            self._outcome = failure.outcome
 
 
 @dataclass(frozen=True)

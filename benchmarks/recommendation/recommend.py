@@ -129,4 +129,4 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Ou
         if isinstance(outcome, Success):
             runs[line], lengths[line] = outcome.run, grid.dt * grid.n_steps
     found = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
-    return {line: timing.minimum / lengths[line] for line, timing in found.items()}
+    return {line: timing.minimum / lengths[line] if timing.outcome.ok else math.inf for line, timing in found.items()}

@@ -124,5 +124,5 @@ def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
     )
     detail = f"{timing} of {timed.simulated:.4g} s, {steps} steps"
     for measure, value in zip(MEASURES, values, strict=True):
-        outcome = UNCOUNTED if math.isnan(value) else OK
+        outcome = OK if not math.isnan(value) else UNCOUNTED if timing.outcome.ok else timing.outcome
         yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")

@@ -10,6 +10,8 @@ from weakref import WeakKeyDictionary
 from conservative.errors import BadInput
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.client import time_limit
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.pickling import NotTransferable
 from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
 from conservative.scene import Scene
@@ -38,6 +40,9 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
     """
+    if isinstance(case.method, EngineMethod):  # it is in another process already
+        with time_limit(limit):
+            return attempt(case, skip_missing)
     if is_bounded(case.method):
         return attempt(case, skip_missing)
     known = _ended.get(case.scene, {}).get(case.method)
@@ -62,13 +67,16 @@ def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Succes
 
     A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
     """
-    tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
-    return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
+    if is_known_to_end(case.method):
+        return attempt(case, skip_missing)
+    tried = attempt_apart(limit, case, skip_missing)
+    elsewhere = isinstance(tried, Failure) or isinstance(case.method, EngineMethod)  # whose run is timed where it is
+    return tried if elsewhere else attempt(case, skip_missing)
 
 
 def is_known_to_end(method: Method) -> bool:
     """Whether the run of a method ends: of ours, and of engines that take a known number of steps and that we know."""
-    return is_bounded(method) or (_is_ours(method) and method.order is not None)
+    return is_bounded(method) or (_is_ours(method) and method.order is not None and not isinstance(method, EngineMethod))
 
 
 def is_bounded(method: Method) -> bool:

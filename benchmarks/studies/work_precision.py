@@ -84,4 +84,4 @@ def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
     runs = {key: timed.done.run for key, timed in ready.items()}
     timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
     for key, timed in ready.items():
-        yield timed.case.row(Value(Measure.TIME, timings[key].minimum / timed.simulated))
+        yield timed.case.row(Value(Measure.TIME, timings[key].minimum / timed.simulated), timings[key].outcome)
