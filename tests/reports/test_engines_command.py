@@ -1,0 +1,76 @@
+"""`conservative engines`: what it prints, and how it exits."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from conservative.references.environments import environment
+from conservative.reports.cli.main import main
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return environment.folder_of_all()
+
+
+def run(*arguments):
+    done = CliRunner().invoke(main, ["engines", *arguments])
+    return done.exit_code, done.output
+
+
+def write_record(cache, version):
+    folder = cache / "exudyn" / version
+    folder.mkdir(parents=True)
+    record = {"engine": "exudyn", "version": version, "python": "3.11.7", "packages": [f"exudyn=={version}", "numpy==2.4.6"]}
+    (folder / environment.RECORD).write_text(json.dumps(record))
+
+
+def test_the_list_shows_what_there_is_and_what_could_be(cache):
+    write_record(cache, "1.9.0")
+    write_record(cache, "1.10.0")
+    code, text = run("list")
+    assert code == 0
+    lines = text.splitlines()
+    place = lines.index("exudyn==1.9.0: Python 3.11.7, exudyn==1.9.0, numpy==2.4.6")
+    assert lines[place + 1].startswith("exudyn==1.10.0: ")
+    assert "bsk: not installed" in lines
+
+
+def test_the_list_as_json_has_every_version(cache):
+    write_record(cache, "1.9.0")
+    found = json.loads(run("list", "--json")[1])
+    assert found["environments"][0]["packages"] == ["exudyn==1.9.0", "numpy==2.4.6"]
+    assert "drake" in found["engines"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("install", "exudin"), "engine: got 'exudin'; allowed: 'exudyn' (nearest)"),
+        (("install", "exudyn; true"), "allowed: NAME or NAME==VERSION"),
+        (("install", "exudyn", "drake==1.0 2.0"), "allowed: NAME or NAME==VERSION"),
+        (("remove", "exudyn==1.9.0"), "allowed after: conservative engines install exudyn==1.9.0"),
+        (("remove", "../exudyn"), "allowed: NAME or NAME==VERSION"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_and_exit_code_2(arguments, message):
+    code, text = run(*arguments)
+    assert code == 2
+    assert message in text
+    assert len(text.splitlines()) == 1
+
+
+def test_remove_removes(cache):
+    write_record(cache, "1.9.0")
+    assert run("remove", "exudyn") == (0, "exudyn==1.9.0: removed\n")
+    assert environment.list_environments() == ()
+
+
+def test_a_dry_run_of_the_doctor_changes_nothing_and_tells_by_its_exit_code(cache):
+    write_record(cache, "1.9.0")
+    code, text = run("doctor", "--dry-run")
+    assert code == 1
+    assert text.startswith("exudyn==1.9.0: its Python does not run")
+    assert environment.list_environments()
