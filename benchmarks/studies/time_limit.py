@@ -26,7 +26,8 @@ _ended: WeakKeyDictionary[Scene, dict[Method, tuple[float, int]]] = WeakKeyDicti
 
 def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
     """Return the outcome of a case that may take `limit` s of wall time, if it is not known to end; see `attempt_apart`."""
-    return (attempt if is_known_to_end(case.method) else partial(attempt_apart, limit))(case, skip_missing)
+    here = is_known_to_end(case.method) and not isinstance(case.method, EngineMethod)
+    return (attempt if here else partial(attempt_apart, limit))(case, skip_missing)
 
 
 def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
@@ -67,16 +68,15 @@ def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Succes
 
     A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
     """
-    if is_known_to_end(case.method):
-        return attempt(case, skip_missing)
-    tried = attempt_apart(limit, case, skip_missing)
-    elsewhere = isinstance(tried, Failure) or isinstance(case.method, EngineMethod)  # whose run is timed where it is
-    return tried if elsewhere else attempt(case, skip_missing)
+    if isinstance(case.method, EngineMethod):  # its run is timed where it is
+        return attempt_apart(limit, case, skip_missing)
+    tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
+    return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
 
 
 def is_known_to_end(method: Method) -> bool:
     """Whether the run of a method ends: of ours, and of engines that take a known number of steps and that we know."""
-    return is_bounded(method) or (_is_ours(method) and method.order is not None and not isinstance(method, EngineMethod))
+    return is_bounded(method) or (_is_ours(method) and method.order is not None)
 
 
 def is_bounded(method: Method) -> bool:
