@@ -135,17 +135,20 @@ class Adapters:
 
 def _wall_time(run: Any, calls: int) -> float:
     """Return the wall time of calls, s. What a run has to do before each call, its `renew`, is in no time."""
-    renew = getattr(run, "renew", None)
+    renew: Callable[[], None] | None = getattr(run, "renew", None)
+    if renew is not None:
+        return sum(_renewed_time(run, renew) for _ in range(calls))
     start = perf_counter_ns()
-    for _ in range(0 if renew else calls):
+    for _ in range(calls):
         run()
-    spent = perf_counter_ns() - start
-    for _ in range(calls if renew else 0):
-        renew()
-        start = perf_counter_ns()
-        run()
-        spent += perf_counter_ns() - start
-    return spent * 1e-9
+    return (perf_counter_ns() - start) * 1e-9
+
+
+def _renewed_time(run: Any, renew: Callable[[], None]) -> float:
+    renew()
+    start = perf_counter_ns()
+    run()
+    return (perf_counter_ns() - start) * 1e-9
 
 
 OPERATIONS = ("check", "prepare", "run", "time")
