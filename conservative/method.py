@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
+from .check import MOST_STEPS, checked_grid, positive_integer, positive_number, require_memory
 from .declarations import Candidacy, Claims, Cost
 from .errors import BadInput
 from .scene import Scene
@@ -35,7 +35,14 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True)
-class Grid:
+class _Steps:
+    dt: float
+    n_steps: int
+    every: int = 1
+
+
+@dataclass(frozen=True, init=False)
+class Grid(_Steps):
     """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
@@ -47,12 +54,8 @@ class Grid:
         `most_samples`.
     """
 
-    dt: float
-    n_steps: int
-    every: int = 1
-
-    def __post_init__(self) -> None:
-        check_grid(self.dt, self.n_steps, self.every)
+    def __init__(self, dt: float, n_steps: int, every: int = 1) -> None:
+        super().__init__(*checked_grid(dt, n_steps, every))
 
     @property
     def steps(self) -> Array:

@@ -137,7 +137,7 @@ def _count_work(method: Method, trajectory: Trajectory) -> float:
 def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int) -> Grid:
     """Return a grid of an even number of steps of at most dt. Raise `BadInput` if they are more than `MOST_STEPS`."""
     if t_end / dt > MOST_STEPS:
-        raise BadInput("error", f"what takes {t_end / dt:.3g} steps of {dt:.3g} s", f"what {MOST_STEPS:g} steps reach, or a step")
+        raise BadInput("error", f"what takes {t_end / dt:.3g} steps", f"what {MOST_STEPS:g} steps reach: a larger one")
     if spacing is None:
         n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
         return Grid(t_end / n, n, min(sample_every, n))
