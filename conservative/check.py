@@ -75,7 +75,7 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
 
 
 def real_array(value: object) -> Array | None:
-    """Return a new array of what NumPy makes real numbers of, finite or not and of any unit; None of texts and the like."""
+    """Return a new array (...) of what NumPy makes real numbers of, finite or not, of any unit; None of texts and the like."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
     try:
@@ -194,7 +194,7 @@ def require_memory(argument: str, n_steps: int, every: int) -> None:
         raise BadInput(argument, f"{every}, for {samples} samples of {n_steps} steps", fits)
 
 
-def checked_grid(dt: object, n_steps: object, every: object) -> tuple[float, int, int]:
+def convert_steps(dt: object, n_steps: object, every: object) -> tuple[float, int, int]:
     """Return a step, s, and counts, dimensionless, as a float and ints.
 
     Raises

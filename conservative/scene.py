@@ -54,8 +54,8 @@ class Details(TypedDict, total=False):
 class Scene(_Fields):
     """A rigid body turning about a fixed point, from a start, for a time.
 
-    Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range methods
-    of ours are right or say what failed; the engines of others are given the numbers as they are.
+    Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range our
+    own methods are right or say what failed; engines are given the numbers as they are.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Runs of random bodies in all fields, with steps of any length: part of what `hostile_values` tries.
 
-Moments lie up to 1e16 apart in diagonal tensors and up to 1e13 in others, some are equal or nearly so; steps take the body from a
-ten thousandth of a radian to a hundred. Each run is right within its bounds or ends with an outcome; where the body is `TAME` and
-the step `SHORT`, that outcome must not be a lack of conservation. Short runs of free bodies and tops are compared with `Exact`.
-Source: our own.
+Moments lie up to 1e16 apart in diagonal tensors and up to 1e13 in others, some are equal or nearly so; steps take the body
+from a ten thousandth of a radian to a hundred. Each run is right within its bounds or ends with an outcome; where the body is
+`TAME` and the step `SHORT`, that outcome must not be a lack of conservation. Short runs of free bodies and tops are compared
+with `Exact`. Source: our own.
 """
 
 from __future__ import annotations

@@ -135,7 +135,7 @@ class LinearSpring(_SpringFields, PointPotential):
         return self.stiffness / 2 * (1 - 2 * self.rest_length / (distance_0 + distance_1))
 
     def scale(self) -> float:
-        """Return the largest V there can be, J: the points as far apart as they get, or together if that is less than at rest."""
+        """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
         farthest = float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W))
         return self.stiffness / 2 * max(farthest, self.rest_length) ** 2
 
