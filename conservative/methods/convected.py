@@ -122,13 +122,14 @@ def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[
 def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, int, float]:
     """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
     u = u0  # 2) prediction: the state itself
+    norm = math.inf
     for corrections in range(MAX_ITERATIONS + 1):
-        r, K = linearise(u0, u)  # 3)
-        norm = math.sqrt(r @ r)
-        if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
-            break
         try:
+            r, K = linearise(u0, u)  # 3)
+            norm = math.sqrt(r @ r)
+            if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
+                break
             u = u - np.linalg.solve(K, r)  # 4), (28)
-        except np.linalg.LinAlgError:  # steps of a radian and more can end up where the tangent is singular
+        except np.linalg.LinAlgError:  # steps of a radian and more can end up where C C' or the tangent is singular
             break
     return u, corrections, norm

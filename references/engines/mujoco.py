@@ -14,6 +14,7 @@ from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice
 from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -97,6 +98,7 @@ class MuJoCo(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return gravity_or_free(scene) or mass_model_reason(scene)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         mj = load("mujoco", "mujoco", "MuJoCo")
         axes = principal_axes(scene)

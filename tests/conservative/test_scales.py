@@ -16,7 +16,6 @@ ATTITUDES = from_quaternion((lambda q: q / np.linalg.norm(q, axis=1)[:, None])(R
     [
         cv.UniformGravity(2.3, (0.1, 0.3, -0.2)),
         cv.LinearSpring(3.1, (0.4, -0.2, 0.3), (0.5, 0.6, -0.7)),
-        cv.LinearSpring(3.1, (0.4, -0.2, 0.3), (0.5, 0.6, -0.7), 0.4),
         cv.GravityGradient(1.2, BODY.inertia, (1, 2, -0.5)),
     ],
     ids=lambda potential: type(potential).__name__,
