@@ -28,7 +28,7 @@ def test_rounding_a_tensor_leaves_a_body_symmetric():
 def test_a_rod_keeps_all_digits_of_its_small_moment(small):
     scene = cv.Scene("rod", cv.RigidBody((small, 1.0, small)), np.eye(3), (0.1, 0.2, 0.3), 1.0)
     start = principal_start(scene, "non_spinning")
-    assert start.J == (small, small, small)
+    assert (small, small, small) == start.J
     assert start.spin[1] == 1.0
 
 
