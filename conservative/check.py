@@ -75,7 +75,7 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
 
 
 def real_array(value: object) -> Array | None:
-    """Return a new array of what NumPy makes real numbers of, finite or not and of any unit; None of texts and the like."""
+    """Return a new array (...) of what NumPy makes real numbers of, finite or not, of any unit; None of texts and the like."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
     try:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from .attitude import Array
 from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
-from .declarations import Candidacy, Claims, Cost
+from .declarations import Candidacy, Claims, Cost, settings_text
 from .errors import BadInput
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, accept
@@ -43,8 +43,7 @@ class Grid:
     Raises
     ------
     BadInput
-        dt is not a finite number above 0; n_steps or every is not an integer of 1 to `MOST_STEPS`; or the samples are more than
-        `most_samples`.
+        dt is not a finite number above 0, n_steps or every is not an integer of 1 to 2^53, or samples do not fit in memory.
     """
 
     dt: float
@@ -249,10 +248,3 @@ def _maker(kind: type) -> str:
         return f"{package}=={metadata.version(package)}"
     except metadata.PackageNotFoundError:
         return package
-
-
-@lru_cache(maxsize=1024)
-def settings_text(value: Any) -> str:
-    """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
-    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
-    return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)
