@@ -110,12 +110,19 @@ def _ask(limit: float, shared: list[bytes], work: bytes) -> tuple[str, bytes]:
     """Return the answer of an idle process, or of a new one, which is idle again after that."""
     worker = _take_idle() or Worker()
     try:
-        answer = worker.answer(limit, dump((sys.path, limit, shared, work)))
+        answer = worker.answer(limit, dump((sys.path, _find_folder(), limit, shared, work)))
     except BaseException:  # KeyboardInterrupt too
         worker.end()
         raise
     _idle.append(worker)
     return answer
+
+
+def _find_folder() -> str:
+    """Return the working directory, "" where it is there no more."""
+    with suppress(OSError):
+        return os.getcwd()  # noqa: PTH109  # as it is
+    return ""
 
 
 def _take_idle() -> Worker | None:
@@ -209,7 +216,9 @@ def _do(message: bytes, nowhere: Any) -> tuple[str, bytes]:
 
     "unknown" is a module that cannot be imported here, and "lost" why there are no bytes.
     """
-    sys.path[:], limit, kept, work = load(message)
+    sys.path[:], folder, limit, kept, work = load(message)
+    with suppress(OSError):
+        os.chdir(folder)
     faulthandler.dump_traceback_later(limit + GRACE, exit=True, file=nowhere)
     try:
         shared = [_load_shared(content) for content in kept]

@@ -115,6 +115,14 @@ def test_one_process_does_one_piece_of_work_after_the_other():
     assert not process.is_running()
 
 
+def test_it_runs_in_the_working_directory_of_the_moment(tmp_path, monkeypatch):
+    run_within(LONG, int)
+    monkeypatch.chdir(tmp_path)
+    assert run_within(LONG, os.getcwd) == str(tmp_path)
+    tmp_path.rmdir()
+    assert run_within(LONG, int) == 0
+
+
 def test_threads_have_processes_of_their_own():
     found = []
     threads = [
