@@ -1,5 +1,6 @@
 """The rules of the automatic choice, one by one, and the whole on methods whose errors are known beforehand."""
 
+import dataclasses
 import math
 import warnings
 from dataclasses import dataclass
@@ -113,6 +114,8 @@ def test_bounds_and_counts():
         assert automatic.bound_rate(scene) == pytest.approx(math.sqrt(2 * scene.energy_scale))
     trajectory = Known().prepare(SCENE, cv.Grid(0.5, 4, 1))()
     assert automatic._count_work(Known(step=7.0), trajectory) == 3.0 * 8 + 7.0 * 4
+    explicit = dataclasses.replace(trajectory, counters=Counters(4, 4, None))
+    assert automatic._count_work(Known(step=7.0), explicit) == 7.0 * 4
     assert automatic._rounding_error(trajectory) == pytest.approx(2.0**-53 * 2.0 * 2.0, rel=1e-9, abs=0)
 
 
