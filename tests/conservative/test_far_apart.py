@@ -43,4 +43,4 @@ def test_a_singular_step_is_an_outcome(method):
     dt, body, w = SINGULAR[method]
     found = cv.integrate(cv.Scene("fast", body, np.eye(3), w, 10 * dt), dt, method, on_failure="return")
     assert found.outcome.kind is OutcomeKind.NOT_CONVERGED
-    assert len(found) == 1
+    assert 1 <= len(found) < 10
