@@ -35,6 +35,11 @@ def test_gauss_legendre_coefficients(stages):
     np.testing.assert_array_equal(padded[3][:stages], table.b_low)
 
 
+def test_as_many_stages_as_have_been_checked():
+    assert gauss_legendre.MOST_STAGES == 10
+    assert gauss_legendre.DIGITS >= 50
+
+
 def test_frames():
     assert non_spinning.resolve_frame("auto", TOP) == "non_spinning"
     assert non_spinning.resolve_frame("auto", FREE) == non_spinning.resolve_frame("auto", free((1, 1, 1), (0, 1, 0))) == "body"
