@@ -177,7 +177,10 @@ def test_rows_that_cannot_be_compared():
     for found, expected in (
         (nothing, ("row", "passed", "missing", "passed")),
         (renamed, ("row", "passed", "renamed new", "passed")),
-        (replace(RUN, rows={"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}), ("row", "passed", "renamed new", "passed")),
+        (
+            replace(RUN, rows={"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}),
+            ("row", "passed", "renamed new", "passed"),
+        ),
         (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
         (changed(status=Status.ERROR), ("row", "passed", "error", "passed")),
         (changed(definition="new"), ("definition", "hash", "new", "hash")),
