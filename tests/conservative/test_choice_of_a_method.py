@@ -177,6 +177,14 @@ def test_spacing_is_kept(choose):
     assert (0.5 / found.choice.dt) % 2 == pytest.approx(0, abs=1e-9)
 
 
+def test_more_steps_than_anybody_waits_for_are_refused_before_they_are_taken(choose):
+    choose(Known(size=0.1))
+    with pytest.raises(cv.BadInput, match=r"error: got what takes .* steps; allowed: what 1e\+10 steps reach"):
+        automatic.integrate_to_error(SCENE, 1e-9, 1e9, None, 10**12)
+    assert max(grid.n_steps for grid in Known.taken) <= automatic.MOST_PROBED
+    assert automatic._probe(Known(size=1.0), SCENE, 1e-15, 8.0)[0] == math.inf
+
+
 def test_an_error_that_cannot_be_reached_is_a_warning(choose):
     choose(Known(size=1e-3, power=0))
     with warnings.catch_warnings(record=True) as caught:
