@@ -101,6 +101,10 @@ def test_history_says_what_changed_and_times_of_other_machines_stay():
     assert (third.history[2]["removed"], third.history[2]["changed"]) == ([ROW.id], [])
     redefined = baseline.update_baseline(second, [changed(definition="new")], "other code")
     assert set(redefined.rows[ROW.id].time_ratios) == {"here"}
+    mixed = replace(RUN, rows={**RUN.rows, **{name: replace(ROW, id=name, time_ratio=None) for name in ("a", "b", "c")}})
+    assert (
+        baseline.update_baseline(None, [mixed], "one timed").rows[ROW.id] == KEPT.rows[ROW.id]
+    )  # rows without times count for none
     untimed = baseline.update_baseline(KEPT, [changed(time_ratio=None)], "no time")
     assert untimed.rows[ROW.id].time_ratios == {}
 
@@ -177,6 +181,10 @@ def test_rows_that_cannot_be_compared():
     for found, expected in (
         (nothing, ("row", "passed", "missing", "passed")),
         (renamed, ("row", "passed", "renamed new", "passed")),
+        (
+            replace(RUN, rows={"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}),
+            ("row", "passed", "renamed new", "passed"),
+        ),
         (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
         (changed(status=Status.ERROR), ("row", "passed", "error", "passed")),
         (changed(definition="new"), ("definition", "hash", "new", "hash")),

@@ -65,6 +65,9 @@ def fresh():
         (0.1, 1.0, 0.5, 1, (0.5 / 6, 12, 6)),
         (0.125, 1.0, 0.5, 2, (0.125, 8, 8)),
         (0.5, 1.2, 0.5, 1, (0.25, 6, 2)),
+        (0.1, 2.2, None, 1, (0.1, 22, 1)),  # 2.2 / 0.1 is above 22 by rounding
+        (0.1, 2.2, 2.2, 1, (0.1, 22, 22)),
+        (0.1, 1.1, 0.1, 1, (0.05, 22, 2)),
     ],
 )
 def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected):
@@ -186,8 +189,8 @@ def test_an_error_that_cannot_be_reached_is_a_warning(choose):
     choose(Known(size=1e-3, power=0))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = automatic.integrate_to_error(SCENE, 1e-18, 8.0, None, 1)
-    assert [each.category for each in caught] == [AccuracyNotReached]
+        found = cv.integrate(SCENE, error=1e-18)
+    assert [(each.category, each.filename) for each in caught] == [(AccuracyNotReached, __file__)]
     assert not found.choice.reached
     assert found.choice.error == 1e-18
     assert 3 <= len(found.choice.attempts) <= automatic.ATTEMPTS

@@ -104,6 +104,13 @@ def test_what_is_refused(make, argument):
     assert raised.value.argument == argument
 
 
+def test_rows_of_a_tableau_that_are_refused_are_counted():
+    with pytest.raises(cv.BadInput, match=r"A: got rows of \[0, 0\]; allowed: rows of 0 to 1 coefficients"):
+        explicit.ExplicitTableau("", 1, ((), ()), (0.5, 0.5))
+    with pytest.raises(cv.BadInput, match=r"b: got sum b A c\^0 = 0.6; allowed: 0.5, as order 2 asks for"):
+        explicit.ExplicitTableau("", 2, ((), (0.6,)), (0.0, 1.0))
+
+
 def test_what_is_at_the_edge_of_what_is_allowed():
     assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
     assert cv.Substepped(most=1).most == 1
