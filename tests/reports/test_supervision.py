@@ -11,8 +11,8 @@ import time
 import pytest
 
 from conservative.benchmarks.verification import interrupts
-from conservative.benchmarks.verification.processes import temporaries
-from conservative.reports.terminal.supervision import Board
+from conservative.benchmarks.verification.processes import COMMAND, temporaries
+from conservative.reports.terminal.supervision import SharedStatus
 
 from ..environments import ROOT, variables
 
@@ -63,6 +63,12 @@ def ended(process, alive):
     assert os.read(alive, 1) == b""
     os.close(alive)
     return process.returncode, err
+
+
+@pytest.mark.parametrize("closed", ["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
+def test_a_command_whose_streams_are_closed_ends_as_any_other(closed, tmp_path):
+    shell = ["sh", "-c", f'exec "$0" -c "$1" run nonsense {closed}', sys.executable, COMMAND]
+    assert subprocess.run(shell, cwd=tmp_path, env=variables(PYTHONPATH=str(ROOT)), timeout=HANG).returncode == 2
 
 
 @pytest.mark.parametrize("work", WORK)
@@ -162,16 +168,16 @@ def read(terminal):
 
 
 def test_a_board_has_the_last_words_whole_or_none():
-    board = Board()
-    assert board.read() == ("", [])
-    board.tell("kept")
-    board.list_places(["/a b", "/c"])
-    assert board.read() == ("kept", ["/a b", "/c"])
-    board.tell("")
-    board.list_places([])
-    assert board.read() == ("", [])
-    board.tell("x" * 10**6)
-    assert board.read() == ("", [])
+    status = SharedStatus()
+    assert status.read() == ("", [])
+    status.tell("kept")
+    status.list_places(["/a b", "/c"])
+    assert status.read() == ("kept", ["/a b", "/c"])
+    status.tell("")
+    status.list_places([])
+    assert status.read() == ("", [])
+    status.tell("x" * 10**6)
+    assert status.read() == ("", [])
 
 
 @pytest.mark.parametrize("moment", [0.3, 1.0, 2.5])
