@@ -21,9 +21,12 @@ if TYPE_CHECKING:
     from .errors import BadInput as BadInput
     from .errors import Diverged as Diverged
     from .errors import IntegrationFailed as IntegrationFailed
+    from .errors import InvalidResult as InvalidResult
     from .errors import MissingEngine as MissingEngine
     from .errors import MissingExtra as MissingExtra
+    from .errors import NotConserved as NotConserved
     from .errors import NotConverged as NotConverged
+    from .errors import NotWritten as NotWritten
     from .errors import PotentialFailed as PotentialFailed
     from .errors import Unsupported as Unsupported
     from .errors import WrongBranch as WrongBranch
@@ -48,6 +51,7 @@ if TYPE_CHECKING:
     from .potentials.python_function import FunctionPotential as FunctionPotential
     from .potentials.uniform_gravity import UniformGravity as UniformGravity
     from .scene import Scene as Scene
+    from .trajectory import Bounds as Bounds
     from .trajectory import Counters as Counters
     from .trajectory import Trajectory as Trajectory
     from .version import VERSION as VERSION
@@ -57,6 +61,7 @@ _PLACES = {
     "VERSION": "version",
     "AccuracyNotReached": "errors",
     "BadInput": "errors",
+    "Bounds": "trajectory",
     "Convected": "methods.convected",
     "Counters": "trajectory",
     "Diverged": "errors",
@@ -65,6 +70,7 @@ _PLACES = {
     "GravityGradient": "potentials.gravity_gradient",
     "Grid": "method",
     "IntegrationFailed": "errors",
+    "InvalidResult": "errors",
     "Invariant": "invariants",
     "Lame": "methods.lame",
     "LinearSpring": "potentials.point_to_point",
@@ -72,7 +78,9 @@ _PLACES = {
     "MissingEngine": "errors",
     "MissingExtra": "errors",
     "MoserVeselov": "methods.moser_veselov",
+    "NotConserved": "errors",
     "NotConverged": "errors",
+    "NotWritten": "errors",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
     "PointAttraction": "potentials.point_to_point",
@@ -95,6 +103,7 @@ __all__ = [
     "VERSION",
     "AccuracyNotReached",
     "BadInput",
+    "Bounds",
     "Convected",
     "Counters",
     "Diverged",
@@ -103,6 +112,7 @@ __all__ = [
     "GravityGradient",
     "Grid",
     "IntegrationFailed",
+    "InvalidResult",
     "Invariant",
     "Lame",
     "LinearSpring",
@@ -110,7 +120,9 @@ __all__ = [
     "MissingEngine",
     "MissingExtra",
     "MoserVeselov",
+    "NotConserved",
     "NotConverged",
+    "NotWritten",
     "Outcome",
     "OutcomeKind",
     "PointAttraction",

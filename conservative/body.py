@@ -33,7 +33,8 @@ class RigidBody(_Fields):
     Parameters
     ----------
     inertia
-        Principal moments (3,) or the whole tensor (3, 3) about the fixed point in body axes, kg m^2.
+        Principal moments (3,) or the whole tensor (3, 3) about the fixed point in body axes, kg m^2. The largest component
+        is of 1e-100 to 1e100 kg m^2.
 
     Raises
     ------

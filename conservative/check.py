@@ -75,7 +75,7 @@ def finite_array(argument: str, value: ArrayLike, shapes: tuple[tuple[int, ...],
 
 
 def real_array(value: object) -> Array | None:
-    """Return a new array of what NumPy makes real numbers of, finite or not and of any unit; None of texts and the like."""
+    """Return a new array (...) of what NumPy makes real numbers of, finite or not, of any unit; None of texts and the like."""
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value.copy()
     try:
@@ -194,8 +194,14 @@ def require_memory(argument: str, n_steps: int, every: int) -> None:
         raise BadInput(argument, f"{every}, for {samples} samples of {n_steps} steps", fits)
 
 
-def check_grid(dt: object, n_steps: object, every: object) -> None:
-    """Raise `BadInput` for a step that is not finite, s, counts beyond `MOST_STEPS`, and samples that do not fit in memory."""
+def convert_steps(dt: object, n_steps: object, every: object) -> tuple[float, int, int]:
+    """Return a step, s, and counts, dimensionless, as a float and ints.
+
+    Raises
+    ------
+    BadInput
+        The step is not finite or not above 0, a count is beyond `MOST_STEPS`, or the samples do not fit in memory.
+    """
     step = real_number(dt)  # no range: steps of scenes in other units are no longer in SI units
     if step is None or not 0 < step < math.inf:
         raise BadInput("dt", describe(dt), "a finite step above 0, s")
@@ -207,6 +213,7 @@ def check_grid(dt: object, n_steps: object, every: object) -> None:
     if not math.isfinite(step * counts[0]):
         raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
     require_memory("every", *counts)
+    return step, *counts
 
 
 def power_of_two(size: float) -> float:

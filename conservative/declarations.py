@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -104,3 +106,10 @@ class Claims:
 
 README = "conservative/README.md, Methods"
 """Source of what this project claims of its own methods."""
+
+
+@lru_cache(maxsize=1024)
+def settings_text(value: Any) -> str:
+    """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
+    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
+    return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
@@ -152,17 +151,11 @@ class InvalidResult(IntegrationFailed):
 
 
 class PotentialFailed(RuntimeError):
-    """A function that a potential was made of raised an exception, which is this one's `__cause__`.
+    """A function that a potential was made of raised an exception, which is this one's `__cause__`."""
 
-    Kernels raise it without arguments; what was raised in the thread is kept in `pending` for it.
-    """
-
-    pending = threading.local()
-
-    def __init__(self) -> None:
-        self.__cause__ = getattr(self.pending, "cause", None)
+    def __init__(self, cause: BaseException) -> None:
         super().__init__(
-            f"potential: got {self.__cause__!r} from its energy or gradient; "
+            f"potential: got {cause!r} from its energy or gradient; "
             "allowed: functions that give finite numbers for every matrix (3, 3) near a rotation"
         )
 

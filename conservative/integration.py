@@ -50,13 +50,14 @@ def integrate(
     error
         Attitude error over the run, rad, instead of a method and a step: `conservative.methods.automatic` chooses both, and
         `trajectory.choice` has them and the estimated error; a warning `AccuracyNotReached` where round-off is in the way.
+        What takes more than 10^10 steps is refused.
     on_failure
         "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
 
     Raises
     ------
     BadInput
-        An argument cannot be used.
+        An argument cannot be used, the steps do not fit in memory or are too many, or the method has no step of that length.
     Unsupported
         The method cannot do the scene.
     NotConverged

@@ -119,7 +119,7 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
         if invariant.name == "energy":
             rows[0] = 1 / size, 0.0, 0.0, start
         elif invariant.name == "axial momentum":
-            rows[4, :3], rows[4, 3] = axial_direction(body, potential) / size, start / size
+            rows[4, :3], rows[4, 3] = scene.symmetry_axis_B / size, start / size
         else:
             directions = np.eye(3) if potential is None else potential.axis_W[None]
             part = slice(1, 1 + len(directions))

@@ -13,7 +13,8 @@ from .attitude import Array, orthonormality
 from .deferred_imports import kernels
 from .errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
 from .invariants import Invariant, sizes
-from .outcome import OK, Choice, Outcome
+from .outcome import OK, Outcome
+from .outcome import Choice as Choice
 from .outcome import Counters as Counters
 from .scene import Scene
 
@@ -157,7 +158,7 @@ def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) 
     mistake = _find_mistake(found, scene, steps)
     kept = method.conserves
     if mistake is None and method.kernel and found.failure is None and _is_kept(found, steps, kept, bounds):
-        return found  # type: ignore[no-any-return]
+        return found
     with np.errstate(all="ignore"):
         mistake = mistake or _find_misplaced(found, steps)
         if mistake is not None:
@@ -172,6 +173,11 @@ def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
         return f"a {type(found).__name__}, no Trajectory"
     if found.scene is not scene:
         return "the trajectory of another scene"
+    return _find_mistyped(found, steps)
+
+
+def _find_mistyped(found: Any, steps: Steps) -> str | None:
+    """Return which field of a `Trajectory` has another type or shape than it should, None if none has."""
     if not isinstance(found.counters, Counters) or not isinstance(found.failure, IntegrationFailed | None):
         return "counters or a failure of another type"
     n = len(found.t) if found.failure is not None and isinstance(found.t, np.ndarray) else steps.n_samples

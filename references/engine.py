@@ -36,7 +36,7 @@ LONG = 1e5
 
 
 def limit_reason(steps: int, share: float) -> str:
-    """Return why a run that has done a share of its time, 0 to 1, in so many steps has to end; "" if it may go on."""
+    """Return why a run that has done a share of its time, 0 to 1 and dimensionless, has to end; "" if it may go on."""
     if steps >= STEP_LIMIT:
         return f"step limit of {STEP_LIMIT} reached"
     if steps % PACE_STEPS == 0 and steps > 10 * STEP_LIMIT * share:

@@ -30,7 +30,10 @@ class Convected(Method):
     Parameters
     ----------
     tol
-        The paper's eps: Newton stops where the norm of the residual (27) is at most this.
+        The paper's eps: Newton stops where the norm of the residual (27) is at most this. It is absolute: the residual has
+        changes of base vectors and of momenta, the latter in units in which the motion is of order one (SI units, unless the
+        largest moment, kg m^2, or the rate, 1/s, that the energy makes of it is out of 2^-16 to 2^16;
+        `conservative.methods.units`).
 
     Raises
     ------
@@ -73,7 +76,8 @@ class Convected(Method):
         linearise = _linearise(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
-            u, corrections, failure = _march(linearise, u0, grid, self.tol)
+            with np.errstate(all="ignore"):  # what overflows is no solution, and the step fails
+                u, corrections, failure = _march(linearise, u0, grid, self.tol)
             q, p = u[:, :9].copy(), u[:, 9:].copy()
             L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
             R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import describe, real_array
-from ..errors import BadInput, PotentialFailed
+from ..errors import PotentialFailed
 
 EnergyFunction = Callable[[Array], float]
 GradientFunction = Callable[[Array], Array]
@@ -23,8 +23,7 @@ def _blamed() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        PotentialFailed.pending.cause = error
-        raise PotentialFailed from error
+        raise PotentialFailed(error) from error
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,8 @@ class Gradient:
         with _blamed():
             found = self.function(R.copy())
             gradient = real_array(found)
-            if gradient is None:
+            if gradient is None or gradient.shape != (3, 3):
                 raise TypeError(f"the gradient is {describe(found)}, not a matrix (3, 3) of real numbers")
-            if gradient.shape != (3, 3):
-                raise BadInput("gradient", f"shape {gradient.shape}", "a function that returns a matrix (3, 3)")
             return gradient
 
     def __call__(self, R_WB: Array) -> Array:

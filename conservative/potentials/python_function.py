@@ -176,18 +176,9 @@ class _Callback:
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         known, outputs = getattr(self.last, "pair", (b"", buffer))
         if inputs != known:  # residual and tangent of one iteration need the same
-            outputs = self._try(what, buffer)
+            outputs = self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
             self.last.pair = inputs, outputs  # at once: an interrupt may come anywhere
         buffer[N_INPUTS : N_INPUTS + len(outputs)] = outputs
-
-    def _try(self, what: int, buffer: Array) -> Array:
-        try:
-            return self._evaluate(what, buffer[:9].reshape(3, 3), buffer[9:N_INPUTS])
-        except PotentialFailed:
-            raise
-        except Exception as error:
-            PotentialFailed.pending.cause = error
-            raise PotentialFailed from error
 
     def _evaluate(self, what: int, R_BP: Array, state: Array) -> Array:
         functions = (_body_torque, _finite_torque, _finite_derivative, _energy)

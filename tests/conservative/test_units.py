@@ -20,7 +20,7 @@ from conservative.registry import scene as registered
 TURN = rotation_about((3, -1, 2), 1.3)
 MOMENTS = {"top": (1.3, 1.3, 0.6)}
 HOOK = np.array([0.3, 0.1, 0.4])
-UNITS = [(1e80, 1.0, 1.0), (1e-80, 1.0, 1.0), (1.0, 1e45, 1.0), (1e-80, 1e-40, 1e-30), (1e90, 1e-3, 1e60), (1e-6, 1e-2, 1e-2)]
+UNITS = [(1e80, 1.0, 1.0), (1e-80, 1.0, 1.0), (1.0, 1e45, 1.0), (1e-80, 1e-40, 1e-30), (1e80, 1e30, 1e40), (1e-6, 1e-2, 1e-2)]
 """Units of moments, kg m^2, times, s, and lengths, m."""
 
 

@@ -141,6 +141,8 @@ def test_the_longest_step_of_moser_veselov():
     limit = min(6.0 / speed, 2 * math.acos(0.2) / nu)
     assert moser_veselov.step_limit(FREE, exact=True) == pytest.approx(limit)
     assert moser_veselov.step_limit(free((1, 1.4, 2), (0, 0, 0)), exact=True) == math.inf
+    spindle = free((1, 1, 0.05), (0.1, 0.1, 1.0))  # its polhode turns at (1 - 0.05) rad/s: half a period is the limit
+    assert moser_veselov.step_limit(spindle, exact=True) == pytest.approx(2 * math.acos(0.2) / 0.95)
     ball = free((1, 1, 1), (0, 0, 2))
     assert moser_veselov.step_limit(ball, exact=True) == pytest.approx(3.0)
     for exact, order in ((True, "exact"), (False, 4)):

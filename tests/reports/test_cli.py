@@ -9,8 +9,6 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import integrate, registry
-from conservative.benchmarks.gate import results
-from conservative.benchmarks.gate.results import Row
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.reports.cli.main import main
 from conservative.reports.run import single_run
@@ -222,33 +220,3 @@ def test_choices_are_what_a_scene_file_takes(table, tmp_path):
         path.write_text(f"t_end = 1.0\n{body}\n{potential}[start]\nw_WB_B = [0, 0, 1]\n")
         allowed = conservative("run", path).stderr.partition("one of ")[2].strip().split(", ")
         assert set(keys) == set(allowed) - {"shape", "kind", "com_B" if table == "shape" else "", "R_BS"}
-
-
-@pytest.fixture
-def gated(tmp_path, monkeypatch):
-    """A folder with a baseline of one row, and results in which an error became larger."""
-    monkeypatch.chdir(tmp_path)
-    before, after = (Row("id", "brick_flip", "reduced", "passed", values={"attitude error max": v}) for v in (1e-3, 2e-3))
-    for name, row in (("before.json", before), ("after.json", after)):
-        results.write(results.Results("a machine", {"id": row}, "a commit"), tmp_path / name)
-    return conservative("gate", "before.json", "--baseline", "kept.json", "--update", "First", "--json")
-
-
-def test_gate_as_json_has_the_violations(gated):
-    done = conservative("gate", "after.json", "--baseline", "kept.json", "--json")
-    assert done.exit_code == 1
-    (verdict,) = json.loads(done.stdout)["verdicts"]
-    assert not verdict["passed"]
-    (violation,) = verdict["violations"]
-    assert (violation["measure"], violation["scene"], violation["method"]) == ("attitude error max", "brick_flip", "reduced")
-    assert (violation["was"], violation["now"]) == ("0.001", "0.002")
-    passed = conservative("gate", "before.json", "--baseline", "kept.json", "--json")
-    assert passed.exit_code == 0
-    assert json.loads(passed.stdout)["passed"]
-
-
-def test_update_as_json_has_the_entry_of_the_history(gated):
-    told = json.loads(gated.stdout)
-    assert gated.exit_code == 0
-    assert (told["baseline"], told["rows"]) == ("kept.json", 1)
-    assert (told["entry"]["reason"], told["entry"]["added"]) == ("First", ["id"])
