@@ -180,7 +180,7 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     """Yield a raw file that takes the place of `target` when the block ends well."""
     with ExitStack() as stack:
         with _errors(target, argument):
-            place = Path(os.path.realpath(target))  # a link stays one
+            place = _find_place(target)
             fresh, handle = stack.enter_context(_open_target(place))
         yield _RawFile(handle, target, argument)
         if fresh != place:
@@ -188,6 +188,12 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
                 os.fsync(handle)  # before it takes the place: else a crash of the machine could leave an empty file there
                 fresh.replace(place)
             sync(place.parent)
+
+
+def _find_place(target: Path) -> Path:
+    """Return the file that a link stands for, so that the link stays one; of what is no file, such as a pipe, its own name."""
+    is_file = target.is_file() or not target.exists()
+    return Path(os.path.realpath(target)) if is_file else target  # the name of a pipe that realpath has is nowhere
 
 
 @contextmanager

@@ -15,8 +15,8 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -151,12 +151,12 @@ class Worker:
         self.parent = os.getpid()
         ours, theirs = socket.socketpair()
         with ours, theirs:
-            self.process = subprocess.Popen(
-                python_command(f"from {__name__} import serve; serve(int(sys.argv[2]))", str(theirs.fileno())),
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C is for the parent, which ends this
-            )
+            with _block_interrupts():
+                self.process = subprocess.Popen(
+                    python_command(f"from {__name__} import serve; serve(int(sys.argv[2]))", str(theirs.fileno())),
+                    pass_fds=[theirs.fileno()],
+                    stdin=subprocess.DEVNULL,
+                )
             self.connection = Connection(ours.detach())
         try:
             self.answer(START_LIMIT, b"")
@@ -197,9 +197,21 @@ class Worker:
             self.process.wait()
 
 
+@contextmanager
+def _block_interrupts() -> Iterator[None]:
+    """Start processes in the block that Ctrl-C does not reach: it is for the parent, which ends them.
+
+    They stay in its process group, so that whoever ends that ends them as well.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def serve(descriptor: int) -> None:
     """Do one piece of work after the other, as messages from the parent say, until the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = Connection(descriptor)
     with open(os.devnull, "w") as nowhere:  # noqa: PTH123  # a stream with a descriptor, that of stderr where this is closed
         os.dup2(2, 1)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 from conservative.benchmarks.verification import interrupts
@@ -77,6 +78,20 @@ def test_a_signal_ends_a_command_in_the_middle_of_anything(number, code, work, t
     process, alive = started(WORK[work], tmp_path)
     os.killpg(process.pid, number)
     assert ended(process, alive) == (code, "Interrupted\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_work_in_a_process_of_its_own_ends_with_its_command(number, tmp_path):
+    code = (
+        "from conservative.references.worker import run_within\nprint('at work', flush=True)\n"
+        "print(run_within(60, os.getpid), flush=True)\nrun_within(600, lambda: [None for _ in iter(int, 1)])"
+    )
+    process, alive = started(code, tmp_path)
+    worker = psutil.Process(int(process.stdout.readline()))
+    time.sleep(1.0)
+    process.send_signal(number)
+    ended(process, alive)
+    assert psutil.wait_procs([worker], timeout=HANG)[0] == [worker]
 
 
 def test_what_is_kept_is_said_and_what_was_being_written_goes(tmp_path):
