@@ -37,8 +37,9 @@ SEARCHED: tuple[Method, ...] = (
 )
 TAME, SHORT = 1e6, 3.0
 """Ratio of moments, and turn in a step, rad, up to which a run may not end for lack of conservation."""
-SLACK, FLOOR = 100.0, 1e-9
-"""Error that a run may have in attitude: so many times the order's power of the turn in a step, and so much anyway, rad."""
+SLACK, FLOOR = 10.0, 1e-9
+"""Error that a run may have in attitude: so many times the order's power of the turn in a step (measured: below 2), and so
+much anyway, rad."""
 
 
 @dataclass(frozen=True)
