@@ -89,6 +89,13 @@ def test_values_of_several_runs_are_their_median_and_range():
     assert row.time_ratios["here"].runs == 3
 
 
+def test_rows_without_times_take_no_part_in_false_alarms():
+    ratios = [2.0 + 0.01 * k for k in range(baseline.REPEATS + 1)]
+    others = {name: replace(ROW, id=name, time_ratio=None) for name in ("a", "b", "c")}
+    runs = [replace(RUN, rows={**others, ROW.id: replace(ROW, time_ratio=ratio)}) for ratio in ratios]
+    assert baseline.update_baseline(None, runs, "one timed").rows[ROW.id].time_ratios["here"] == baseline.time_limit(ratios, 1)
+
+
 def test_history_says_what_changed_and_times_of_other_machines_stay():
     there = replace(with_values(energy_drift_max=5e-3), machine="there")
     both = replace(there, rows={**there.rows, OTHER.id: OTHER})
@@ -101,10 +108,6 @@ def test_history_says_what_changed_and_times_of_other_machines_stay():
     assert (third.history[2]["removed"], third.history[2]["changed"]) == ([ROW.id], [])
     redefined = baseline.update_baseline(second, [changed(definition="new")], "other code")
     assert set(redefined.rows[ROW.id].time_ratios) == {"here"}
-    mixed = replace(RUN, rows={**RUN.rows, **{name: replace(ROW, id=name, time_ratio=None) for name in ("a", "b", "c")}})
-    assert (
-        baseline.update_baseline(None, [mixed], "one timed").rows[ROW.id] == KEPT.rows[ROW.id]
-    )  # rows without times count for none
     untimed = baseline.update_baseline(KEPT, [changed(time_ratio=None)], "no time")
     assert untimed.rows[ROW.id].time_ratios == {}
 
