@@ -63,7 +63,13 @@ def test_a_last_pair_with_less_than_half_the_slope_is_left_out(slopes, decision)
 
 @pytest.mark.parametrize(
     ("slopes", "decision"),
-    [((2.12, 2, 2, 2), "1234"), ((2.08, 2, 2, 2), "01234"), ((2.12, 2, 2), "123"), ((1.88, 2, 2, 2), "1234"), ((2.12, 2), "012")],
+    [
+        ((2.12, 2, 2, 2), "1234"),
+        ((2.08, 2, 2, 2), "01234"),
+        ((2.12, 2, 2), "123"),
+        ((1.88, 2, 2, 2), "1234"),
+        ((2.12, 2), "012"),
+    ],
 )
 def test_a_coarsest_pair_that_is_off_by_a_twentieth_is_left_out(slopes, decision):
     assert decide(errors_of(*slopes)) == decision
