@@ -150,12 +150,10 @@ def remove(path: Path) -> None:
 
 def sync(path: Path) -> None:
     """Have a file, or the names in a folder, on the disk, where the file system can."""
-    with suppress(OSError):
+    with suppress(OSError), ExitStack() as stack:
         handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        stack.callback(os.close, handle)
+        os.fsync(handle)
 
 
 class _RawFile(io.FileIO):
@@ -180,7 +178,8 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     """Yield a raw file that takes the place of `target` when the block ends well."""
     with ExitStack() as stack:
         with _errors(target, argument):
-            place = _find_place(target)
+            is_file = target.is_file() or not target.exists()
+            place = Path(os.path.realpath(target)) if is_file else target  # a link stays one; that of a pipe is nowhere
             fresh, handle = stack.enter_context(_open_target(place))
         yield _RawFile(handle, target, argument)
         if fresh != place:
@@ -188,12 +187,6 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
                 os.fsync(handle)  # before it takes the place: else a crash of the machine could leave an empty file there
                 fresh.replace(place)
             sync(place.parent)
-
-
-def _find_place(target: Path) -> Path:
-    """Return the file that a link stands for, so that the link stays one; of what is no file, such as a pipe, its own name."""
-    is_file = target.is_file() or not target.exists()
-    return Path(os.path.realpath(target)) if is_file else target  # the name of a pipe that realpath has is nowhere
 
 
 @contextmanager
@@ -210,11 +203,10 @@ def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
     if place.exists() and not os.access(place, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     if place.exists() and not place.is_file():
-        handle = os.open(place, os.O_WRONLY)  # of a folder, an error
-        try:
+        with ExitStack() as stack:
+            handle = os.open(place, os.O_WRONLY)  # of a folder, an error
+            stack.callback(os.close, handle)
             yield place, handle
-        finally:
-            os.close(handle)
         return
     with temporary(place, lambda path: os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)) as (fresh, handle):
         if place.exists():

@@ -127,14 +127,13 @@ def _find_folder() -> str:
 
 def _take_idle() -> Worker | None:
     """Return a process that waits for work; None where none does."""
-    while True:
-        try:
+    with suppress(IndexError):
+        while True:
             worker = _idle.pop()
-        except IndexError:
-            return None
-        if worker.parent == os.getpid() and worker.process.poll() is None:
-            return worker
-        worker.end()
+            if worker.parent == os.getpid() and worker.process.poll() is None:
+                return worker
+            worker.end()
+    return None
 
 
 @atexit.register
@@ -165,13 +164,7 @@ class Worker:
             raise
 
     def answer(self, limit: float, message: bytes) -> tuple[str, bytes]:
-        """Return what the process answers to a message within `limit`, in s; see `serve`.
-
-        Raises
-        ------
-        TimeLimitExceeded, WorkerDied
-            It does not.
-        """
+        """Return what the process answers within `limit`, s; see `serve`. Raise `TimeLimitExceeded` or `WorkerDied`."""
         try:
             self.connection.send_bytes(message)
             found = self.connection.recv_bytes() if self.connection.poll(limit) else None
@@ -213,13 +206,11 @@ def _block_interrupts() -> Iterator[None]:
 def serve(descriptor: int) -> None:
     """Do one piece of work after the other, as messages from the parent say, until the parent is gone."""
     connection = Connection(descriptor)
-    with open(os.devnull, "w") as nowhere:  # noqa: PTH123  # a stream with a descriptor, that of stderr where this is closed
+    # A stream with a descriptor: that of stderr where this is closed.
+    with open(os.devnull, "w") as nowhere, suppress(EOFError, ConnectionError):  # noqa: PTH123
         os.dup2(2, 1)
         while True:
-            try:
-                message = connection.recv_bytes()
-            except (EOFError, ConnectionError):
-                return
+            message = connection.recv_bytes()
             connection.send_bytes(dump(_do(message, nowhere) if message else ("started", b"")))
 
 
