@@ -43,7 +43,7 @@ class _Steps:
 
 @dataclass(frozen=True, init=False)
 class Grid(_Steps):
-    """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
+    """Steps of dt, s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
 

@@ -59,7 +59,7 @@ class Search:
             return self._find_drift()
         tame = self.turn <= SHORT and condition(self.found.scene) <= TAME
         alarmed = tame and isinstance(failure, NotConserved) and not self._is_loose()
-        return f"false alarm: {self.method.name} and {failure.quantity}" if alarmed else ""  # type: ignore[union-attr]
+        return f"false alarm: {self.method.name} and {failure.quantity}" if alarmed else ""  # type: ignore[attr-defined]
 
     def _find_drift(self) -> str:
         """Return what an ok run has lost, by the definitions and not by the compiled code that called it ok."""
@@ -177,7 +177,7 @@ def _points(draw: Generator) -> tuple[Array, Array]:
 
 def _spring(draw: Generator, body: cv.RigidBody, energy: float) -> cv.LinearSpring:
     b, a = _points(draw)
-    farthest = np.linalg.norm(a) + np.linalg.norm(b)
+    farthest = float(np.linalg.norm(a) + np.linalg.norm(b))
     rest = 0.0 if draw.random() < 0.4 else farthest * 10 ** draw.uniform(-2, 2)
     return cv.LinearSpring(energy / farthest**2, b, a, rest)
 
