@@ -34,7 +34,6 @@ RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
 LONGEST_SHOWN = 200
 """Characters of a value that a message shows at most."""
 
-
 MOST_STEPS = 2**53
 """Steps of a run at most: floats, which times are made of, count no farther."""
 SAMPLE_BYTES = 1000
@@ -127,9 +126,11 @@ def real_number(value: object) -> float | None:
 
 def positive_number(argument: str, value: object, allowed: str = "a finite number above 0") -> float:
     """Return `value`, of any unit, as a float of `SMALLEST` to `LARGEST`. Raise `BadInput` otherwise."""
-    number = finite_number(argument, value, allowed)
-    if number <= 0:
+    number = real_number(value)
+    if number is None or not 0 < number < math.inf:
         raise BadInput(argument, describe(value), allowed)
+    if not _in_range(number):
+        raise BadInput(argument, describe(value), f"{allowed}, of {SMALLEST:g} to {LARGEST:g}")
     return number
 
 
