@@ -223,7 +223,7 @@ COMMANDS = [
     Line("run brick_flip --csv a\0.csv", "--csv", "x00", "without NUL"),
     Line("report --out a\0", "--out", "x00", "without NUL"),
     Line("run a\0.toml", "scene", "x00", "a text"),
-    Line("run brick_flip --dt 1e-15", "sample_every", "5999999994000000 steps", "fit in memory"),
+    Line("run brick_flip --dt 1e-15", "dt", "more than 1e+11 steps", "--t-end"),
     Line("reprot", "reprot", "reprot", "report"),
 ]
 
