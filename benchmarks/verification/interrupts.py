@@ -58,7 +58,9 @@ class Try:
             return
         if self.ended.code != 130:
             yield f"exit code {self.ended.code}"
-        if not self.ended.err.startswith("Interrupted") or self.ended.err.count("\n") != 1:
+        # A command may have said already why it will end by itself.
+        said = [line for line in self.ended.err.splitlines() if not line.startswith("Error: ")]
+        if len(said) != 1 or not said[0].startswith("Interrupted"):
             yield f"said {self.ended.err!r}"
 
     def __str__(self) -> str:
