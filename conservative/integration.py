@@ -72,13 +72,24 @@ def integrate(
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     choice("on_failure", on_failure, ("raise", "return"))
-    if error is None:
-        trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
-    else:
-        trajectory = _integrate_to(error, scene, dt, method, t_end, sample_every)
+    try:
+        if error is None:
+            trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
+        else:
+            trajectory = _integrate_to(error, scene, dt, method, t_end, sample_every)
+    except SystemError as failure:
+        raise _interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
     if trajectory.failure is not None and on_failure == "raise":
         raise trajectory.failure
     return trajectory
+
+
+def _interrupt_of(failure: SystemError) -> BaseException:
+    """Return the interrupt that came while Python called machine code, which makes `SystemError`s of it; else the failure."""
+    reason: BaseException | None = failure
+    while isinstance(reason, SystemError):
+        reason = reason.__cause__ or reason.__context__
+    return reason if isinstance(reason, KeyboardInterrupt) else failure
 
 
 def _integrate_with(
