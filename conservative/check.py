@@ -34,7 +34,6 @@ RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
 LONGEST_SHOWN = 200
 """Characters of a value that a message shows at most."""
 
-
 MOST_STEPS = 2**53
 """Steps of a run at most: floats, which times are made of, count no farther."""
 SAMPLE_BYTES = 1000
@@ -127,9 +126,11 @@ def real_number(value: object) -> float | None:
 
 def positive_number(argument: str, value: object, allowed: str = "a finite number above 0") -> float:
     """Return `value`, of any unit, as a float of `SMALLEST` to `LARGEST`. Raise `BadInput` otherwise."""
-    number = finite_number(argument, value, allowed)
-    if number <= 0:
+    number = real_number(value)
+    if number is None or not 0 < number < math.inf:
         raise BadInput(argument, describe(value), allowed)
+    if not _in_range(number):
+        raise BadInput(argument, describe(value), f"{allowed}, of {SMALLEST:g} to {LARGEST:g}")
     return number
 
 
@@ -194,8 +195,14 @@ def require_memory(argument: str, n_steps: int, every: int) -> None:
         raise BadInput(argument, f"{every}, for {samples} samples of {n_steps} steps", fits)
 
 
-def check_grid(dt: object, n_steps: object, every: object) -> None:
-    """Raise `BadInput` for a step that is not finite, s, counts beyond `MOST_STEPS`, and samples that do not fit in memory."""
+def convert_steps(dt: object, n_steps: object, every: object) -> tuple[float, int, int]:
+    """Return a step, s, and counts, dimensionless, as a float and ints.
+
+    Raises
+    ------
+    BadInput
+        The step is not finite or not above 0, a count is beyond `MOST_STEPS`, or the samples do not fit in memory.
+    """
     step = real_number(dt)  # no range: steps of scenes in other units are no longer in SI units
     if step is None or not 0 < step < math.inf:
         raise BadInput("dt", describe(dt), "a finite step above 0, s")
@@ -207,6 +214,7 @@ def check_grid(dt: object, n_steps: object, every: object) -> None:
     if not math.isfinite(step * counts[0]):
         raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
     require_memory("every", *counts)
+    return step, *counts
 
 
 def power_of_two(size: float) -> float:

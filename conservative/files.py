@@ -28,7 +28,7 @@ except ImportError:  # not POSIX: no locks, and nothing is known to be left over
     fcntl = None
 
 _PLACES: Counter[Path] = Counter()
-_LISTENERS: list[Callable[[list[Path]], None]] = []
+_OBSERVERS: list[Callable[[list[Path]], None]] = []
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
             yield stream
             stream.flush()
         except BaseException:
-            raw.ended = True
+            raw.ignore = True
             raise
         finally:
             stream.detach().detach()
@@ -74,10 +74,10 @@ def make_folder(folder: Path, argument: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def listen(listener: Callable[[list[Path]], None]) -> None:
+def add_observer(observer: Callable[[list[Path]], None]) -> None:
     """Have a function called with the places that are being written, whenever these change."""
-    if listener not in _LISTENERS:
-        _LISTENERS.append(listener)
+    if observer not in _OBSERVERS:
+        _OBSERVERS.append(observer)
 
 
 @contextmanager
@@ -86,7 +86,7 @@ def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, 
 
     Leftovers of the place go first. An `OSError` stays one: the caller knows what to make of it.
     """
-    _list(place, 1)
+    _count_writers(place, 1)
     try:
         remove_leftovers(place)
         fresh, handle = _make_locked(place, make)
@@ -96,7 +96,7 @@ def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, 
             remove(fresh)
             release(handle)
     finally:
-        _list(place, -1)
+        _count_writers(place, -1)
 
 
 def remove_leftovers(place: Path) -> bool:
@@ -124,7 +124,7 @@ def _temporaries(place: Path, suffix: str = "") -> list[Path]:
 def lock(path: Path) -> int | None:
     """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
     with suppress(OSError):
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
         if _try_lock(handle) and _is_at(handle, path):
             return handle
         os.close(handle)
@@ -150,28 +150,26 @@ def remove(path: Path) -> None:
 
 def sync(path: Path) -> None:
     """Have a file, or the names in a folder, on the disk, where the file system can."""
-    with suppress(OSError):
+    with suppress(OSError), ExitStack() as stack:
         handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        stack.callback(os.close, handle)
+        os.fsync(handle)
 
 
 class _RawFile(io.FileIO):
-    """A file whose errors name the place that its contents are for; once `ended`, it takes what is left and forgets it."""
+    """A file whose errors name the place that its contents are for; with `ignore` it takes what is left and forgets it."""
 
     def __init__(self, handle: int, target: Path, argument: str) -> None:
         super().__init__(handle, "w", closefd=False)
-        self.target, self.argument, self.ended = target, argument, False
+        self.target, self.argument, self.ignore = target, argument, False
 
     def write(self, content: Any) -> int:
-        if self.ended:
+        if self.ignore:
             return memoryview(content).nbytes
         try:
             return super().write(content)
         except OSError as error:
-            self.ended = True
+            self.ignore = True
             raise NotWritten(self.argument, self.target, error) from None
 
 
@@ -180,8 +178,9 @@ def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
     """Yield a raw file that takes the place of `target` when the block ends well."""
     with ExitStack() as stack:
         with _errors(target, argument):
-            place = Path(os.path.realpath(target))  # a link stays one
-            fresh, handle = stack.enter_context(_opened(place))
+            is_file = target.is_file() or not target.exists()
+            place = Path(os.path.realpath(target)) if is_file else target  # a link stays one; that of a pipe is nowhere
+            fresh, handle = stack.enter_context(_open_target(place))
         yield _RawFile(handle, target, argument)
         if fresh != place:
             with _errors(target, argument):
@@ -199,16 +198,15 @@ def _errors(target: Path, argument: str) -> Iterator[None]:
 
 
 @contextmanager
-def _opened(place: Path) -> Iterator[tuple[Path, int]]:
+def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
     """Yield what to write into: a temporary with the permissions of the file, or the place itself where it is no file."""
     if place.exists() and not os.access(place, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     if place.exists() and not place.is_file():
-        handle = os.open(place, os.O_WRONLY)  # of a folder, an error
-        try:
+        with ExitStack() as stack:
+            handle = os.open(place, os.O_WRONLY)  # of a folder, an error
+            stack.callback(os.close, handle)
             yield place, handle
-        finally:
-            os.close(handle)
         return
     with temporary(place, lambda path: os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)) as (fresh, handle):
         if place.exists():
@@ -216,10 +214,10 @@ def _opened(place: Path) -> Iterator[tuple[Path, int]]:
         yield fresh, handle
 
 
-def _list(place: Path, number: int) -> None:
-    _PLACES[place] += number
-    for listener in _LISTENERS:
-        listener(sorted(+_PLACES))
+def _count_writers(place: Path, change: int) -> None:
+    _PLACES[place] += change
+    for observer in _OBSERVERS:
+        observer(sorted(+_PLACES))
 
 
 def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:

@@ -50,13 +50,14 @@ def integrate(
     error
         Attitude error over the run, rad, instead of a method and a step: `conservative.methods.automatic` chooses both, and
         `trajectory.choice` has them and the estimated error; a warning `AccuracyNotReached` where round-off is in the way.
+        What takes more than 10^10 steps is refused.
     on_failure
         "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
 
     Raises
     ------
     BadInput
-        An argument cannot be used.
+        An argument cannot be used, the steps do not fit in memory or are too many, or the method has no step of that length.
     Unsupported
         The method cannot do the scene.
     NotConverged
@@ -71,13 +72,24 @@ def integrate(
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     choice("on_failure", on_failure, ("raise", "return"))
-    if error is None:
-        trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
-    else:
-        trajectory = _integrate_to(error, scene, dt, method, t_end, sample_every)
+    try:
+        if error is None:
+            trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
+        else:
+            trajectory = _integrate_to(error, scene, dt, method, t_end, sample_every)
+    except SystemError as failure:
+        raise _interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
     if trajectory.failure is not None and on_failure == "raise":
         raise trajectory.failure
     return trajectory
+
+
+def _interrupt_of(failure: SystemError) -> BaseException:
+    """Return the interrupt that came while Python called machine code, which makes `SystemError`s of it; else the failure."""
+    reason: BaseException | None = failure
+    while isinstance(reason, SystemError):
+        reason = reason.__cause__ or reason.__context__
+    return reason if isinstance(reason, KeyboardInterrupt) else failure
 
 
 def _integrate_with(

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, check_grid, positive_integer, positive_number, require_memory
+from .check import MOST_STEPS, convert_steps, positive_integer, positive_number, require_memory
 from .declarations import Candidacy, Claims, Cost, settings_text
 from .errors import BadInput
 from .scene import Scene
@@ -35,8 +35,15 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Steps of dt s, and the samples kept of them: the start, every `every`-th step, and the last.
+class _Steps:
+    dt: float
+    n_steps: int
+    every: int = 1
+
+
+@dataclass(frozen=True, init=False)
+class Grid(_Steps):
+    """Steps of dt, s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
 
@@ -46,12 +53,8 @@ class Grid:
         dt is not a finite number above 0, n_steps or every is not an integer of 1 to 2^53, or samples do not fit in memory.
     """
 
-    dt: float
-    n_steps: int
-    every: int = 1
-
-    def __post_init__(self) -> None:
-        check_grid(self.dt, self.n_steps, self.every)
+    def __init__(self, dt: float, n_steps: int, every: int = 1) -> None:
+        super().__init__(*convert_steps(dt, n_steps, every))
 
     @property
     def steps(self) -> Array:
@@ -63,9 +66,7 @@ class Grid:
     @property
     def t(self) -> Array:
         """Times (n,) of the samples, s."""
-        t = self.steps
-        t *= self.dt
-        return t
+        return self.steps * self.dt
 
     def count_samples(self, done: int) -> int:
         """Return how many samples a run of `done` steps has filled."""
@@ -93,9 +94,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
     n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
     if n_steps > MOST_STEPS:
-        raise BadInput(
-            "dt", f"{step:g}, {n_steps:.3g} steps to {end:g} s", f"{end / MOST_STEPS:.3g} s or more: up to 2^53 steps"
-        )
+        raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
     return Grid(step, n_steps, every)

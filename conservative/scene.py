@@ -54,6 +54,9 @@ class Details(TypedDict, total=False):
 class Scene(_Fields):
     """A rigid body turning about a fixed point, from a start, for a time.
 
+    Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range our
+    own methods are right or say what failed; engines are given the numbers as they are.
+
     Parameters
     ----------
     name
@@ -79,7 +82,7 @@ class Scene(_Fields):
     Raises
     ------
     BadInput
-        An argument is not finite, has another shape, or is not a rotation.
+        An argument is not finite, has another shape, is out of range, or is not a rotation.
     """
 
     def __init__(

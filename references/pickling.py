@@ -48,7 +48,7 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
         cloudpickle, of the extra `report`, is not installed.
     """
     stream = io.BytesIO()
-    with LOCK, _taken_by_value(by_value):
+    with LOCK, _register_by_value(by_value):
         try:
             _pickler()(stream, shared).dump(value)
         except (pickle.PicklingError, TypeError, AttributeError, RecursionError, ValueError) as error:
@@ -132,7 +132,7 @@ def _make_exception(kind: type[BaseException], args: tuple[Any, ...], state: dic
 
 
 @contextmanager
-def _taken_by_value(names: Sequence[str]) -> Iterator[None]:
+def _register_by_value(names: Sequence[str]) -> Iterator[None]:
     """Take functions and classes of modules by value within the block."""
     modules = [sys.modules[name] for name in names]
     if not modules:

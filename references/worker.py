@@ -15,7 +15,8 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -31,10 +32,8 @@ MOST_SHARED = 8
 """Shared objects that either side keeps: the parent their bytes, the process what was made of them, compiled code included."""
 MOST_MODULES = 16
 """Modules at most that are sent because the process cannot import them."""
-START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]);"
-    "from conservative.references.worker import serve; serve(int(sys.argv[2]))"
-)
+LONGEST_LIMIT = 1e6
+"""Time, s, that any piece of work may take at most: 11 days. Clocks of operating systems take not much more."""
 _idle: list[Worker] = []
 
 
@@ -80,6 +79,7 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     MissingExtra
         cloudpickle, of the extra `report`, is not installed.
     """
+    limit = min(limit, LONGEST_LIMIT)
     by_value: list[str] = []
     while True:
         kept = [_bytes_of(each, tuple(by_value)) for each in shared]
@@ -94,6 +94,13 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
         by_value.append(name)  # the process cannot import it
 
 
+def python_command(statement: str, *arguments: str) -> list[str]:
+    """Return the command for a fresh interpreter that finds the modules that this one does; arguments are `sys.argv[2:]`."""
+    start = "import json, sys; sys.path[:] = json.loads(sys.argv[1]);"
+    places = json.dumps([place for place in sys.path if isinstance(place, str)])
+    return [sys.executable or "python3", "-P", "-c", f"{start} {statement}", places, *arguments]
+
+
 @lru_cache(maxsize=MOST_SHARED)
 def _bytes_of(value: object, by_value: tuple[str, ...]) -> bytes:
     return dump(value, (), by_value)
@@ -103,7 +110,7 @@ def _ask(limit: float, shared: list[bytes], work: bytes) -> tuple[str, bytes]:
     """Return the answer of an idle process, or of a new one, which is idle again after that."""
     worker = _take_idle() or Worker()
     try:
-        answer = worker.answer(limit, dump((sys.path, limit, shared, work)))
+        answer = worker.answer(limit, dump((sys.path, _find_folder(), limit, shared, work)))
     except BaseException:  # KeyboardInterrupt too
         worker.end()
         raise
@@ -111,16 +118,22 @@ def _ask(limit: float, shared: list[bytes], work: bytes) -> tuple[str, bytes]:
     return answer
 
 
+def _find_folder() -> str:
+    """Return the working directory, "" where it is there no more."""
+    with suppress(OSError):
+        return os.getcwd()  # noqa: PTH109  # as it is
+    return ""
+
+
 def _take_idle() -> Worker | None:
     """Return a process that waits for work; None where none does."""
-    while True:
-        try:
+    with suppress(IndexError):
+        while True:
             worker = _idle.pop()
-        except IndexError:
-            return None
-        if worker.parent == os.getpid() and worker.process.poll() is None:
-            return worker
-        worker.end()
+            if worker.parent == os.getpid() and worker.process.poll() is None:
+                return worker
+            worker.end()
+    return None
 
 
 @atexit.register
@@ -136,14 +149,14 @@ class Worker:
     def __init__(self) -> None:
         self.parent = os.getpid()
         ours, theirs = socket.socketpair()
-        with theirs:
-            self.process = subprocess.Popen(
-                [sys.executable, "-P", "-c", START, json.dumps(sys.path), str(theirs.fileno())],
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C is for the parent, which ends this
-            )
-        self.connection = Connection(ours.detach())
+        with ours, theirs:
+            with _block_interrupts():
+                self.process = subprocess.Popen(
+                    python_command(f"from {__name__} import serve; serve(int(sys.argv[2]))", str(theirs.fileno())),
+                    pass_fds=[theirs.fileno()],
+                    stdin=subprocess.DEVNULL,
+                )
+            self.connection = Connection(ours.detach())
         try:
             self.answer(START_LIMIT, b"")
         except BaseException:
@@ -151,21 +164,23 @@ class Worker:
             raise
 
     def answer(self, limit: float, message: bytes) -> tuple[str, bytes]:
-        """Return what the process answers to a message within `limit`, in s; see `serve`.
-
-        Raises
-        ------
-        TimeLimitExceeded, WorkerDied
-            It does not.
-        """
+        """Return what the process answers within `limit`, s; see `serve`. Raise `TimeLimitExceeded` or `WorkerDied`."""
         try:
             self.connection.send_bytes(message)
-            if not self.connection.poll(limit):
-                raise TimeLimitExceeded(limit)
-            kind, content = load(self.connection.recv_bytes())
-        except (EOFError, ConnectionError):
-            raise WorkerDied(self.process.wait()) from None
+            found = self.connection.recv_bytes() if self.connection.poll(limit) else None
+        except (EOFError, OSError):  # an OSError where it ends in the middle of an answer
+            raise WorkerDied(self._wait()) from None
+        if found is None:
+            raise TimeLimitExceeded(limit)
+        kind, content = load(found)
         return kind, content
+
+    def _wait(self) -> int:
+        """Return how the process ended, which has closed the connection; one that goes on without it is ended."""
+        with suppress(subprocess.TimeoutExpired):
+            return self.process.wait(GRACE)
+        self.process.kill()
+        return self.process.wait()
 
     def end(self) -> None:
         """End the process, whatever it does, and wait until it is gone."""
@@ -175,17 +190,27 @@ class Worker:
             self.process.wait()
 
 
+@contextmanager
+def _block_interrupts() -> Iterator[None]:
+    """Start processes in the block that Ctrl-C does not reach: it is for the parent, which ends them.
+
+    They stay in its process group, so that whoever ends that ends them as well.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def serve(descriptor: int) -> None:
     """Do one piece of work after the other, as messages from the parent say, until the parent is gone."""
-    os.dup2(2, 1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = Connection(descriptor)
-    with open(os.devnull, "w") as nowhere:  # noqa: PTH123  # a stream with a descriptor
+    # A stream with a descriptor: that of stderr where this is closed.
+    with open(os.devnull, "w") as nowhere, suppress(EOFError, ConnectionError):  # noqa: PTH123
+        os.dup2(2, 1)
         while True:
-            try:
-                message = connection.recv_bytes()
-            except (EOFError, ConnectionError):
-                return
+            message = connection.recv_bytes()
             connection.send_bytes(dump(_do(message, nowhere) if message else ("started", b"")))
 
 
@@ -194,7 +219,9 @@ def _do(message: bytes, nowhere: Any) -> tuple[str, bytes]:
 
     "unknown" is a module that cannot be imported here, and "lost" why there are no bytes.
     """
-    sys.path[:], limit, kept, work = load(message)
+    sys.path[:], folder, limit, kept, work = load(message)
+    with suppress(OSError):
+        os.chdir(folder)
     faulthandler.dump_traceback_later(limit + GRACE, exit=True, file=nowhere)
     try:
         shared = [_load_shared(content) for content in kept]

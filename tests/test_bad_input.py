@@ -163,7 +163,7 @@ API = [
     (lambda: field(energy=lambda R: HUGE), "energy", "OverflowError", "a real number"),
     (lambda: field(gradient=lambda R: None), "gradient", "None", "a matrix (3, 3)"),
     (lambda: field(gradient=lambda R: 1j * ONE), "gradient", "1.j", "a matrix (3, 3)"),
-    (lambda: field(gradient=lambda R: [1, 2, 3]), "gradient", "shape (3,)", "a matrix (3, 3)"),
+    (lambda: field(gradient=lambda R: [1, 2, 3]), "gradient", "[1, 2, 3], not a matrix (3, 3)", "a matrix (3, 3)"),
     (lambda: field(axis_W=(0, 0, 2)), "axis_W", "2.0", "a unit vector"),
     (lambda: field(axis_W=(0, NAN, 1)), "axis_W", "nan", "a unit vector"),
     (lambda: field(axis_W=(1, 0, 0)), "axis_W", "a torque of", "symmetric"),
@@ -223,7 +223,7 @@ COMMANDS = [
     Line("run brick_flip --csv a\0.csv", "--csv", "x00", "without NUL"),
     Line("report --out a\0", "--out", "x00", "without NUL"),
     Line("run a\0.toml", "scene", "x00", "a text"),
-    Line("run brick_flip --dt 1e-15", "sample_every", "5999999994000000 steps", "fit in memory"),
+    Line("run brick_flip --dt 1e-15", "dt", "more than 1e+11 steps", "--t-end"),
     Line("reprot", "reprot", "reprot", "report"),
 ]
 

@@ -27,7 +27,10 @@ ALLOWED = {
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
-    "benchmarks/verification/hostile_calls.py": ("reduced", "a setting with a frame"),
+    "benchmarks/verification/hostile_bodies.py": (
+        "convected exact gauss moser_veselov reduced substepped",
+        "what moves random bodies, and the truth that it is compared with",
+    ),
     "benchmarks/verification/hostile_scales.py": (
         "convected exact gauss heyoka lame moser_veselov mujoco pinocchio precise projected reduced scipy substepped",
         "what moves a body of any scale",

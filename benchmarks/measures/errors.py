@@ -48,7 +48,7 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     n = len(trajectory)
     R_ref, w_ref = truth.R_WB[:n], truth.w_WB_B[:n]
     attitude = angle_between(R_ref, trajectory.R_WB)
-    rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=-1) / (np.linalg.norm(truth.w_WB_B, axis=-1).max() or 1.0)
+    rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=1) / (np.linalg.norm(truth.w_WB_B, axis=1).max() or 1.0)
     found = [
         Value(Measure.ATTITUDE_MAX, float(attitude.max())),
         Value(Measure.ATTITUDE_FINAL, float(attitude[-1])),
@@ -58,7 +58,7 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     ]
     potential = trajectory.scene.potential
     if isinstance(potential, UniformGravity):
-        position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=-1)
+        position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=1)
         found += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
     return found + measure_drifts(trajectory)
 

@@ -112,7 +112,7 @@ def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
 def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
     adaptive = tolerance_setting(probes[0].method) is not None
     while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target:
-        if at_round_off(probes) or was_ended(probes[-1]):
+        if at_round_off(probes) or timed_out(probes[-1]):
             break
         finer = (_tighten_tolerance if adaptive else _shorten_step)(conditions, probes, aim(probes[-1]))
         if finer is None:
@@ -126,7 +126,7 @@ def at_round_off(probes: Sequence[Probe]) -> bool:
     return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
 
 
-def was_ended(probe: Probe) -> bool:
+def timed_out(probe: Probe) -> bool:
     """Whether a probe went on beyond its limit; what is finer would, too."""
     return probe.outcome.kind is OutcomeKind.TIMEOUT
 

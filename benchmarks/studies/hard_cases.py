@@ -18,13 +18,13 @@ from ..measures.measurement import Measurement
 from .case import Case
 from .paper import accuracy
 from .selection import Missing
-from .study import Progress, Study
+from .study import HANG_FACTOR, Progress, Study
 from .time_limit import attempt_apart
 
 TURN = 60.0
 """Length of the runs, rad turned at the rate of the start. Limited, because multi-precision truth costs seconds."""
 LIMIT = 20.0
-"""Wall-time limit of a run, s, compilation included."""
+"""Wall-time limit of a run, s, compilation included; more where a study plans for runs of more than a tenth of it."""
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -56,7 +56,7 @@ def grid(scene: Scene) -> Grid:
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield all errors, drifts and work of every method on every scene."""
     methods = study.competitors
-    total = len(study.scenes) * len(methods)
+    total, limit = len(study.scenes) * len(methods), max(LIMIT, HANG_FACTOR * study.longest_run)
     for i, scene in enumerate(study.scenes):
         progress(i * len(methods), total, f"{scene.name}: truth")
         steps = grid(scene)
@@ -64,4 +64,4 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
-            yield from accuracy(case, attempt_apart(LIMIT, case, study.skip_missing), truth)
+            yield from accuracy(case, attempt_apart(limit, case, study.skip_missing), truth)

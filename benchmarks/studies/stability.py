@@ -8,7 +8,7 @@ A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| that of th
                      or, of any method and while the body turns by no more than pi, where angles are not ambiguous: the first
                      step ends further from the true attitude than a body that did not move
     diverged         the state is not finite from a time on, or the energy is off by more than its own scale
-    timeout          the run of an engine took longer than `LIMIT` s, and was ended
+    timeout          the run of an engine took longer than `LIMIT` s, or than the study plans for, and was ended
     unsupported      the method does not have the scene, or not the step
     crashed          an engine raised an exception of its own
 
@@ -57,7 +57,8 @@ STEP_SIZES = (1, 2, 3, 5, 7, 10, 15, 20, 25, 30, 40, 50, 70, 100)
 """|w| dt in units of `UNIT` rad, short to long."""
 STEPS = 24
 LIMIT, FIRST_LIMIT = 1.0, 60.0
-"""Wall-time limits, s: of a run, and of the first run of a method on a scene, which may compile."""
+"""Wall-time limits, s: of a run, unless the study plans for longer ones, and of the first run of a method on a scene, which
+may compile."""
 TOLERANCE = 1e-6
 """Tolerance, rad, when comparing two angles: round-off turns even a body at rest."""
 
@@ -99,7 +100,7 @@ class TrueMotion:
 
 def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measurement]:
     """Return the rows of one method on one scene."""
-    works, limit, outcome = math.nan, FIRST_LIMIT, OK
+    works, limit, outcome = math.nan, max(FIRST_LIMIT, study.longest_run), OK
     case = Case(study.name, motion.scene, method, motion.grid(STEP_SIZES[0]))
     fails = math.nan
     for size in STEP_SIZES:
@@ -107,7 +108,7 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
             break
-        works, limit = UNIT * size, LIMIT
+        works, limit = UNIT * size, max(LIMIT, study.longest_run)
     rows = [
         case.row(Value(Measure.LONGEST_STEP, works), OK if works > 0 else outcome),
         case.row(Value(Measure.FAILING_STEP, fails), outcome, "every step works" if outcome.ok else ""),

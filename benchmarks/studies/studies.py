@@ -7,6 +7,7 @@ for study in studies.cross_studies(selection.scenes(), selection.methods()):
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from conservative.check import choice
 from conservative.method import Method
@@ -59,11 +60,14 @@ def cross_studies(
     return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in CROSSED)
 
 
-def list_hard_studies(methods: tuple[Method, ...], skip_missing: bool = False) -> tuple[Study, ...]:
+def list_hard_studies(
+    methods: tuple[Method, ...], skip_missing: bool = False, time_limit: float | None = None
+) -> tuple[Study, ...]:
     """Return the studies of the hard cases: stability, and every registered scene with one or two settings of each family."""
+    options: dict[str, Any] = {"skip_missing": skip_missing, "time_limit": time_limit}
     return (
-        Study("stability", selection.scenes(stability.SCENES), methods, skip_missing=skip_missing),
-        Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), skip_missing=skip_missing),
+        Study("stability", selection.scenes(stability.SCENES), methods, **options),
+        Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), **options),
     )
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from weakref import WeakKeyDictionary
 
 from conservative.errors import BadInput
-from conservative.method import Method, Role
+from conservative.method import Grid, Method, Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 from conservative.references.environments.engine_method import EngineMethod
@@ -20,8 +20,8 @@ from conservative.trajectory import Trajectory
 from .case import Case, Failure, Success, attempt
 from .selection import Missing
 
-_ended: WeakKeyDictionary[Scene, dict[Method, tuple[float, int]]] = WeakKeyDictionary()
-"""Limit, s, and steps of the last run that was ended, by scene and method: nobody waits for the same twice."""
+_timeouts: WeakKeyDictionary[Scene, dict[Method, tuple[float, Grid]]] = WeakKeyDictionary()
+"""Limit, s, and grid of the last run that was ended, by scene and method: nobody waits for the same twice."""
 
 
 def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
@@ -34,7 +34,8 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
     """Return the outcome of a case that may take `limit` s of wall time; see `attempt`.
 
     What is not our own may go on for ever, or end the process that it is in: it runs in another one, which is ended after the
-    limit. The trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called.
+    limit. The trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called. A method
+    that no bytes can be made of, as it holds an open file or a lock, runs here, without a limit.
 
     Raises
     ------
@@ -46,13 +47,12 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
             return attempt(case, skip_missing)
     if is_bounded(case.method):
         return attempt(case, skip_missing)
-    known = _ended.get(case.scene, {}).get(case.method)
-    if known and limit <= known[0] and case.grid.n_steps >= known[1]:
-        return Failure(Outcome(OutcomeKind.TIMEOUT, f"a run of {known[1]} steps was ended after {known[0]:g} s"))
+    if known := _find_timeout(limit, case):
+        return known
     try:
         done = run_within(limit, partial(_attempt, case), (case.scene,))
     except TimeLimitExceeded as late:
-        _ended.setdefault(case.scene, {})[case.method] = limit, case.grid.n_steps
+        _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
         return Failure(Outcome(OutcomeKind.TIMEOUT, str(late)))
     except WorkerDied as death:
         return Failure(Outcome(OutcomeKind.CRASHED, str(death)))
@@ -86,6 +86,15 @@ def is_bounded(method: Method) -> bool:
 
 def _is_ours(method: Method) -> bool:
     return type(method).__module__.startswith("conservative.")
+
+
+def _find_timeout(limit: float, case: Case) -> Failure | None:
+    """Return the outcome of a case with as many steps, and as long a motion, as one that was ended after as much time."""
+    before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
+    longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
+    if limit > before or not longer:
+        return None
+    return Failure(Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s"))
 
 
 def _attempt(case: Case) -> Success | Failure:

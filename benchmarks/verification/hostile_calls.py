@@ -22,6 +22,7 @@ from conservative.references.exact.method import free_body, lagrange_top
 from conservative.scene_files import scene_file
 
 from .hostile_arguments import Try, draw_hostile, scramble
+from .hostile_bodies import SEARCHED, try_body, try_truth
 from .hostile_scales import OURS, REFERENCES, try_extremes, try_units
 
 MODEL_FILES = 0.002
@@ -47,9 +48,11 @@ def warm_up() -> None:
         cv.scenes.brick_flip(),
         cv.scenes.lagrange_top(),
         cv.scenes.sprung_body(),
+        cv.scenes.brick_flip().rename("in a gradient", potential=cv.GravityGradient(1.0, (1.0, 2.0, 2.5))),
+        cv.scenes.brick_flip().rename("attracted", potential=cv.PointAttraction(1.0, (1, 0, 0), (0, 0, 3))),
         _scene_in(cv.FunctionPotential(_quartic, _quartic_gradient)),
     ]
-    for method in (*OURS, cv.Reduced(4, frame="auto"), *REFERENCES):
+    for method in (*SEARCHED, *REFERENCES):
         for scene in scenes:
             if method.unsupported(scene) is None:
                 cv.integrate(scene, 0.005, method, t_end=0.01, on_failure="return")
@@ -210,6 +213,6 @@ def _closed_form(rng: Random, folder: Path) -> Try:
 
 
 _ARGUMENTS = (_construct, _construct, _set, _integrate, _name, _scene_function, _scene_file, _closed_form, _model_file)
-_SCALES = (try_extremes, try_units)
-PARTS = {"arguments": _ARGUMENTS, "scales": _SCALES, "all": _ARGUMENTS + _SCALES}
-"""Kinds of call: with hostile arguments, and with numbers anywhere in the range that is allowed."""
+_SCALES, _BODIES = (try_extremes, try_units), (try_body, try_body, try_truth)
+PARTS = {"arguments": _ARGUMENTS, "scales": _SCALES, "bodies": _BODIES, "all": _ARGUMENTS + _SCALES + _BODIES}
+"""Kinds of call: with hostile arguments, with numbers anywhere in the range that is allowed, and of random bodies."""

@@ -24,7 +24,7 @@ from conservative.trajectory import Trajectory
 from .hostile_arguments import Try
 
 OURS = (cv.Reduced(), cv.Reduced(4), cv.Gauss(2), cv.MoserVeselov(), cv.Lame(), cv.Projected(), cv.Convected(), cv.Substepped())
-REFERENCES = (MuJoCo(), Pinocchio(), Heyoka(1e-9), SciPy(rtol=1e-6), Exact(), Precise(64))
+REFERENCES = (MuJoCo(), Pinocchio(), Heyoka(1e-9), SciPy(rtol=1e-8), Exact(), Precise(64))
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from .hostile_arguments import Try
+from .hostile_bodies import Comparison, Search
 from .hostile_calls import PARTS, make_try, warm_up
 from .hostile_scales import Pair
 
@@ -90,6 +91,8 @@ def find_fault(value: object) -> str:
     """Return what is wrong with a result, "" for nothing."""
     if isinstance(value, Pair):
         return find_fault(value.scaled) or _difference(value)
+    if isinstance(value, Search | Comparison):
+        return value.fault
     if isinstance(value, Trajectory):
         return _fault_of_trajectory(value) if value.ok else ""
     if isinstance(value, Scene):

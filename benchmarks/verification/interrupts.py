@@ -8,7 +8,6 @@ are counted on their own, and only have to end.
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import signal
@@ -18,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .processes import Ended, Started, quantile, temporaries
+from .processes import Ended, Started, quantile, read_options, temporaries
 
 LIMIT = 0.5
 """Time, s, within which a command ends."""
@@ -59,7 +58,9 @@ class Try:
             return
         if self.ended.code != 130:
             yield f"exit code {self.ended.code}"
-        if not self.ended.err.startswith("Interrupted") or self.ended.err.count("\n") != 1:
+        # A command may have said already why it will end by itself.
+        said = [line for line in self.ended.err.splitlines() if not line.startswith("Error: ")]
+        if len(said) != 1 or not said[0].startswith("Interrupted"):
             yield f"said {self.ended.err!r}"
 
     def __str__(self) -> str:
@@ -114,10 +115,7 @@ def summary(found: Sequence[Try]) -> str:
 
 def main() -> None:
     """Print a line for each try and one with the counts; exit with 1 where something leaked or was late."""
-    parser = argparse.ArgumentParser(prog="python -m conservative.benchmarks.verification.interrupts", description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=11)
-    options = parser.parse_args()
+    options = read_options("interrupts", __doc__)
     found = []
     for each in tries(options.count, options.seed):
         found.append(each)

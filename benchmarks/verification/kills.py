@@ -6,7 +6,6 @@ begins. Each has the rows of one that was left alone, apart from times; beside i
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import random
@@ -18,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from .processes import Ended, Started, temporaries
+from .processes import Ended, Started, read_options, temporaries
 
 REPORT = ("report", "--quick", "--scenes", "brick_flip", "--methods", "moser_veselov:order=2")
 TIMES = ("s", "s/s")
@@ -113,10 +112,7 @@ def _wrong_whole(ended: Ended, folder: Path, expected: Sequence[tuple[str, ...]]
 
 def main() -> None:
     """Print a line for each kill and each report, and one with the counts; exit with 1 where something was lost."""
-    parser = argparse.ArgumentParser(prog="python -m conservative.benchmarks.verification.kills", description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=11)
-    options = parser.parse_args()
+    options = read_options("kills", __doc__)
     found = []
     for each in kills(options.count, options.seed):
         found.append(each)

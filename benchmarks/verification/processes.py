@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import select
@@ -80,6 +81,14 @@ class Started:
 def temporaries(folder: Path) -> list[str]:
     """Return the names of what should have been removed from a folder."""
     return sorted(path.name for path in folder.rglob("*") if TEMPORARY.fullmatch(path.name))
+
+
+def read_options(attack: str, description: str | None) -> argparse.Namespace:
+    """Return how often to try, `count`, and the `seed` of what is tried, as the command line of an attack has them."""
+    parser = argparse.ArgumentParser(prog=f"python -m {__package__}.{attack}", description=description)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=11)
+    return parser.parse_args()
 
 
 def quantile(values: Sequence[float], part: float) -> float:

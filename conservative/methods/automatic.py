@@ -24,7 +24,7 @@ import numpy as np
 from .. import registry
 from ..attitude import Array, angle_between
 from ..declarations import Candidacy
-from ..errors import AccuracyNotReached, IntegrationFailed, MissingEngine, Unsupported
+from ..errors import AccuracyNotReached, BadInput, IntegrationFailed, MissingEngine, Unsupported
 from ..method import Grid, Method, Role
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
@@ -41,6 +41,10 @@ STALLED = 0.7
 """Shorter steps have stopped helping when two in a row leave more than this share of the error before them."""
 PROBE_RADIANS = 200.0
 """Length of a probe in units of the fastest turning that the energy allows."""
+MOST_STEPS, MOST_PROBED = 10**10, 10**7
+"""Steps that a run may be given, and a probe: some quarter of an hour, and a second, by the fastest method."""
+MOST_COMPARED = 10**5
+"""Samples of a probe at most."""
 
 Attempts = list[tuple[float, float]]
 """Steps tried, s, with the estimated error of each, rad."""
@@ -79,6 +83,11 @@ def integrate_to_error(scene: Scene, error: float, t_end: float, spacing: float 
 
     With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th
     step.
+
+    Raises
+    ------
+    BadInput
+        The error asks for more than `MOST_STEPS` steps.
     """
     method, dt = _find_cheapest(scene, error, t_end)
     attempts: Attempts = []
@@ -109,7 +118,9 @@ def _probe(method: Method, scene: Scene, error: float, t_end: float) -> tuple[fl
     dt = duration / 2 if method.order else min(method.longest_step(scene) / 2, t_end / 16)
     attempts: Attempts = []
     for _ in range(2 * ATTEMPTS):
-        grid = _even_grid(dt, duration, None, 1)
+        if duration / dt > MOST_PROBED:  # out of the question, while another candidate gets there
+            return math.inf, dt
+        grid = _even_grid(dt, duration, None, max(1, int(duration / dt / MOST_COMPARED)))
         estimate, trajectory = _run_twice(method, scene, grid)
         attempts.append((grid.dt, estimate))
         if estimate <= SAFETY * share or method.order is None or _stalls(attempts):
@@ -124,7 +135,9 @@ def _count_work(method: Method, trajectory: Trajectory) -> float:
 
 
 def _even_grid(dt: float, t_end: float, spacing: float | None, sample_every: int) -> Grid:
-    """Return a grid of an even number of steps of at most dt."""
+    """Return a grid of an even number of steps of at most dt. Raise `BadInput` if they are more than `MOST_STEPS`."""
+    if t_end / dt > MOST_STEPS:
+        raise BadInput("error", f"what takes {t_end / dt:.3g} steps", f"what {MOST_STEPS:g} steps reach: a larger one")
     if spacing is None:
         n = 2 * max(1, math.ceil(t_end / dt / 2 * (1 - 1e-9)))
         return Grid(t_end / n, n, min(sample_every, n))

@@ -18,11 +18,11 @@ LOOSEST = 1e-3
 """With a larger drift no run of ours is called ok, whatever the tolerance, the body and the number of steps."""
 ROUNDING, SOLVER = 4.0, 10.0
 """Rounding units, and tolerances, that a step may leave."""
-NORMALISED = 1e-13
+UNIT_QUATERNIONS = 1e-13
 """Orthonormality of matrices made of quaternions of length one."""
 
 
-def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = NORMALISED) -> Bounds:
+def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float | None = UNIT_QUATERNIONS) -> Bounds:
     """Return the bounds of a run whose solver may leave a relative error `tol` in a step.
 
     `orthonormality` is None where it is kept no better than the invariants.

@@ -30,7 +30,10 @@ class Convected(Method):
     Parameters
     ----------
     tol
-        The paper's eps: Newton stops where the norm of the residual (27) is at most this.
+        The paper's eps: Newton stops where the norm of the residual (27) is at most this. It is absolute: the residual has
+        changes of base vectors and of momenta, the latter in units in which the motion is of order one (SI units, unless the
+        largest moment, kg m^2, or the rate, 1/s, that the energy makes of it is out of 2^-16 to 2^16;
+        `conservative.methods.units`).
 
     Raises
     ------
@@ -73,7 +76,8 @@ class Convected(Method):
         linearise = _linearise(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
-            u, corrections, failure = _march(linearise, u0, grid, self.tol)
+            with np.errstate(all="ignore"):  # what overflows is no solution, and the step fails
+                u, corrections, failure = _march(linearise, u0, grid, self.tol)
             q, p = u[:, :9].copy(), u[:, 9:].copy()
             L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
             R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
@@ -118,13 +122,14 @@ def _march(linearise: Linearisation, u: Array, grid: Grid, tol: float) -> tuple[
 def _take_step(linearise: Linearisation, u0: Array, tol: float) -> tuple[Array, int, float]:
     """Return the state after one step, the corrections it took, and the norm of the residual it was left with."""
     u = u0  # 2) prediction: the state itself
+    norm = math.inf
     for corrections in range(MAX_ITERATIONS + 1):
-        r, K = linearise(u0, u)  # 3)
-        norm = math.sqrt(r @ r)
-        if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
-            break
         try:
+            r, K = linearise(u0, u)  # 3)
+            norm = math.sqrt(r @ r)
+            if norm <= tol or not math.isfinite(norm) or corrections == MAX_ITERATIONS:
+                break
             u = u - np.linalg.solve(K, r)  # 4), (28)
-        except np.linalg.LinAlgError:  # steps of a radian and more can end up where the tangent is singular
+        except np.linalg.LinAlgError:  # steps of a radian and more can end up where C C' or the tangent is singular
             break
     return u, corrections, norm

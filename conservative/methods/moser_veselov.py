@@ -19,7 +19,7 @@ from ..trajectory import Bounds
 from .bounds import bounds_of
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
-from .units import converted, find_units, in_own_units
+from .units import convert_scene, find_units, in_own_units
 
 ORDERS: tuple[int | Literal["exact"], ...] = (2, 4, 6, 8, 10, "exact")
 LONGEST, LONGEST_EXACT = 1.5, 6.0
@@ -149,7 +149,7 @@ def step_limit(scene: Scene, exact: bool) -> float:
     if not exact:
         return LONGEST / speed
     units = find_units(scene, scene.dt)
-    nu = abs(scene.derive(converted, units).derive(find_polhode)[1].nu) / units.time
+    nu = abs(scene.derive(convert_scene, units).derive(find_polhode)[1].nu) / units.time
     return min(LONGEST_EXACT / speed, LONGEST_SHIFT / nu if nu > 0 else math.inf)
 
 

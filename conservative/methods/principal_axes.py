@@ -61,8 +61,8 @@ def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
     axis_B = scene.symmetry_axis_B
     if axis_B is None:
         raise BadInput("frame", f"'non_spinning' for the scene {scene.name!r}", "a scene symmetric about one axis")
-    J3 = float(axis_B @ scene.body.inertia @ axis_B)
-    J1 = (float(np.trace(scene.body.inertia)) - J3) / 2
+    J = np.roll(scene.body.moments, 2 - int(np.argmax(np.abs(axis_B @ scene.body.R_BP))))
+    J1, J3 = float(J[0] + J[1]) / 2, float(J[2])
     start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
     upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis but for round-off
     spin = ((J1 - J3) / (J1 * J3) * start.L[2], 1 / J3)

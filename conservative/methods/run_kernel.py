@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from threading import get_ident, main_thread
 from typing import Any
@@ -28,7 +29,10 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 
     def run() -> Trajectory:
         q, L = np.empty((n, 4)), np.empty((n, 3))
-        result = Result(*enter(kernel.PAUSE if in_main_thread() else 0, q, L))
+        try:
+            result = Result(*enter(kernel.PAUSE if in_main_thread() else 0, q, L))
+        except np.linalg.LinAlgError:  # what compiled code cannot catch: equations that are singular, or not finite
+            result = Result(count_steps(enter, q, L, grid), 0, 0, None, np.inf, False)
         done = result.done
         t, R_WB, w_WB_B, failure = turn_back(start, grid, n if done == n_steps else grid.count_samples(done), q, L)
         if failure is None and done < n_steps:
@@ -38,6 +42,14 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
         return Trajectory(scene, t, R_WB, w_WB_B, label, work, failure)
 
     return run
+
+
+def count_steps(enter: Any, q: Array, L: Array, grid: Grid) -> int:
+    """Return how many steps a run that raises takes at least, by the samples it fills: q (n, 4), L (n, 3), kg m^2/s."""
+    q.fill(np.nan)
+    with suppress(np.linalg.LinAlgError):
+        enter(0, q, L)
+    return (max(1, int(np.isfinite(q).all(axis=1).sum())) - 1) * grid.every
 
 
 def in_main_thread() -> bool:

@@ -81,7 +81,7 @@ def find_exponents(scene: Scene) -> tuple[int, int | None]:
     return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
 
-def converted(scene: Scene, units: Units) -> Scene:
+def convert_scene(scene: Scene, units: Units) -> Scene:
     """Return the scene in other units."""
     return scene if units == SI else units.convert(scene)
 
@@ -89,7 +89,7 @@ def converted(scene: Scene, units: Units) -> Scene:
 def bound_rate(scene: Scene) -> float:
     """Return an upper bound of the angular speed, rad/s: all energy kinetic, about the axis of least inertia."""
     units = find_units(scene, scene.dt)
-    of_order_one = scene.derive(converted, units)
+    of_order_one = scene.derive(convert_scene, units)
     return math.sqrt(2 * of_order_one.energy_scale / float(of_order_one.body.moments.min())) / units.time
 
 
@@ -102,7 +102,7 @@ def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
         if units == SI:
             return prepare(method, scene, grid)
         steps = Grid(grid.dt / units.time, grid.n_steps, grid.every)
-        run = prepare(method, scene.derive(converted, units), steps)
+        run = prepare(method, scene.derive(convert_scene, units), steps)
         return lambda: units.restore(run(), scene, grid)
 
     return prepare_in_units

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,7 +86,8 @@ class GravityGradient(_Fields):
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
         rate = power_of_two(self.rate)
-        inertia = self.inertia * rate * rate / energy
+        ratio = rate / math.sqrt(energy)  # twice, as a product of three may vanish before it is divided
+        inertia = self.inertia * ratio * ratio
         return build_unchecked(GravityGradient, rate=self.rate / rate, inertia=inertia, direction_W=self.direction_W)
 
     @property

@@ -135,8 +135,9 @@ class LinearSpring(_SpringFields, PointPotential):
         return self.stiffness / 2 * (1 - 2 * self.rest_length / (distance_0 + distance_1))
 
     def scale(self) -> float:
-        """Return the energy with the points as far apart as they get and no rest length, J."""
-        return self.stiffness / 2 * float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W)) ** 2
+        """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
+        farthest = float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W))
+        return self.stiffness / 2 * max(farthest, self.rest_length) ** 2
 
     def in_units(self, energy: float) -> LinearSpring:
         """Return the field with energies in units of `energy`, a power of two, J, and lengths in units of the longest."""

@@ -11,6 +11,7 @@ from conservative.attitude import Array
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -81,6 +82,7 @@ class Heyoka(Method):
             return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"
         return reason
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
         integrators, label = forms.compile_double(problem.form, self.tol), self.label

@@ -11,9 +11,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from conservative.check import describe, printable_text
@@ -21,6 +19,7 @@ from conservative.errors import BadInput, MissingEngine
 from conservative.shapes import MassDistribution
 
 from ..engine import version
+from ..worker import python_command
 from . import model_reader
 from .model_reader import CPU_SECONDS, ENGINES, MEMORY
 
@@ -95,9 +94,8 @@ def _text_of(path: object) -> str:
 
 def _ask(request: dict[str, Any]) -> dict[str, Any]:
     """Return the answer of a reader; raise `BadInput` where its limits end it."""
-    command = [sys.executable or "python3", "-P", "-m", model_reader.__name__]
-    places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
-    environment = {**os.environ, "PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1"}
+    command = python_command(f"from {model_reader.__name__} import main; main()")
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
             command, input=json.dumps(request).encode(), capture_output=True, timeout=SECONDS, env=environment, check=False

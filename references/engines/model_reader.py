@@ -1,8 +1,9 @@
 """The worker that reads model files: MJCF by MuJoCo, URDF by Pinocchio. It takes a request on stdin and answers on stdout.
 
-A process of its own, as no file must hold up or fill the one that asks: `conservative.references.engines.model_files` runs
-`python -m conservative.references.engines.model_reader` and has what it means for a body to turn. Request and answer are JSON,
-whose numbers are the shortest that give the same doubles. Source: the two formats' documentation.
+A process of its own, as no file must hold up or fill the one that asks: `conservative.references.engines.model_files` starts it
+and has what it means for a body to turn. Not one of `conservative.references.worker`: its limits on memory and processor time
+last as long as the process, and JSON, whose numbers are the shortest that give the same doubles, needs no extra package.
+Source: the two formats' documentation.
 """
 
 from __future__ import annotations
@@ -205,7 +206,3 @@ def main() -> None:
     with os.fdopen(os.dup(1), "w") as stdout, Path(os.devnull).open("w") as nothing:
         os.dup2(nothing.fileno(), 1)
         json.dump(answer(request), stdout)
-
-
-if __name__ == "__main__":
-    main()

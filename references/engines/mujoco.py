@@ -16,6 +16,7 @@ from conservative.check import choice
 from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.errors import Unsupported
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -83,6 +84,7 @@ class MuJoCo(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return gravity_or_free(scene) or mass_model_reason(scene)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Compile MuJoCo's model. Raises `Unsupported` for an integrator that this version does not have."""
         mj = load("mujoco", "mujoco", "MuJoCo")

@@ -11,6 +11,7 @@ import numpy as np
 from conservative.attitude import Array, from_quaternion
 from conservative.check import choice
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -64,6 +65,7 @@ class Pinocchio(Method):
     def unsupported(self, scene: Scene) -> str | None:
         return gravity_or_free(scene) or mass_model_reason(scene)
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         pin = load("pinocchio", "pin", "Pinocchio")
         axes = principal_axes(scene)

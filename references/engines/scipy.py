@@ -12,6 +12,7 @@ from conservative.attitude import Array, from_quaternion
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.units import in_own_units
 from conservative.potentials.potential import torque_W
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
@@ -68,6 +69,7 @@ class SciPy(Method):
     def order(self) -> None:
         return None
 
+    @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
         axes = principal_axes(scene)

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.errors import BadInput
 
 from .digits import Number, mp
 from .theta import ComplexArray
+
+MOST_PERIODS = 2**60
+"""Periods up to which twice the digits of a double leave a phase to 1e-14 of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +28,18 @@ class Clock:
     def reduce(self, t: Array) -> tuple[Array, Array]:
         """Return the phase (n,) within half a period of 0, and the parity (n,), 0 or 1, of the periods taken off.
 
-        The product with the time is carried in twice the digits: the error stays a rounding unit of the period, whatever t.
+        The product with the time is carried in twice the digits: the error stays a rounding unit of the period up to
+        `MOST_PERIODS` of them.
+
+        Raises
+        ------
+        BadInput
+            Some time is beyond those periods.
         """
         if self.period == mp.inf:
             high, low = _line(self.start, self.rate, t)
             return high + low, np.zeros_like(t)
+        self._require_digits(t)
         high, low = _line(mp.mpf(0), self.rate / self.period, t)
         whole = np.rint(high)
         start, start_low = _two_parts(self.start / self.period)
@@ -38,6 +49,14 @@ class Clock:
         high = high - more
         period, period_low = _two_parts(self.period)
         return period * high + (period * low + period_low * high), np.mod(np.mod(whole, 2) + more, 2)
+
+    def _require_digits(self, t: Array) -> None:
+        """Raise `BadInput` for times after more than `MOST_PERIODS`, of which nothing is left of the phase."""
+        last = float(np.abs(t).max(initial=0.0))
+        periods = abs(self.rate / self.period) * mp.mpf(last)
+        if periods > MOST_PERIODS:
+            counted, longest = mp.nstr(periods, 3), float(MOST_PERIODS * abs(self.period / self.rate))
+            raise BadInput("t", f"{last:g} s, {counted} periods", f"times of up to 2^60 periods, {longest:.3g} s")
 
     def phasor(self, t: Array) -> ComplexArray:
         """Return exp(i phase), (n,); the period must be 2 pi."""

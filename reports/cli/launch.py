@@ -7,6 +7,7 @@ Nothing is imported at the top: until signals wait, Ctrl-C ends Python as it end
 def launch() -> None:
     """Run the command line; exit with 2 where click, which it is made with, is not installed."""
     _let_signals_wait()
+    _open_streams()
     import sys
 
     from ..terminal.supervision import supervise
@@ -31,6 +32,20 @@ def _let_signals_wait() -> None:
 
     if hasattr(_signal, "pthread_sigmask"):
         _signal.pthread_sigmask(_signal.SIG_BLOCK, (_signal.SIGINT, _signal.SIGTERM))
+
+
+def _open_streams() -> None:
+    """Open those of stdin, stdout and stderr that are closed, or what is opened next would be taken for them."""
+    import os
+    import sys
+
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+    sys.stdin, sys.stdout, sys.stderr = (
+        stream or os.fdopen(number, "w" if number else "r", closefd=False)
+        for number, stream in enumerate((sys.stdin, sys.stdout, sys.stderr))
+    )
 
 
 def _tidy(place: str) -> bool:

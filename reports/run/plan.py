@@ -66,7 +66,8 @@ class Plan:
         Studies of the same scenes and methods share their truths.
         """
         crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing, self.time_limit)
-        return (*crossed, *studies.list_hard_studies(self.methods, self.skip_missing)) if self.hard else crossed
+        hard = studies.list_hard_studies(self.methods, self.skip_missing, self.time_limit) if self.hard else ()
+        return (*crossed, *hard)
 
     @property
     def names(self) -> tuple[str, ...]:

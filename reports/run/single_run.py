@@ -64,7 +64,7 @@ def run_once(
 def _bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
     """Return the steps and samples, or find what `integrate` would refuse before a file is opened."""
     try:
-        grid = grid_for(scene, dt, t_end)
+        grid = grid_for(scene, dt, t_end, STEPS)  # few samples: how many there will be is decided below
     except OverflowError:  # more steps than a float can count
         grid = Grid(dt or 0.0, STEPS + 1)
     require_support(method, scene)

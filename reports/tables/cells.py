@@ -40,7 +40,7 @@ Table = tuple[Sequence[str], Sequence[Row]]
 """Header and rows."""
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
-_DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED)
+_DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED, OutcomeKind.NOT_CONSERVED)
 
 
 def number(value: float, digits: int = 2) -> str:

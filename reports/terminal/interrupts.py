@@ -36,7 +36,7 @@ def interruptible(number: signal.Signals) -> Iterator[None]:
         stops.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
         raise stops[0]
 
-    with _handle(stop, number), _repeated(stops, number):
+    with _handle(stop, number), _repeat_ignored(stops, number):
         try:
             yield
         except Exception as error:
@@ -48,7 +48,7 @@ def interruptible(number: signal.Signals) -> Iterator[None]:
 
 
 @contextmanager
-def _repeated(stops: list[KeyboardInterrupt], number: signal.Signals) -> Iterator[None]:
+def _repeat_ignored(stops: list[KeyboardInterrupt], number: signal.Signals) -> Iterator[None]:
     """Send a signal again whose exception is ignored: the callback of a weak reference, as imports have them, cannot raise."""
     before = sys.unraisablehook
 

@@ -26,7 +26,7 @@ MANIFEST = "measurements.json"
 _FOLDER = "a folder that can be written and is new, empty, or an earlier report, on a disk with room for it"
 _ASIDE = "-old"
 """How the name of an earlier report that has stepped aside ends."""
-_PATIENCE = 1.0
+_SWAP_TIME = 1.0
 """Time, s, that another report may take to finish with the same folder."""
 
 
@@ -125,7 +125,7 @@ def _step_aside(target: Path) -> tuple[Path, int | None]:
 
     Another report that holds it has just been put there, and is about to be done with it.
     """
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + _SWAP_TIME
     while (handle := files.lock(target)) is None and target.exists() and time.monotonic() < end:
         time.sleep(0.01)
     return target.rename(target.with_name(f".{target.name}-{os.urandom(6).hex()}{_ASIDE}")), handle

@@ -25,13 +25,13 @@ Tidy = Callable[[str], bool]
 EXIT_CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 _SLOT = 1 << 16
 """Bytes of what a child leaves."""
-_PATIENCE = 0.2
+_TIDY_TIME = 0.2
 """Time, s, that what the child has started may take to be gone."""
 _CLEAR = "\r\x1b[2K\x1b[?25h"
 """What removes a bar that was being drawn, and shows the cursor again."""
 
 
-class Board:
+class SharedStatus:
     """What a child leaves for its parent to read after a kill: what is kept, in words, and the places being written.
 
     The memory has two slots, and before them a byte that says which one is whole: a kill can come while the other is written.
@@ -69,36 +69,36 @@ class Board:
         return message, places
 
 
-board: Board | None = None
+shared_status: SharedStatus | None = None
 """What this process tells the one that supervises it; None where it is not supervised, and handles its signals itself."""
 
 
 def tell(message: str) -> None:
     """Say what is kept, should this process be killed from now on."""
-    if board is not None:
-        board.tell(message)
+    if shared_status is not None:
+        shared_status.tell(message)
 
 
 def list_places() -> bool:
     """Have the places listed that are being written from now on; return whether this process is supervised."""
-    if board is None:
+    if shared_status is None:
         return False
     from conservative import files  # here, since a --help writes nothing
 
-    files.listen(board.list_places)
+    files.add_observer(shared_status.list_places)
     return True
 
 
 def supervise(tidy: Tidy) -> None:
     """Go on in a child; in the parent wait for that and exit as it does. Where there is no fork, go on as it is."""
-    global board
+    global shared_status
     if not hasattr(os, "fork"):
         return
     stops = (*EXIT_CODES, signal.SIGTSTP)
     waited = {number for number in stops if signal.getsignal(number) != signal.SIG_IGN} | {signal.SIGCHLD}
     signal.signal(signal.SIGCHLD, lambda number, frame: None)  # where it is ignored, a child leaves no exit code
     signal.pthread_sigmask(signal.SIG_BLOCK, waited)
-    shared, (ours, theirs) = Board(), os.pipe()
+    shared, (ours, theirs) = SharedStatus(), os.pipe()
     child = os.fork()
     if child:
         with suppress(OSError):
@@ -111,7 +111,7 @@ def supervise(tidy: Tidy) -> None:
         signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # the group is in the background of its terminal, and writes there
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {*EXIT_CODES, *waited})
-    board = shared
+    shared_status = shared
 
 
 def _end_with_the_parent(pipe: int) -> None:
@@ -130,7 +130,7 @@ def _end_with_the_parent(pipe: int) -> None:
     os._exit(1)  # the parent was gone before that
 
 
-def _wait(child: int, waited: set[signal.Signals], shared: Board, tidy: Tidy) -> NoReturn:
+def _wait(child: int, waited: set[signal.Signals], shared: SharedStatus, tidy: Tidy) -> NoReturn:
     """Wait for signals: that the child has ended, that it has to, that it has to pause. Exit as it does."""
     while True:
         number = signal.sigwait(waited)
@@ -155,7 +155,7 @@ def _signal_group(child: int, number: signal.Signals) -> None:
         os.killpg(child, number)
 
 
-def _exit(status: int, number: int, shared: Board) -> NoReturn:
+def _exit(status: int, number: int, shared: SharedStatus) -> NoReturn:
     """Exit as a child did, or as one that was ended by the signal `number`."""
     if os.WIFEXITED(status):
         sys.exit(os.WEXITSTATUS(status))
@@ -172,7 +172,7 @@ def _exit(status: int, number: int, shared: Board) -> NoReturn:
 
 def _tidy(places: list[str], tidy: Tidy) -> None:
     """Remove what is left over beside places that were being written."""
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + _TIDY_TIME
     while (places := [place for place in places if not tidy(place)]) and time.monotonic() < end:
         time.sleep(0.01)
 

@@ -152,3 +152,52 @@ def test_what_is_largest_in_between_is_no_final_and_no_mean_value():
     assert found["rate error max"] == pytest.approx((speed * bump).max() / speed.max(), rel=1e-9)
     spoilt = ("attitude error", "rate error", "position error", "energy drift", "vertical momentum drift")
     assert all(found[f"{name} max"] > 1e-4 and found[f"{name} final"] < 1e-12 for name in spoilt), found
+
+
+@pytest.mark.parametrize(
+    ("t_end", "off", "same"), [(0.1, 0.9e-12, True), (0.1, 1.1e-12, False), (40.0, 3.9e-11, True), (40.0, 4.1e-11, False)]
+)
+def test_times_are_the_same_to_round_off(t_end, off, same):
+    """Off by 1e-12 s, or by that part of the last time where it is more."""
+    t, R, w = np.linspace(0, t_end, 3), np.tile(START, (3, 1, 1)), np.tile(RATES, (3, 1))
+    found = Trajectory(FREE, t, R, w, "found")
+    truth = Trajectory(FREE, t + np.array([0.0, 0.0, off]), R, w, "truth")
+    if same:
+        assert {value.key: value.value for value in measure_errors(found, truth)}["attitude error max"] == 0
+    else:
+        with pytest.raises(BadInput, match=f"the 3 times of the trajectory, to {t_end:g} s, or more"):
+            measure_errors(found, truth)
+
+
+def test_too_short_a_truth_is_refused_with_what_would_do():
+    exact = cv.integrate(FREE, dt=0.01)
+    truth = Trajectory(FREE, exact.t[:-1], exact.R_WB[:-1], exact.w_WB_B[:-1], "truth")
+    with pytest.raises(BadInput, match=rf"got {len(exact) - 1} samples; allowed: the {len(exact)} times .* to 2 s, or more"):
+        measure_errors(exact, truth)
+
+
+def test_three_samples_have_a_slope():
+    t = np.array([0.0, 1.0, 3.0])
+    assert secular_slope(t, 2 * t) == pytest.approx((2.0, 0.0), abs=1e-12)
+    assert secular_slope(t, np.outer(t, [3.0, 0.0, 4.0])) == pytest.approx((5.0, 0.0), abs=1e-12)
+    bent = np.array([0.0, 2.0, 1.0])
+    alone, turned = secular_slope(t, bent), secular_slope(t, np.outer(bent, [0.6, 0.0, 0.8]))
+    assert turned == pytest.approx(alone)
+    assert alone.stderr > 0.1
+
+
+def test_means_and_ends_of_a_planted_error():
+    exact = cv.integrate(FREE, dt=0.01, sample_every=50)
+    angles = np.array([0.0, 3e-4, 1e-4, 0.0, 2e-4])
+    turned = np.array([R @ rotation_about((0, 1, 0), angle) for R, angle in zip(exact.R_WB, angles, strict=True)])
+    found = values(changed(exact, turned), exact)
+    assert found["attitude error rms"] == pytest.approx(math.sqrt((9 + 1 + 4) * 1e-8 / 5), rel=1e-6)
+    assert found["attitude error final"] == pytest.approx(2e-4, rel=1e-6)
+    assert found["attitude error max"] == pytest.approx(3e-4, rel=1e-6)
+
+
+def test_at_rest_rates_have_a_scale():
+    rest = cv.Scene("rest", cv.RigidBody(INERTIA), START, (0, 0, 0), 1.0)
+    t, R, w = np.array([0.0, 1.0]), np.tile(START, (2, 1, 1)), np.zeros((2, 3))
+    found = Trajectory(rest, t, R, np.array([[0.0, 0.0, 0.0], [3e-6, 0.0, 4e-6]]), "found")
+    assert values(found, Trajectory(rest, t, R, w, "truth"))["rate error max"] == pytest.approx(5e-6)

@@ -89,6 +89,13 @@ def test_values_of_several_runs_are_their_median_and_range():
     assert row.time_ratios["here"].runs == 3
 
 
+def test_rows_without_times_take_no_part_in_false_alarms():
+    ratios = [2.0 + 0.01 * k for k in range(baseline.REPEATS + 1)]
+    others = {name: replace(ROW, id=name, time_ratio=None) for name in ("a", "b", "c")}
+    runs = [replace(RUN, rows={**others, ROW.id: replace(ROW, time_ratio=ratio)}) for ratio in ratios]
+    assert baseline.update_baseline(None, runs, "one timed").rows[ROW.id].time_ratios["here"] == baseline.time_limit(ratios, 1)
+
+
 def test_history_says_what_changed_and_times_of_other_machines_stay():
     there = replace(with_values(energy_drift_max=5e-3), machine="there")
     both = replace(there, rows={**there.rows, OTHER.id: OTHER})
@@ -177,6 +184,10 @@ def test_rows_that_cannot_be_compared():
     for found, expected in (
         (nothing, ("row", "passed", "missing", "passed")),
         (renamed, ("row", "passed", "renamed new", "passed")),
+        (
+            replace(RUN, rows={"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}),
+            ("row", "passed", "renamed new", "passed"),
+        ),
         (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
         (changed(status=Status.ERROR), ("row", "passed", "error", "passed")),
         (changed(definition="new"), ("definition", "hash", "new", "hash")),

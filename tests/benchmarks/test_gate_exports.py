@@ -5,9 +5,10 @@ import math
 
 import pytest
 
-from conservative.benchmarks.gate import dashboards
+from conservative.benchmarks.gate import dashboards, pytest_gate
 from conservative.benchmarks.gate.compare import Verdict, Violation
 from conservative.benchmarks.gate.results import Results, Row, Status
+from conservative.errors import NotWritten
 
 VALUES = {"attitude error max": 1.0, "observed order": 2.0, "energy drift max": math.nan, "mine": 3.0}
 ROW = Row("id", "brick", "reduced", Status.PASSED, "", "hash", VALUES, {"attitude error max": 0.25}, 4.0, 5.0)
@@ -68,3 +69,11 @@ def test_the_summary_is_a_table_of_violations_and_a_list_of_notes():
         "| measure | scene | method | 1 | 2 | at most 1 |\n\n- a note\n- another\n"
     )
     assert dashboards.markdown(Verdict((), (), 3)) == "## Gate: passed\n\n3 rows, 0 violations.\n\n"
+
+
+def test_what_cannot_be_added_to_is_named(tmp_path):
+    pytest_gate._append(tmp_path / "summary", "one\n")
+    pytest_gate._append(tmp_path / "summary", "two\n")
+    assert (tmp_path / "summary").read_text() == "one\ntwo\n"
+    with pytest.raises(NotWritten, match="GITHUB_STEP_SUMMARY"):
+        pytest_gate._append(tmp_path, "three\n")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.measures.measure import Measure, Value, key
+from conservative.benchmarks.measures.measure import Measure, Value, blanks, key
 from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame, from_flat, outcome_of
 from conservative.benchmarks.measures.samples import Samples
 from conservative.method import Role
@@ -103,3 +103,14 @@ def test_the_table_of_samples_has_a_row_for_each():
     assert list(full.columns) == list(empty.columns) == list(samples.COLUMNS)
     assert (full.dtypes == empty.dtypes).all()
     assert full["t"].tolist() == [*LINE.t, *LINE.t]
+    assert full.index.tolist() == list(range(2 * len(LINE.t)))
+
+
+def test_a_value_without_its_value_is_still_one_of_its_measure():
+    blank = Value(Measure.DRIFT_MAX, 1.0, "energy").blank
+    assert (blank.measure, blank.quantity, blank.key) == (Measure.DRIFT_MAX, "energy", "energy drift max")
+    assert blank.value != blank.value
+    assert [(each.key, each.value == each.value) for each in blanks(Measure.ORDER, Measure.TIME)] == [
+        ("observed order", False),
+        ("time per simulated second", False),
+    ]

@@ -82,6 +82,12 @@ def test_calls_double_while_too_short_to_be_trusted(clock, each, calls):
     assert timing.count_calls(lambda: clock(each), 0.01) == (12 if each < 0.001 else calls)
 
 
+def test_a_sample_that_is_too_short_sets_no_number_of_calls(clock):
+    """One call that looks a hundred times as quick as the others is followed by two, not by a thousand."""
+    rests = iter([1e-3, 1e-5, *[1e-3] * 100])
+    assert timing.count_calls(lambda: clock(next(rests)), 0.01) == 10
+
+
 @pytest.mark.parametrize(("budget", "rounds"), [(0.0399, 3), (0.0401, 4), (0.0601, 6), (1.0, 7)])
 def test_a_budget_is_what_the_next_round_must_not_exceed(clock, budget, rounds):
     assert timing.time_interleaved({"run": lambda: clock(0.01)}, budget=budget)["run"].rounds == rounds

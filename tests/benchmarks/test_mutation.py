@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from conservative.benchmarks.verification.mutation import mutants, table
-from conservative.benchmarks.verification.mutation.__main__ import ROOT, share
+from conservative.benchmarks.verification.mutation.__main__ import ROOT, describe, noticeable, share
 from conservative.benchmarks.verification.mutation.judges import Verdict, start_judges
 from conservative.benchmarks.verification.mutation.mutants import Mutant
 from conservative.errors import BadInput
 
 MODULE = "def double(x: int) -> int:\n    return 2 * x\n"
 TEST = "from module import double\n\n\ndef test_double():\n    assert double(3) == 6\n"
+SKIPPED = MODULE + "\n\nimport pytest\n\npytest.skip('no test runs', allow_module_level=True)\n"
 ENDLESS = "def double(x: int) -> int:\n    while True:\n        pass\n"
 
 
@@ -52,16 +53,23 @@ def test_the_share_and_its_interval():
     assert share([Verdict(mutant, None)])[0] == 1.0
 
 
+def test_survivors_that_are_listed_are_counted_apart():
+    listed, real = Mutant(*(file := table.list_equivalents()[0])[:1], 1, *file[1:], ""), Mutant("a.py", 1, "a", "b", "")
+    verdicts = [*[Verdict(real, 1)] * 8, Verdict(real, 0), Verdict(listed, 0), Verdict(listed, 1)]
+    assert describe(verdicts).startswith("killed 9 of 11: 81.8% (95 %: ")
+    assert describe(noticeable(verdicts)).startswith("killed 9 of 10: 90.0% (95 %: 59.6% to 98.2%)")
+
+
 @pytest.mark.skipif(not hasattr(__import__("os"), "fork"), reason="mutants are judged by forks")
 def test_a_fault_is_killed_and_one_that_does_nothing_survives(tmp_path):
     for name, text in {"module.py": MODULE, "test_module.py": TEST, "pytest.ini": "[pytest]\n"}.items():
         (tmp_path / name).write_text(text)
-    texts = {"fault": MODULE.replace("2 * x", "3 * x"), "nothing": MODULE.replace("2 * x", "x * 2")}
+    texts = {"fault": MODULE.replace("2 * x", "3 * x"), "nothing": MODULE.replace("2 * x", "x * 2"), "skip": SKIPPED}
     tried = [(Mutant("module.py", 2, "", name, text), ["test_module.py"]) for name, text in texts.items()]
     with start_judges(tmp_path, 1) as judges:
         verdicts = {verdict.mutant.after: verdict for verdict in judges.judge_all(tmp_path, tried)}
         late = judges.judge("module.py", ENDLESS, ["test_module.py"], 3.0)["code"]
-    assert {name: each.survived for name, each in verdicts.items()} == {"fault": False, "nothing": True}
+    assert {name: each.survived for name, each in verdicts.items()} == {"fault": False, "nothing": True, "skip": False}
     assert not any(each.late for each in verdicts.values())
     assert Verdict(tried[0][0], late).late
     assert (tmp_path / "module.py").read_text() == MODULE

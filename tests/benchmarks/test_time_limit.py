@@ -15,7 +15,7 @@ from conservative.benchmarks.studies import studies, study
 from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
-from conservative.method import grid_for
+from conservative.method import Grid, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
 
@@ -77,6 +77,19 @@ def test_nobody_waits_for_the_same_twice():
     assert attempt_within(0.2, case).outcome.reason == "ended after 0.2 s"
     assert attempt_within(0.1, case).outcome.reason == "a run of 40 steps was ended after 0.2 s"
     assert attempt_within(0.3, case).outcome.reason == "ended after 0.3 s"
+
+
+def test_a_shorter_motion_is_tried_though_a_longer_one_of_fewer_samples_was_ended():
+    scene = copy_of(SCENE)
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(2.0, 1))).outcome.reason == "ended after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.1, 10))).outcome.reason == "ended after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.05, 20))).outcome.reason.startswith("a run of 10")
+
+
+def test_the_limit_is_an_option_of_all_studies():
+    crossed = studies.cross_studies((SCENE,), (cv.Reduced(),), time_limit=3.0)
+    hard = studies.list_hard_studies((cv.Reduced(),), time_limit=3.0)
+    assert {study.longest_run for study in (*crossed, *hard)} == {3.0}
 
 
 def test_a_method_that_cannot_be_sent_runs_here():

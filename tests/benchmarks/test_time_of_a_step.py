@@ -134,3 +134,8 @@ def test_another_process_is_asked_by_name(monkeypatch):
 
 def test_the_yardstick_is_compiled_once():
     assert yardstick.compile_reference.cache_parameters()["maxsize"] == 1
+
+
+def test_the_constants_are_those_that_baselines_were_measured_with():
+    assert yardstick.definition().endswith("(0.0004, 30, 0.002, 3, 4)")
+    assert (yardstick.MOST_ROUNDS, yardstick.MOST_STEPS, yardstick.RETRIES, yardstick.PAUSE) == (300, 2**20, 3, 0.5)

@@ -11,6 +11,7 @@ import inspect
 import pkgutil
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
                 continue
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
-                yield f"{scene.name}, {method.name}, {factor}", method.prepare(scene, Grid(dt, n, 2))
+                yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
 
 
 def numbers(trajectory: cv.Trajectory) -> np.ndarray:

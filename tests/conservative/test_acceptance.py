@@ -192,7 +192,7 @@ def test_ill_conditioned_bodies_are_right_or_an_outcome() -> None:
             if found.ok:
                 with np.errstate(all="raise"):
                     assert np.abs(found.drift(scene.invariants[0])).max() <= 1e-3
-    assert len(ended) > 60
+    assert len(ended) > 40  # the others are refused: their moments are too far apart
     assert not all(ended)
 
 

@@ -1,5 +1,6 @@
 """The rules of the automatic choice, one by one, and the whole on methods whose errors are known beforehand."""
 
+import dataclasses
 import math
 import warnings
 from dataclasses import dataclass
@@ -64,6 +65,9 @@ def fresh():
         (0.1, 1.0, 0.5, 1, (0.5 / 6, 12, 6)),
         (0.125, 1.0, 0.5, 2, (0.125, 8, 8)),
         (0.5, 1.2, 0.5, 1, (0.25, 6, 2)),
+        (0.1, 2.2, None, 1, (0.1, 22, 1)),  # 2.2 / 0.1 is above 22 by rounding
+        (0.1, 2.2, 2.2, 1, (0.1, 22, 22)),
+        (0.1, 1.1, 0.1, 1, (0.05, 22, 2)),
     ],
 )
 def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected):
@@ -113,6 +117,8 @@ def test_bounds_and_counts():
         assert automatic.bound_rate(scene) == pytest.approx(math.sqrt(2 * scene.energy_scale))
     trajectory = Known().prepare(SCENE, cv.Grid(0.5, 4, 1))()
     assert automatic._count_work(Known(step=7.0), trajectory) == 3.0 * 8 + 7.0 * 4
+    explicit = dataclasses.replace(trajectory, counters=Counters(4, 4, None))
+    assert automatic._count_work(Known(step=7.0), explicit) == 7.0 * 4
     assert automatic._rounding_error(trajectory) == pytest.approx(2.0**-53 * 2.0 * 2.0, rel=1e-9, abs=0)
 
 
@@ -171,12 +177,20 @@ def test_spacing_is_kept(choose):
     assert (0.5 / found.choice.dt) % 2 == pytest.approx(0, abs=1e-9)
 
 
+def test_more_steps_than_anybody_waits_for_are_refused_before_they_are_taken(choose):
+    choose(Known(size=0.1))
+    with pytest.raises(cv.BadInput, match=r"error: got what takes .* steps; allowed: what 1e\+10 steps reach"):
+        automatic.integrate_to_error(SCENE, 1e-9, 1e9, None, 10**12)
+    assert max(grid.n_steps for grid in Known.taken) <= automatic.MOST_PROBED
+    assert automatic._probe(Known(size=1.0), SCENE, 1e-15, 8.0)[0] == math.inf
+
+
 def test_an_error_that_cannot_be_reached_is_a_warning(choose):
     choose(Known(size=1e-3, power=0))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = automatic.integrate_to_error(SCENE, 1e-18, 8.0, None, 1)
-    assert [each.category for each in caught] == [AccuracyNotReached]
+        found = cv.integrate(SCENE, error=1e-18)
+    assert [(each.category, each.filename) for each in caught] == [(AccuracyNotReached, __file__)]
     assert not found.choice.reached
     assert found.choice.error == 1e-18
     assert 3 <= len(found.choice.attempts) <= automatic.ATTEMPTS

@@ -46,7 +46,7 @@ def test_reduced_residual_and_its_tangent(field):
         (equation(0.3, A + EPSILON * e, field) - equation(0.3, A - EPSILON * e, field)) / (2 * EPSILON) for e in np.eye(3)
     ]
     rows = reduced.inverse_tangent(0.3, triple(J), field, Q, triple(A))
-    np.testing.assert_allclose(np.array(rows) @ tangent, np.eye(3), atol=1e-8)
+    np.testing.assert_allclose(np.array(rows) @ np.transpose(tangent), np.eye(3), atol=1e-8)
 
 
 @pytest.mark.parametrize("field", [None, FIELD])

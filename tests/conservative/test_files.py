@@ -112,6 +112,11 @@ def test_a_link_stays_one(tmp_path):
 def test_what_is_no_file_is_written_as_it_is():
     files.write_text(Path(os.devnull), "anything", "csv")
     assert not Path(os.devnull).is_file()
+    reading, writing = os.pipe()
+    files.write_text(Path(f"/dev/fd/{writing}"), "through a pipe", "csv")
+    os.close(writing)
+    assert os.read(reading, 100) == b"through a pipe"
+    os.close(reading)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a device that is always full")

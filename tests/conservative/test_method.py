@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,13 @@ def test_grid_of_steps_and_samples(dt, t_end, every, n_steps, times):
 def test_grid_counts_the_samples_of_a_run_that_stopped(done):
     grid = Grid(0.1, 7, 3)
     assert grid.count_samples(done) == np.searchsorted(grid.steps, done, side="right")
+
+
+def test_a_grid_holds_a_float_and_integers_whatever_numbers_it_is_given():
+    grid = Grid(Fraction(1, 4), np.int64(8), np.uint8(2))
+    assert grid == Grid(0.25, 8, 2)
+    assert [type(value) for value in (grid.dt, grid.n_steps, grid.every)] == [float, int, int]
+    np.testing.assert_array_equal(grid.t, [0, 0.5, 1, 1.5, 2])
 
 
 @pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10"])

@@ -64,3 +64,11 @@ def test_projected_moves_the_state_least():
         move = np.concatenate([np.array(dL) / size, turn])
         left = np.linalg.lstsq(np.array(gradients).T, move, rcond=None)[1]
         assert left < 1e-22
+
+
+@pytest.mark.parametrize(("off", "defect"), [((30.0, 0.0), 10.0), ((0.0, -30.0), 15.0)])
+def test_defects_are_relative_to_the_scale_of_their_invariant(off, defect):
+    inverse, scales = triple(1 / J), (3.0, 2.0)
+    kept = np.add(projected.values(inverse, FIELD, (0.0, 0.0, 1.0), Q, triple(L)), off)
+    found = projected.project(inverse, FIELD, (0.0, 0.0, 1.0), triple(kept), scales, Q, triple(L))
+    assert found[2:] == (0, pytest.approx(defect))

@@ -73,3 +73,11 @@ def test_lame_restores_invariants_by_one_damped_correction():
     dw, turn = lame.restore_invariants(E, z, k, rate, tuple(map(float, gamma)), tuple(map(float, w)))
     np.testing.assert_allclose(dw, rate * expected[:2], rtol=1e-12)
     np.testing.assert_allclose(turn, expected[2:], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("g2", "g3", "B", "expected"), [(16.0, 1.0, (0, 0, 0), 2.0), (1.0, -8.0, (0, 1, 0), 2**0.5), (1.0, 1.0, (0, 1, -25), 5.0)]
+)
+def test_lame_rates_are_those_of_the_largest_root(g2, g3, B, expected):
+    found = lame.scale_of((g2, 1e-17), (g3, 1e-17), np.array([(float(b), 0.0) for b in B]))
+    assert found == pytest.approx(expected)

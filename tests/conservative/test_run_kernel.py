@@ -17,13 +17,13 @@ GRID = Grid(0.1, 6)
 def run(done=GRID.n_steps, bad=(), elsewhere=False):
     """The trajectory that a kernel leads to which takes `done` steps; the states of the samples in `bad` are no numbers."""
 
-    def enter(n_steps, every, q, L):
+    def enter(n_steps, every, pause, q, L):
         q[:], L[:] = (1.0, 0.0, 0.0, 0.0), (0.3, 0.4, 2.5)
         for sample in bad:
             q[sample] = np.nan
         return done, done, 0, None, 0.25, elsewhere
 
-    kernel = SimpleNamespace(enter=enter, FAILURE="planted")
+    kernel = SimpleNamespace(enter=enter, FAILURE="planted", PAUSE=7)
     return prepare_run(SCENE, GRID, "planted", principal_start(SCENE), kernel, (), ())()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import to_quaternion
-from conservative.methods import gauss, non_spinning, principal_axes, projected
+from conservative.methods import gauss, non_spinning, principal_axes, projected, units
 from conservative.methods.coefficients import gauss_legendre
 
 from .exact_motion import START, free, in_field, top
@@ -33,6 +33,11 @@ def test_gauss_legendre_coefficients(stages):
     assert not padded[0].reshape(stages, width)[:, stages:].any()
     np.testing.assert_array_equal(padded[2][:stages], table.b)
     np.testing.assert_array_equal(padded[3][:stages], table.b_low)
+
+
+def test_as_many_stages_as_have_been_checked():
+    assert gauss_legendre.MOST_STAGES == 10
+    assert gauss_legendre.DIGITS >= 50
 
 
 def test_frames():
@@ -68,6 +73,7 @@ def test_units_of_the_closed_system():
     assert 0.5 < size / model.unit <= 1
     np.testing.assert_allclose(model.J_inverse, model.unit / GRAVITY.body.moments)
     assert math.log2(model.unit).is_integer()
+    np.testing.assert_allclose(model.gamma, START[2] @ GRAVITY.body.R_BP, atol=1e-15)
     rest = gauss.closed_system(principal_axes.principal_start(free((1, 1.4, 2), (0, 0, 0))))
     assert (rest.unit, rest.L) == (1.0, (0.0, 0.0, 0.0))
     hanging = cv.Scene("at rest", GRAVITY.body, START, (0, 0, 0), 1.0, GRAVITY.potential)
@@ -85,3 +91,22 @@ def test_scales_and_axis_of_the_projection():
     axis = np.array([0.5, 0.2, 0.3])
     np.testing.assert_allclose(np.abs(projected.field_axis(SPRUNG)), axis / np.linalg.norm(axis))
     assert projected.field_axis(FREE) is None
+
+
+@pytest.mark.parametrize(
+    ("method", "scene"),
+    [
+        (cv.Convected(), FREE),
+        (cv.Gauss(2), FREE),
+        (cv.Lame(), TOP),
+        (cv.MoserVeselov(), FREE),
+        (cv.Projected(), GRAVITY),
+        (cv.Reduced(), FREE),
+    ],
+    ids=lambda value: value.name,
+)
+def test_all_methods_look_for_units_of_their_own(method, scene, monkeypatch):
+    steps = []
+    monkeypatch.setattr(units, "find_units", lambda scene, dt: steps.append(dt) or units.SI)
+    method.prepare(scene, cv.Grid(0.01, 1))
+    assert 0.01 in steps

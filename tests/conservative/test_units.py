@@ -13,14 +13,14 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.errors import NotConverged
 from conservative.invariants import sizes
 from conservative.method import Grid, Method
-from conservative.methods.units import SI, bound_rate, find_units
+from conservative.methods.units import SI, Units, bound_rate, find_units
 from conservative.registry import list_scenes, method
 from conservative.registry import scene as registered
 
 TURN = rotation_about((3, -1, 2), 1.3)
 MOMENTS = {"top": (1.3, 1.3, 0.6)}
 HOOK = np.array([0.3, 0.1, 0.4])
-UNITS = [(1e80, 1.0, 1.0), (1e-80, 1.0, 1.0), (1.0, 1e45, 1.0), (1e-80, 1e-40, 1e-30), (1e90, 1e-3, 1e60), (1e-6, 1e-2, 1e-2)]
+UNITS = [(1e80, 1.0, 1.0), (1e-80, 1.0, 1.0), (1.0, 1e45, 1.0), (1e-80, 1e-40, 1e-30), (1e80, 1e30, 1e40), (1e-6, 1e-2, 1e-2)]
 """Units of moments, kg m^2, times, s, and lengths, m."""
 
 
@@ -98,6 +98,18 @@ def test_units_are_powers_of_two_to_the_sixteenth() -> None:
             mantissa, exponent = math.frexp(value)
             assert (mantissa, (exponent - 1) % 16) == (0.5, 0)
             assert 2**-17 < size / value < 2**17
+
+
+def test_all_of_a_scene_is_converted() -> None:
+    """With units of 2^32 kg m^2 and 2^-48 s, every number is divided by a power of two."""
+    ours = scene("heavy", 1e10, 1e-10)
+    found, energy = Units(2.0**32, 2.0**-48).convert(ours), 2.0**128
+    assert (found.t_end, found.dt) == (ours.t_end * 2.0**48, ours.dt * 2.0**48)
+    np.testing.assert_array_equal(found.w_WB_B0, ours.w_WB_B0 / 2.0**48)
+    np.testing.assert_array_equal(found.body.inertia, ours.body.inertia / 2.0**32)
+    np.testing.assert_allclose(found.potential.moment_B, ours.potential.moment_B / energy, rtol=1e-15)
+    np.testing.assert_array_equal(found.R_WB0, ours.R_WB0)
+    assert found.name == ours.name
 
 
 def test_a_potential_that_cannot_be_rescaled_is_taken_as_it_is() -> None:

@@ -104,6 +104,13 @@ def test_what_is_refused(make, argument):
     assert raised.value.argument == argument
 
 
+def test_rows_of_a_tableau_that_are_refused_are_counted():
+    with pytest.raises(cv.BadInput, match=r"A: got rows of \[0, 0\]; allowed: rows of 0 to 1 coefficients"):
+        explicit.ExplicitTableau("", 1, ((), ()), (0.5, 0.5))
+    with pytest.raises(cv.BadInput, match=r"b: got sum b A c\^0 = 0.6; allowed: 0.5, as order 2 asks for"):
+        explicit.ExplicitTableau("", 2, ((), (0.6,)), (0.0, 1.0))
+
+
 def test_what_is_at_the_edge_of_what_is_allowed():
     assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
     assert cv.Substepped(most=1).most == 1
@@ -141,6 +148,8 @@ def test_the_longest_step_of_moser_veselov():
     limit = min(6.0 / speed, 2 * math.acos(0.2) / nu)
     assert moser_veselov.step_limit(FREE, exact=True) == pytest.approx(limit)
     assert moser_veselov.step_limit(free((1, 1.4, 2), (0, 0, 0)), exact=True) == math.inf
+    spindle = free((1, 1, 0.05), (0.1, 0.1, 1.0))  # its polhode turns at (1 - 0.05) rad/s: half a period is the limit
+    assert moser_veselov.step_limit(spindle, exact=True) == pytest.approx(2 * math.acos(0.2) / 0.95)
     ball = free((1, 1, 1), (0, 0, 2))
     assert moser_veselov.step_limit(ball, exact=True) == pytest.approx(3.0)
     for exact, order in ((True, "exact"), (False, 4)):

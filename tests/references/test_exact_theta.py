@@ -2,6 +2,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from conservative.errors import BadInput
 from conservative.references.exact.clock import Clock, rotation_clock
 from conservative.references.exact.digits import mp
 from conservative.references.exact.theta import Lattice, Points, jacobi
@@ -63,3 +64,10 @@ def test_a_clock_keeps_its_digits_however_late(period):
     if period == 2 * mp.pi:
         turned = rotation_clock(clock.start, clock.rate).phasor(t)
         np.testing.assert_allclose(turned, np.exp(1j * phase), rtol=1e-15)
+
+
+def test_a_clock_refuses_times_that_leave_nothing_of_the_phase():
+    clock = rotation_clock(mp.mpf(0), mp.mpf(1))
+    clock.reduce(np.array([7e18]))
+    with pytest.raises(BadInput, match=r"t: got .* periods; allowed: times of up to 2\^60 periods, 7.24e\+18 s"):
+        clock.reduce(np.array([0.0, -7.3e18]))

@@ -49,7 +49,7 @@ def test_rooms_and_orders():
 BAD = [
     (MuJoCo, {"integrator": "rk4"}, r"integrator: got 'rk4'; allowed: one of 'Euler', 'RK4'"),
     (Pinocchio, {"scheme": "leapfrog"}, r"scheme: got 'leapfrog'; allowed: one of 'Euler', 'RK4'"),
-    (Heyoka, {"tol": 0}, r"tol: got 0; allowed: a number above 0 and below 1"),
+    (Heyoka, {"tol": 0}, r"tol: got 0; allowed: a number above 0, from 1e-20, and below 1"),
     (Heyoka, {"tol": -1e-9}, r"tol: got -1e-09; allowed"),
     (Heyoka, {"tol": 1.0}, r"tol: got 1.0; allowed"),
     (Heyoka, {"tol": float("nan")}, r"tol: got nan; allowed"),

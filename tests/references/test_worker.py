@@ -1,5 +1,6 @@
 """Work with a limit: it is ended, its end is an outcome, and nothing goes on behind it."""
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -68,6 +69,31 @@ def test_the_death_of_its_process_is_told(work, said):
     assert run_within(LONG, lambda: 3) == 3
 
 
+def close_all():
+    os.closerange(3, 256)
+    time.sleep(600)
+
+
+def answer_by_half():
+    """The length of an answer, and less than that of it."""
+    for descriptor in range(3, 256):
+        with contextlib.suppress(OSError):
+            os.write(descriptor, (100).to_bytes(4, "big") + b"half")
+    os._exit(4)
+
+
+@pytest.mark.parametrize(("work", "said"), [(close_all, "signal 9"), (answer_by_half, "its process ended with status 4")])
+def test_an_answer_that_does_not_come_whole_is_the_end_of_its_process(work, said, monkeypatch):
+    monkeypatch.setattr(worker, "GRACE", 0.5)
+    with pytest.raises(WorkerDied, match=said):
+        run_within(LONG, work)
+    assert children() == []
+
+
+def test_a_limit_may_be_as_long_as_any_number():
+    assert run_within(1e100, int) == 0
+
+
 def test_what_it_returns_or_raises_comes_back():
     local = {"factor": 7}
     assert run_within(LONG, lambda: 6 * local["factor"]) == 42
@@ -87,6 +113,14 @@ def test_one_process_does_one_piece_of_work_after_the_other():
     (process,) = children()
     worker.end_idle()
     assert not process.is_running()
+
+
+def test_it_runs_in_the_working_directory_of_the_moment(tmp_path, monkeypatch):
+    run_within(LONG, int)
+    monkeypatch.chdir(tmp_path)
+    assert run_within(LONG, os.getcwd) == str(tmp_path)
+    tmp_path.rmdir()
+    assert run_within(LONG, int) == 0
 
 
 def test_threads_have_processes_of_their_own():

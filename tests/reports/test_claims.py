@@ -52,3 +52,15 @@ def test_audit_of_mujoco_by_its_own_documentation(coarse, verdict):
     found = verdicts(rows)
     assert found["RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"] == verdict
     assert found["implicit and implicitfast coincide for a free body (brick_flip)"] == claims.HOLDS
+
+
+def test_the_better_method_is_taken_at_its_coarsest_step_and_the_other_at_its_finest():
+    rows = [
+        *(row("paper", "mujoco", "energy drift max", value, dt, role="engine") for dt, value in ((0.01, 0.5), (0.005, 1e-9))),
+        *(
+            row("paper", "mujoco:integrator=Euler", "energy drift max", value, dt, role="engine")
+            for dt, value in ((0.01, 0.9), (0.0025, 0.05))
+        ),
+    ]
+    words = "RK4 is better than Euler on energy-conserving systems, even with 4 times its step (brick_flip)"
+    assert verdicts(rows) == {words: claims.FAILS}

@@ -97,7 +97,7 @@ def test_a_run_of_many_steps_keeps_a_limited_number_of_samples(tmp_path, monkeyp
 
 def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
     path = tmp_path / "run.csv"
-    done = conservative("run", "lagrange_top", "-m", "convected:1e-300", "--t-end", "0.1", "--csv", path)
+    done = conservative("run", "lagrange_top", "-m", "convected:1e-99", "--t-end", "0.1", "--csv", path)
     assert done.exit_code == 1
     assert one_line(done.stderr)
     assert "not converged in step" in done.stderr
@@ -116,8 +116,8 @@ def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
         (["brick_flip", "--dt", "nan"], ["dt: got nan", "above 0"]),
         (["brick_flip", "--dt", "7"], ["dt: got 7", "at most t_end = 6"]),
         (["brick_flip", "--dt", "1e-15"], ["dt: got 1e-15, for more than 1e+11 steps", "--t-end"]),
-        (["brick_flip", "--dt", "1e-300"], ["dt: got 1e-300", "a longer step"]),
-        (["brick_flip", "--dt", "5e-324"], ["dt: got 4.94066e-324", "a longer step"]),
+        (["brick_flip", "--dt", "1e-300"], ["dt: got 1e-300", "of 1e-100 to"]),
+        (["brick_flip", "--dt", "5e-324"], ["dt: got 5e-324", "of 1e-100 to"]),
         (["brick_flip", "--t-end", "-1"], ["t_end: got -1.0", "above 0"]),
         (["brick_flip", "--csv", "missing/run.csv"], ["csv: got 'missing/run.csv'", "a folder that exists"]),
     ],

@@ -171,6 +171,7 @@ def test_texts_sort_too(opened):
 
 
 def load_axe(opened):
+    opened.set_script_timeout(300)  # s: on a busy machine axe needs more than the usual 30
     axe = Path(find_spec("axe_core_python").submodule_search_locations[0]) / "axe.min.js"
     opened.execute_script(axe.read_text(encoding="utf-8"))
 

@@ -8,11 +8,12 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 from conservative.benchmarks.verification import interrupts
-from conservative.benchmarks.verification.processes import temporaries
-from conservative.reports.terminal.supervision import Board
+from conservative.benchmarks.verification.processes import COMMAND, temporaries
+from conservative.reports.terminal.supervision import SharedStatus
 
 from ..environments import ROOT, variables
 
@@ -65,12 +66,32 @@ def ended(process, alive):
     return process.returncode, err
 
 
+@pytest.mark.parametrize("closed", ["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
+def test_a_command_whose_streams_are_closed_ends_as_any_other(closed, tmp_path):
+    shell = ["sh", "-c", f'exec "$0" -c "$1" run nonsense {closed}', sys.executable, COMMAND]
+    assert subprocess.run(shell, cwd=tmp_path, env=variables(PYTHONPATH=str(ROOT)), timeout=HANG).returncode == 2
+
+
 @pytest.mark.parametrize("work", WORK)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_command_in_the_middle_of_anything(number, code, work, tmp_path):
     process, alive = started(WORK[work], tmp_path)
     os.killpg(process.pid, number)
     assert ended(process, alive) == (code, "Interrupted\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_work_in_a_process_of_its_own_ends_with_its_command(number, tmp_path):
+    code = (
+        "from conservative.references.worker import run_within\nprint('at work', flush=True)\n"
+        "print(run_within(60, os.getpid), flush=True)\nrun_within(600, lambda: [None for _ in iter(int, 1)])"
+    )
+    process, alive = started(code, tmp_path)
+    worker = psutil.Process(int(process.stdout.readline()))
+    time.sleep(1.0)
+    process.send_signal(number)
+    ended(process, alive)
+    assert psutil.wait_procs([worker], timeout=HANG)[0] == [worker]
 
 
 def test_what_is_kept_is_said_and_what_was_being_written_goes(tmp_path):
@@ -162,16 +183,16 @@ def read(terminal):
 
 
 def test_a_board_has_the_last_words_whole_or_none():
-    board = Board()
-    assert board.read() == ("", [])
-    board.tell("kept")
-    board.list_places(["/a b", "/c"])
-    assert board.read() == ("kept", ["/a b", "/c"])
-    board.tell("")
-    board.list_places([])
-    assert board.read() == ("", [])
-    board.tell("x" * 10**6)
-    assert board.read() == ("", [])
+    status = SharedStatus()
+    assert status.read() == ("", [])
+    status.tell("kept")
+    status.list_places(["/a b", "/c"])
+    assert status.read() == ("kept", ["/a b", "/c"])
+    status.tell("")
+    status.list_places([])
+    assert status.read() == ("", [])
+    status.tell("x" * 10**6)
+    assert status.read() == ("", [])
 
 
 @pytest.mark.parametrize("moment", [0.3, 1.0, 2.5])

@@ -2,8 +2,10 @@
 
 Small faults made by cosmic-ray are planted one at a time in a copy of the tree, and the tests that `mutation.toml` names for
 the file are run, with kernels as plain Python. NAME is a room of that table or a file of one; without any, all are tried. Of
-each room a random sample is drawn, evenly over all places that can be changed. Printed are the share that is killed, with its
-95 % interval, by file and by room, and each survivor with the reason, where one is known. Exit status 1: a room below 90 %.
+each room a random sample is drawn, evenly over all places that can be changed. A mutant is killed where a test fails, fewer
+pass than without it, or they take three times as long. Printed are the share that is killed, with its 95 % interval, by file
+and by room, of all mutants and without those listed as equivalent, which nobody can notice, and each survivor with the reason,
+where one is known. Exit status 1: in a room fewer than 90 % of those that can be noticed are killed.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections import Counter
 from pathlib import Path
 
 from . import table
@@ -23,8 +24,8 @@ GOAL = 0.9
 """Least share of the mutants of a room that tests kill."""
 
 
-def measure_room(judges: Judges, room: table.Room, files: list[str], count: int, seed: int) -> float:
-    """Print what the tests of a room notice, and return the share of killed mutants."""
+def measure_room(judges: Judges, room: table.Room, files: list[str], count: int, seed: int) -> tuple[float, float]:
+    """Print what the tests of a room notice, and return the share of killed mutants: of all, and of those to be noticed."""
     mutants, places = draw_mutants(ROOT, files, count, seed)
     print(f"\n{room.name}: {len(mutants)} mutants at {places} places", flush=True)
     verdicts = []
@@ -33,7 +34,7 @@ def measure_room(judges: Judges, room: table.Room, files: list[str], count: int,
         if verdict.survived:
             print(f"  survived: {verdict.mutant}\n    {table.find_reason(verdict.mutant) or 'no reason known'}", flush=True)
     print_shares(verdicts)
-    return share(verdicts)[0]
+    return share(verdicts)[0], share(noticeable(verdicts))[0]
 
 
 def print_shares(verdicts: list[Verdict]) -> None:
@@ -41,11 +42,20 @@ def print_shares(verdicts: list[Verdict]) -> None:
     for file in sorted({verdict.mutant.file for verdict in verdicts}):
         of_file = [verdict for verdict in verdicts if verdict.mutant.file == file]
         print(f"  {sum(not each.survived for each in of_file):4} of {len(of_file):4} killed: {file}")
+    print(f"  {describe(verdicts)}, {sum(each.late for each in verdicts)} of them by the time limit")
+    print(f"  without equivalents {describe(noticeable(verdicts))}", flush=True)
+
+
+def noticeable(verdicts: list[Verdict]) -> list[Verdict]:
+    """Return those of mutants that somebody could notice: not of survivors that are listed as equivalent."""
+    return [verdict for verdict in verdicts if not (verdict.survived and table.find_reason(verdict.mutant))]
+
+
+def describe(verdicts: list[Verdict]) -> str:
+    """Return how many were killed, their share and its interval."""
     killed, low, high = share(verdicts)
-    reasons = Counter(bool(table.find_reason(each.mutant)) for each in verdicts if each.survived)
-    late = sum(each.late for each in verdicts)
-    print(f"  killed {killed:.1%} (95 %: {low:.1%} to {high:.1%}), {late} of them by the time limit;", end=" ")
-    print(f"survived {reasons[True]} with a reason, {reasons[False]} without", flush=True)
+    number = sum(not each.survived for each in verdicts)
+    return f"killed {number} of {len(verdicts)}: {killed:.1%} (95 %: {low:.1%} to {high:.1%})"
 
 
 def share(verdicts: list[Verdict]) -> tuple[float, float, float]:
@@ -68,8 +78,9 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = table.choose_rooms(options.names, ROOT)
     with start_judges(ROOT, options.jobs) as judges:
         found = {room.name: measure_room(judges, room, files, options.sample, options.seed) for room, files in chosen}
-    below = [name for name, killed in found.items() if killed < GOAL]
-    print(f"\n{len(found)} rooms, seed {options.seed}: {len(below)} below {GOAL:.0%} {' '.join(below)}")
+    below = [name for name, (_, killed) in found.items() if killed < GOAL]
+    shares = ", ".join(f"{name} {every:.1%} ({killed:.1%} without equivalents)" for name, (every, killed) in found.items())
+    print(f"\nkilled, seed {options.seed}: {shares}; {len(below)} of {len(found)} rooms below {GOAL:.0%}")
     return 1 if below else 0
 
 

@@ -22,6 +22,8 @@ WORKER = Path(__file__).with_name("worker.py")
 FIRST_LIMIT, SLACK, SPARE = 300, 3, 5
 """Processor's time, s, allowed to the code as it is; to a mutant SLACK times what that took, and SPARE s."""
 ENVIRONMENT = {"NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": ""}
+FEWER = 5
+"""Code of a mutant without a failure, of which fewer tests passed than without it; pytest says 5 where it ran none."""
 NOT_COPIED = shutil.ignore_patterns(".[!g]*", ".git", "__pycache__", "build", "dist")
 
 
@@ -87,22 +89,23 @@ class Judges:
         finally:
             self.free.put(judge)
 
-    def find_limit(self, root: Path, file: str, tests: list[str]) -> float:
-        """Return the time, s, that mutants of a file get; raise `RuntimeError` where the tests fail without one."""
+    def find_limit(self, root: Path, file: str, tests: list[str]) -> tuple[float, int]:
+        """Return the time, s, that mutants of a file get, and how many tests pass without one; `RuntimeError` if any fails."""
         found = self.judge(file, (root / file).read_text(encoding="utf-8"), tests, FIRST_LIMIT)
         if found["code"] != 0:
             raise RuntimeError(f"{' '.join(tests)}: fails without a mutant\n{found['said']}")
-        return float(SLACK * found["spent"] + SPARE)
+        return SLACK * found["spent"] + SPARE, found["passed"]
 
     def judge_all(self, root: Path, mutants: list[tuple[Mutant, list[str]]]) -> Iterator[Verdict]:
         """Yield the verdicts, in the order of the mutants; each with the tests that have to notice it."""
         with ThreadPoolExecutor(self.count) as pool:
             sets = {tuple(tests): mutant.file for mutant, tests in mutants}
             limits = dict(zip(sets, pool.map(lambda one: self.find_limit(root, sets[one], list(one)), sets), strict=True))
-            yield from pool.map(lambda each: self._verdict(each[0], each[1], limits[tuple(each[1])]), mutants)
+            yield from pool.map(lambda each: self._verdict(each[0], each[1], *limits[tuple(each[1])]), mutants)
 
-    def _verdict(self, mutant: Mutant, tests: list[str], limit: float) -> Verdict:
-        return Verdict(mutant, self.judge(mutant.file, mutant.text, tests, limit)["code"])
+    def _verdict(self, mutant: Mutant, tests: list[str], limit: float, passed: int) -> Verdict:
+        found = self.judge(mutant.file, mutant.text, tests, limit)
+        return Verdict(mutant, FEWER if found["code"] == 0 and found["passed"] < passed else found["code"])
 
 
 @contextmanager

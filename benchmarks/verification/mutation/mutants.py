@@ -65,10 +65,13 @@ def list_places(source: str) -> list[list[tuple[str, int]]]:
 
 
 def make_mutant(root: Path, file: str, operator: str, occurrence: int) -> Mutant | None:
-    """Return the mutant, or None where the code does the same."""
+    """Return the mutant, or None where the code does the same or the tool makes none."""
     source = (root / file).read_text(encoding="utf-8")
     made = _import_tool("plugins").get_operator(operator)()
-    text = _import_tool("mutating").mutate_code(source, made, occurrence)
+    try:
+        text = _import_tool("mutating").mutate_code(source, made, occurrence)
+    except AttributeError:  # of an `except` with a dotted name the tool makes none
+        return None
     if text is None or _same_code(source, text):
         return None
     for line, (before, after) in enumerate(zip_longest(source.splitlines(), text.splitlines(), fillvalue=""), 1):

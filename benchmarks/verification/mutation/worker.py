@@ -1,13 +1,15 @@
 """Judges mutants in a copy of the tree: a process that has imported other packages but none of ours, forked for each mutant.
 
 Run by its path, with the folder of the copy. Each line of stdin is one order in JSON (file, text, tests, limit), and each line
-of stdout its outcome: the exit status of pytest, or None past the limit, the processor's time, s, and the end of what was said.
+of stdout its outcome: the exit status of pytest, or None past the limit, the number of tests that passed, the processor's
+time, s, and the end of what was said.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import signal
 import sys
@@ -75,8 +77,12 @@ def _wait(child: int, limit: float, said: IO[str]) -> dict[str, Any]:
         os.killpg(child, signal.SIGKILL)  # what the tests have started, too
     _, status, used = found if found[0] else os.wait4(child, 0)
     said.seek(0)
-    spent = used.ru_utime + used.ru_stime
-    return {"code": None if os.WIFSIGNALED(status) else os.WEXITSTATUS(status), "spent": spent, "said": said.read()[-2000:]}
+    return {
+        "code": None if os.WIFSIGNALED(status) else os.WEXITSTATUS(status),
+        "spent": used.ru_utime + used.ru_stime,
+        "said": (end_of_text := said.read()[-2000:]),
+        "passed": sum(map(int, re.findall(r"(\d+) passed", end_of_text)[-1:])),
+    }
 
 
 def main(tree: str) -> None:
