@@ -136,6 +136,7 @@ class MuJoCoVersion(EngineMethod):
 
     family: ClassVar[str] = "mujoco"
     distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
+    takes_gravity: ClassVar[bool] = True
     colour: ClassVar[str] = "vermilion"
 
     def __post_init__(self) -> None:
@@ -150,8 +151,9 @@ class MuJoCoVersion(EngineMethod):
     def order(self) -> int:
         return 4 if self.integrator == "RK4" else 1
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return gravity_or_free(scene) or mass_model_reason(scene)
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("Euler")
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:

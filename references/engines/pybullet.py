@@ -55,5 +55,9 @@ class PyBullet(EngineMethod):
         return 1
 
     @classmethod
+    def user_defaults(cls) -> Method:
+        return cls(as_installed=True)
+
+    @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return cls(), cls("maximal"), cls(as_installed=True)

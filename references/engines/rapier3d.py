@@ -56,5 +56,9 @@ class Rapier(EngineMethod):
         return 1
 
     @classmethod
+    def user_defaults(cls) -> Method:
+        return cls(as_installed=True)
+
+    @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return cls(), cls(1), cls(as_installed=True)

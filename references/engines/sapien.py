@@ -51,5 +51,9 @@ class Sapien(EngineMethod):
         return 1
 
     @classmethod
+    def user_defaults(cls) -> Method:
+        return cls(as_installed=True)
+
+    @classmethod
     def variants(cls) -> tuple[Method, ...]:
         return cls(), cls(True)

@@ -18,7 +18,7 @@ from conservative.method import Grid, Method, Role, Run
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..engine import mass_model_reason, principal_axes
+from ..engine import gravity_or_free, mass_model_reason, principal_axes
 from .catalogue import Distribution
 from .client import Worker
 from .environment import Environment, find_environment
@@ -40,12 +40,15 @@ class EngineMethod(Method):
         Version of the engine; empty for the newest that is installed. `at_version` makes the class of another one.
     precision
         Of its numbers: "f64" or "f32".
+    takes_gravity
+        Whether its adapter has bodies about a fixed point in uniform gravity, beside free ones.
     """
 
     role: ClassVar[Role] = Role.ENGINE
     distribution: ClassVar[Distribution]
     version: ClassVar[str] = ""
     precision: ClassVar[str] = "f64"
+    takes_gravity: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
@@ -82,9 +85,16 @@ class EngineMethod(Method):
         """The settings as the label has them."""
 
     def unsupported(self, scene: Scene) -> str | None:
+        if self.takes_gravity:
+            return gravity_or_free(scene) or mass_model_reason(scene)
         if scene.potential is not None:
             return f"its adapter has free bodies, not {type(scene.potential).__name__}"
         return mass_model_reason(scene)
+
+    @classmethod
+    def user_defaults(cls) -> Method | None:
+        """Return the engine as installed, with nothing set but the step; None where its user has to choose a setting."""
+        return None
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
