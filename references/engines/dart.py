@@ -20,6 +20,7 @@ class Dart(EngineMethod):
     """
 
     family: ClassVar[str] = "dart"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("dartpy", "dartpy", oldest="6.19")
 
     @property

@@ -39,6 +39,7 @@ class Diffrax(EngineMethod):
     rtol: float = 0.0
 
     family: ClassVar[str] = "diffrax"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("diffrax", "diffrax", oldest="0.7")
 
     def __post_init__(self) -> None:

@@ -41,6 +41,7 @@ class Exudyn(EngineMethod):
     integrator: str = "RK44"
 
     family: ClassVar[str] = "exudyn"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("exudyn", "exudyn", oldest="1.9")
 
     def __post_init__(self) -> None:

@@ -40,6 +40,7 @@ class MJX(EngineMethod):
     precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
 
     family: ClassVar[str] = "mjx"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
 
     def __post_init__(self) -> None:

@@ -6,7 +6,12 @@ EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5
 
 
 def prepare(given):
-    """Return a run of one free rigid body on the node that Exudyn's Lie group integrators take."""
+    """Return a run of one rigid body on the node that Exudyn's Lie group integrators take.
+
+    Explicit integrators take no joints. A body about a fixed point turns as a free one does that has its moments, about the
+    fixed point, as central ones, where weight pulls at the centre of mass and the support's force that is its opposite at the
+    fixed point.
+    """
     import exudyn as exu
     from exudyn.utilities import RigidBodyInertia, SensorBody
 
@@ -18,6 +23,7 @@ def prepare(given):
         initialAngularVelocity=given.w0_W,
         gravity=[0, 0, 0],
     )
+    _load(mbs, body, given)
     outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
     sampled = len(given.steps) > 2
     sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
@@ -33,6 +39,14 @@ def prepare(given):
         return {"R": R.reshape(-1, 3, 3), "w": w}
 
     return run
+
+
+def _load(mbs, body, given):
+    from exudyn.itemInterface import LoadForceVector, MarkerBodyRigid
+
+    for place, sign in ((given.com, -1), (np.zeros(3), 1)) if given.gravity else ():
+        marker = mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=place.tolist()))
+        mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=[0, 0, sign * given.mass * given.gravity]))
 
 
 def _settings(exu, given):
