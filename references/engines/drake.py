@@ -41,6 +41,7 @@ class Drake(EngineMethod):
     accuracy: float = 0.0
 
     family: ClassVar[str] = "drake"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("drake", "pydrake.all", oldest="1.40")
 
     def __post_init__(self) -> None:

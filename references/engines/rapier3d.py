@@ -38,6 +38,7 @@ class Rapier(EngineMethod):
     as_installed: bool = False
 
     family: ClassVar[str] = "rapier3d"
+    takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("rapier3d", "rapier3d", oldest="0.36")
 

@@ -34,6 +34,7 @@ class Sapien(EngineMethod):
     as_installed: bool = False
 
     family: ClassVar[str] = "sapien"
+    takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("sapien", "sapien", oldest="3.0")
 

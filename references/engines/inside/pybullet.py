@@ -4,7 +4,7 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run of one body without damping, sleeping and speed limit; Bullet's loop is one step a call."""
+    """Return a run of one body, free or on a spherical joint at the fixed point; Bullet's loop is one step a call."""
     import pybullet as bullet
 
     client = bullet.connect(bullet.DIRECT)
