@@ -38,6 +38,7 @@ class PyBullet(EngineMethod):
     as_installed: bool = False
 
     family: ClassVar[str] = "pybullet"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("pybullet", "pybullet", oldest="3.2.5")
 
     def __post_init__(self) -> None:

@@ -42,6 +42,8 @@ class EngineMethod(Method):
         Of its numbers: "f64" or "f32".
     takes_gravity
         Whether its adapter has bodies about a fixed point in uniform gravity, beside free ones.
+    free_only
+        Why it has free bodies only, where it is the engine that has no others.
     """
 
     role: ClassVar[Role] = Role.ENGINE
@@ -49,6 +51,7 @@ class EngineMethod(Method):
     version: ClassVar[str] = ""
     precision: ClassVar[str] = "f64"
     takes_gravity: ClassVar[bool] = False
+    free_only: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
@@ -88,7 +91,7 @@ class EngineMethod(Method):
         if self.takes_gravity:
             return gravity_or_free(scene) or mass_model_reason(scene)
         if scene.potential is not None:
-            return f"its adapter has free bodies, not {type(scene.potential).__name__}"
+            return self.free_only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
         return mass_model_reason(scene)
 
     @classmethod
