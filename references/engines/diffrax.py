@@ -33,6 +33,11 @@ class Diffrax(EngineMethod):
         The solver is unknown, or the tolerance out of range.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Solvers: https://docs.kidger.site/diffrax/api/solvers/ode_solvers/
+    Choice of steps: https://docs.kidger.site/diffrax/api/stepsize_controller/
     """
 
     solver: str = "Tsit5"

@@ -13,8 +13,8 @@ from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
 
 ORDERS = {
-    **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 5, "RungeKutta3": 3, "RungeKutta2": 2},
-    **{"ExplicitEuler": 1, "SemiExplicitEuler2": 2, "Verlet": 2},
+    **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "RungeKutta2": 2},
+    **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
 }
 
 
@@ -23,8 +23,9 @@ class OpenSim(EngineMethod):
     """OpenSim, which is Simbody, with one of its integrators, in its own loop (`Manager.integrate`).
 
     A free body is on a `FreeJoint`, one about a fixed point on a `BallJoint`. OpenSim has Simbody use three angles as the
-    coordinates of both (`setUseEulerAngles`), and its Python does not let anybody change that: errors grow where the second angle
-    comes near a right angle. Switched off: storage and analyses of states (`setWriteToStorage`, `setPerformAnalyses`).
+    coordinates of both, and its Python module has nothing to change that: errors grow where the second angle comes near a right
+    one, and a top that spins about its third axis is easier than elsewhere. Switched off: storage and analyses of states
+    (`setWriteToStorage`, `setPerformAnalyses`).
 
     Parameters
     ----------

@@ -12,6 +12,8 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Any, ClassVar
 
+import numpy as np
+
 from conservative import registry
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.method import Grid, Method, Role, Run
@@ -131,6 +133,16 @@ def _class_at(cls: type[EngineMethod], version: str) -> type[EngineMethod]:
 @lru_cache(maxsize=64)
 def _inside(cls: type[EngineMethod]) -> Path:
     return Path(inspect.getfile(cls)).resolve().parent / "inside" / f"{cls.family.partition('@')[0]}.py"
+
+
+def rate_limit_reason(scene: Scene, limit: float) -> str | None:
+    """Return why an engine that limits rates, rad/s, cannot do a scene, None if it can; it names a slower one, where one is."""
+    rate = float(np.linalg.norm(scene.w_WB_B0))
+    if rate <= limit:
+        return None
+    slower = f"slow_{scene.name}"
+    advice = f"; {slower} is a slower one" if slower in registry.list_scenes() else ""
+    return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 
 class WorkerRun:

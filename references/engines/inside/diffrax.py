@@ -1,4 +1,4 @@
-"""Diffrax in its environment, on Euler's equations, with the torque of gravity. Source: its documentation, ODE solvers, diffeqsolve."""
+"""Diffrax in its environment, on Euler's equations. Source: its documentation, ODE solvers, diffeqsolve."""
 
 import numpy as np
 

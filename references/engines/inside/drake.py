@@ -71,6 +71,9 @@ def _build(drake, given):
 
 def _choose(drake, simulator, given):
     """Choose the integrator: in fixed steps, or in its own to an accuracy."""
+    if given.integrator == "default":
+        simulator.get_mutable_integrator().set_maximum_step_size(given.dt)
+        return
     if given.integrator not in drake.GetIntegrationSchemes():
         raise NotImplementedError(f"Drake has no integrator {given.integrator}, but {', '.join(drake.GetIntegrationSchemes())}")
     drake.ResetIntegratorFromFlags(simulator, given.integrator, given.dt)

@@ -6,9 +6,10 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run on a free joint, or on a ball joint at the fixed point, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
+    """Return a run on a free joint, or on a ball joint at the fixed point, compiled as a whole.
 
-    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process.
+    It is a `lax.scan` over samples, with a `fori_loop` over the steps between them. Whether JAX computes in double precision is
+    said by the variable JAX_ENABLE_X64 of the process.
     """
     import jax
     import mujoco
@@ -18,9 +19,7 @@ def prepare(given):
     start = mjx.make_data(model)
     number = start.qpos.dtype
     place = [0, 0, 0] * given.free
-    start = start.replace(
-        qpos=jax.numpy.array([*place, *given.q0], number), qvel=jax.numpy.array([*place, *given.w0], number)
-    )
+    start = start.replace(qpos=jax.numpy.array([*place, *given.q0], number), qvel=jax.numpy.array([*place, *given.w0], number))
     place = SimpleNamespace(jax=jax, model=model, step=mjx.step)
     march = jax.jit(lambda data: _march(place, data, given))
     jax.block_until_ready(march(start))
@@ -56,6 +55,6 @@ def _model(mujoco, given):
             <flag contact="disable" constraint="disable"/>
           </option>
           <worldbody>
-            <body><joint type="{'free' if given.free else 'ball'}"/><inertial {inertial}/></body>
+            <body><joint type="{"free" if given.free else "ball"}"/><inertial {inertial}/></body>
           </worldbody>
         </mujoco>""")

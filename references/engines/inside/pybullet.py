@@ -51,8 +51,8 @@ def _build_held(bullet, given):
     q0, R = _product(given.q0, given.q_com), _matrix(given.q_com)
     link = {
         **{"linkMasses": given.mass, "linkCollisionShapeIndices": -1, "linkVisualShapeIndices": -1, "linkParentIndices": 0},
-        **{"linkPositions": [0, 0, 0], "linkOrientations": [0, 0, 0, 1], "linkInertialFramePositions": (given.com @ R).tolist()},
-        **{"linkInertialFrameOrientations": [0, 0, 0, 1], "linkJointTypes": bullet.JOINT_SPHERICAL},
+        **{"linkPositions": [0, 0, 0], "linkOrientations": [0, 0, 0, 1], "linkInertialFrameOrientations": [0, 0, 0, 1]},
+        **{"linkInertialFramePositions": (given.com @ R).tolist(), "linkJointTypes": bullet.JOINT_SPHERICAL},
     }
     body = bullet.createMultiBody(0, -1, linkJointAxis=[[0, 0, 1]], **{name: [value] for name, value in link.items()})
     bullet.changeDynamics(body, 0, localInertiaDiagonal=given.moments_com.tolist())
