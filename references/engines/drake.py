@@ -55,6 +55,7 @@ class Drake(EngineMethod):
     Its defaults: https://github.com/RobotLocomotion/drake/blob/master/systems/analysis/simulator_config.h
     Fixed steps: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_integrator_base.html
     BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball_rpy_joint.html
+    No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
     """
 
     integrator: str = "runge_kutta5"

@@ -7,7 +7,7 @@ def prepare(given):
     """Return a run of one body, advanced from sample to sample by Drake's Simulator.
 
     A free body is on a quaternion floating joint; a body about a fixed point on Drake's only ball joint, whose coordinates are
-    roll, pitch and yaw. Where its first principal axis comes to stand upright, Drake ends the run.
+    roll, pitch and yaw. Where its first principal axis comes to stand upright, the run ends.
     """
     import pydrake.all as drake
 
@@ -18,16 +18,22 @@ def prepare(given):
     times = given.steps * given.dt
 
     def run():
-        context.SetTime(0.0)
-        start()
-        simulator.Initialize()
-        R, w = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
-        for sample, time in enumerate(times.tolist()):
-            if sample:  # at its start a discrete plant would be updated
-                simulator.AdvanceTo(time)
-            R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
-            w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
-        return {"R": R, "w_W": w}
+        R, w = np.full((len(times), 3, 3), np.nan), np.full((len(times), 3), np.nan)
+        reason = ""
+        try:
+            context.SetTime(0.0)
+            start()
+            simulator.Initialize()
+            for sample, time in enumerate(times.tolist()):
+                if sample:  # at its start a discrete plant would be updated
+                    simulator.AdvanceTo(time)
+                R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
+                w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
+        except RuntimeError as error:
+            if "singularity" not in str(error):
+                raise
+            reason = "Drake's BallRpyJoint has reached a singularity"
+        return {"R": R, "w_W": w, "reason": reason}
 
     return run
 
