@@ -149,7 +149,11 @@ def remove(requirement: str) -> tuple[Environment, ...]:
     there = {f"{each.engine}=={each.version}": each for each in list_environments()}
     found = tuple(each for each in there.values() if each.engine == engine and version in ("", each.version))
     if not found:
-        raise BadInput("engine", repr(requirement), f"what is installed: {nearest(requirement, there)}" if there else "a name after something is installed")
+        raise BadInput(
+            "engine",
+            repr(requirement),
+            f"what is installed: {nearest(requirement, there)}" if there else "a name after something is installed",
+        )
     for environment in found:
         close_workers(environment)
         drop(environment.folder)
