@@ -57,6 +57,12 @@ def compare(here: Method, there: Method, rounds: int) -> Iterator[tuple[str, boo
             yield f"{name}, {what}", same, second.minimum / first.minimum, second.median / first.median
 
 
+def _in_environment(version: str, integrator: str) -> EngineMethod:
+    method = registry.method(f"mujoco@{version}:{integrator}")
+    assert isinstance(method, EngineMethod)
+    return method
+
+
 @click.command()
 @click.option("--version", required=True, help="That of MuJoCo in this process, of which there is an environment.")
 @click.option("--rounds", default=40, help="Interleaved rounds.")
@@ -64,8 +70,7 @@ def main(version: str, rounds: int) -> None:
     """Compare states and times; exit with 1 if a state differs."""
     differs, ratios = 0, []
     for integrator in INTEGRATORS:
-        here, there = registry.method(f"mujoco:{integrator}"), registry.method(f"mujoco@{version}:{integrator}")
-        assert isinstance(there, EngineMethod)
+        here, there = registry.method(f"mujoco:{integrator}"), _in_environment(version, integrator)
         if here.label != there.label:
             raise BadInput("version", version, f"that of this process, {here.label}")
         for what, same, minimum, median in compare(here, there, rounds):
@@ -73,7 +78,7 @@ def main(version: str, rounds: int) -> None:
             click.echo(f"{integrator}, {what}: {bits}; time {minimum:.3f} (minimum), {median:.3f} (median)")
             differs += not same
             ratios.append(minimum)
-    trips = [trip * 1e6 for trip in round_trips(there)]
+    trips = [trip * 1e6 for trip in round_trips(_in_environment(version, INTEGRATORS[0]))]
     click.echo(f"a request and its answer: {min(trips):.0f} us at best, {statistics.median(trips):.0f} us at the median")
     click.echo(
         f"{len(ratios)} comparisons, {differs} with other bits, time {statistics.median(ratios):.3f} of that in this process"
