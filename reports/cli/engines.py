@@ -60,7 +60,7 @@ def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None,
         check(name)  # all of them, before the first takes minutes
     trouble = False
     for name in names:
-        click.echo(f"{name}: asking for it ...", err=True)
+        click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
         done = install(name, source)  # type: ignore[arg-type]
         found, trouble = done.environment, trouble or bool(done.trouble)
         click.echo(
