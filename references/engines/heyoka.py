@@ -15,10 +15,10 @@ from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import STEP_LIMIT, gravity_or_free, limit_reason, pace_reason, symmetric_axes, version
-from ..heyoka_equations import forms, formulations
+from ..engine import STEP_LIMIT, limit_reason, pace_reason, symmetric_axes, version
+from ..heyoka_equations import accelerations, forms, formulations
 
-FRAMES = ("body", "non_spinning", "lean")
+FRAMES = ("body", "non_spinning", "lean", "base_vectors")
 
 SMALLEST_TOL = 1e-20
 """A step of this tolerance has five terms more than one of 1e-16; smaller ones compile ever longer and gain nothing."""
@@ -77,10 +77,12 @@ class Heyoka(Method):
         return None
 
     def unsupported(self, scene: Scene) -> str | None:
-        reason = gravity_or_free(scene)
-        if reason is None and self.frame == "non_spinning" and symmetric_axes(scene) is None:
+        if scene.potential is not None and type(scene.potential) not in accelerations.READERS:
+            kind, table = type(scene.potential).__name__, f"{accelerations.__name__}.READERS"
+            return f"no heyoka expressions for {kind}; add them to {table}"
+        if self.frame == "non_spinning" and symmetric_axes(scene) is None:
             return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"
-        return reason
+        return None
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
