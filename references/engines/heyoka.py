@@ -87,7 +87,7 @@ class Heyoka(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
-        integrators, label = forms.compile_double(problem.form, self.tol), self.label
+        integrators, label = forms.compile_double(problem.form, self.tol, problem.fast_math), self.label
         propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
 
         def run() -> Trajectory:

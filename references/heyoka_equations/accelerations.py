@@ -125,8 +125,8 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
     axes = order_axes(axes, int(np.argmax(np.abs(potential.point_B @ axes.R_BF))))
     b, A = potential.point_B @ axes.R_BF, float(np.linalg.norm(potential.anchor_W))
     third = -b[:2] * axes.J[:2] / (b[2] * axes.J[2])
-    distance = [(b @ b + A * A) / unit**2, *(2 * A * b / unit**2)]
-    return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance])
+    distance = np.array([b @ b + A * A, *(2 * A * b)]) / unit**2
+    return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()])
 
 
 def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
@@ -150,7 +150,7 @@ READERS: dict[type[Potential], Callable[[Axes, Array, Any], FieldInAxes]] = {
 
 def order_axes(axes: Axes, third: int) -> Axes:
     """Return principal axes in another order, in which the one of that number is the third."""
-    turn = np.roll(np.eye(3), third - 2, axis=1)
+    turn = np.roll(np.eye(3), 2 - third, axis=1)
     return Axes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
 
 
