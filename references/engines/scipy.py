@@ -33,9 +33,9 @@ Acceleration = Callable[[float, float, float, float], Sequence[float]]
 class SciPy(Method):
     """`scipy.integrate.solve_ivp` with its own step control; dt is only the distance of samples.
 
-    The state is the quaternion, scalar first, of principal axes F in world axes whose third is the field's, and the rates in F. Samples come from the integrator's
-    interpolant, whose error is that of the steps. The fields of this package are written out; any other potential works as well,
-    through its gradient, at ten times the cost.
+    The state is the quaternion, scalar first, of principal axes F in world axes whose third is the field's, and the rates in F.
+    Samples come from the integrator's interpolant, whose error is that of the steps. This package's fields are written out;
+    any other potential works as well, through its gradient.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _written_out(field: FieldInAxes) -> Acceleration:
 def _general(potential: Potential, axes: Axes) -> Acceleration:
     def acceleration(*q: float) -> list[float]:
         R_WF = from_quaternion(q)
-        return (torque_W(potential, R_WF @ axes.R_BF.T) @ R_WF / axes.J).tolist()  # type: ignore[no-any-return]
+        return (torque_W(potential, R_WF @ axes.R_BF.T) @ R_WF / axes.J).tolist()
 
     return acceleration
 

@@ -8,9 +8,10 @@ the constant moment m, A the anchor's distance from the fixed point, and d the d
     attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
     gravity gradient    J w' = J w x w + g x (rate^2 I g)
 
-The first is linear in g and costs no product. Of the two components at right angles to m that the second and the third have, two
-products give all three. The last has those products of g that Euler's equations have of w. Multi-precision truth has its own
-expressions, in `conservative.references.heyoka_equations.torques`. Source: the potentials' own torques.
+The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
+three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
+plain floats alike. Multi-precision truth has its own, in `conservative.references.heyoka_equations.torques`. Source: the
+potentials' own torques.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ Acceleration = Callable[[Expressions, Expressions], list[Expression]]
 """Takes parameters and g to the angular acceleration, without what Euler's equations have."""
 
 _ROUND_OFF = 4 * np.finfo(float).eps
-"""An off-diagonal term of a field's inertia below this, relative to the largest, comes from turning it into principal axes."""
+"""A component in principal axes below this, relative to the largest, comes from turning there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,15 +124,14 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
     if not potential.point_B.any():
         return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
     axes = order_axes(axes, int(np.argmax(np.abs(potential.point_B @ axes.R_BF))))
-    b, A = potential.point_B @ axes.R_BF, float(np.linalg.norm(potential.anchor_W))
+    b, A = _drop_round_off(potential.point_B @ axes.R_BF), float(np.linalg.norm(potential.anchor_W))
     third = -b[:2] * axes.J[:2] / (b[2] * axes.J[2])
     distance = np.array([b @ b + A * A, *(2 * A * b)]) / unit**2
     return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()])
 
 
 def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
-    inertia = potential.rate**2 * (axes.R_BF.T @ potential.inertia @ axes.R_BF)
-    inertia[np.abs(inertia) <= _ROUND_OFF * np.abs(inertia).max()] = 0
+    inertia = potential.rate**2 * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]
@@ -154,6 +154,11 @@ def order_axes(axes: Axes, third: int) -> Axes:
     return Axes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
 
 
+def _drop_round_off(components: Array) -> Array:
+    """Return components with zeros for those that are round-off: what is zero is left out of the equations."""
+    return np.where(np.abs(components) <= _ROUND_OFF * np.abs(components).max(), 0.0, components)
+
+
 def _turning(axes: Axes, moment: Array) -> list[float]:
     """Return the matrix (9) of J^-1 (g x m), row by row."""
-    return (-hat(moment) / axes.J[:, None]).ravel().tolist()  # type: ignore[no-any-return]
+    return (-hat(moment) / axes.J[:, None]).ravel().tolist()
