@@ -31,8 +31,9 @@ _FEW_SAMPLES = 8
 class Heyoka(Method):
     """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
 
-    Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy;
-    `fast_math` gains nothing and is left off). Samples are Taylor polynomials of the steps, so they cost no accuracy.
+    Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
+    vectorised within a step; `fast_math` where it gains, which is for base vectors). Samples are Taylor polynomials of the steps,
+    so they cost no accuracy. Fields are those of this package: `conservative.references.heyoka_equations.accelerations`.
 
     Parameters
     ----------
@@ -41,9 +42,11 @@ class Heyoka(Method):
     frame
         "body": quaternion and body rates in principal axes, which is what anybody would write. "non_spinning", for a body
         symmetric about an axis, free or in a field along it: quaternion of the frame that turns with l/J1, and world momentum
-        l; spin in closed form afterwards. "lean": the fewest products an evaluation that we found, the strongest opponent:
-        rates and one angle (asymmetric free body); axis, momentum and one angle (symmetric top that stays away from one of
-        the poles); otherwise the non-spinning frame where there is one, and "body" where not.
+        l; spin in closed form afterwards. "base_vectors": rates and two rows of the rotation matrix, that along the field's
+        axis and one at right angles; the second row is their cross product, and none is tidied up. "lean": the fewest products
+        an evaluation that we found, the strongest opponent: rates and one angle (asymmetric free body); axis, momentum and one
+        angle (symmetric top that stays away from one of the poles); otherwise the non-spinning frame where there is one, and
+        base vectors where not. Below errors of 1e-6 those take 5 to 25 % less time than "body".
 
     Raises
     ------
