@@ -32,7 +32,7 @@ class Heyoka(Method):
     """heyoka's adaptive Taylor integrator in double precision; dt is only the distance of samples.
 
     Compiled integrators are kept per formulation and tolerance, in heyoka's fastest mode (not compact, not high-accuracy, not
-    vectorised within a step; `fast_math` where it gains, which is for base vectors). Samples are Taylor polynomials of the steps,
+    vectorised within a step; `fast_math` where it gains, which is for base vectors). Samples are Taylor polynomials of steps,
     so they cost no accuracy. Fields are those of this package: `conservative.references.heyoka_equations.accelerations`.
 
     Parameters
