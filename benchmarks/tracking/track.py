@@ -122,14 +122,15 @@ def make_plan(environments: Iterable[Environment], settings: Iterable[str], scen
         There are fewer than two versions, one is there twice, or a setting or a scene is unknown.
     """
     found, settings, scene_names = tuple(environments), tuple(settings), tuple(scene_names)
-    _require_different([environment.version for environment in found])
+    require_several([environment.version for environment in found])
     methods = tuple(_methods(found, settings))
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
     taken = tuple(scene for scene in scenes if any(each.unsupported(scene) is None for row in methods for each in row.values()))
     return Plan(found, scenes if scene_names else taken, methods)
 
 
-def _require_different(versions: list[str]) -> None:
+def require_several(versions: list[str]) -> None:
+    """Raise `BadInput` unless there are two versions or more, all different."""
     if len(set(versions)) < len(versions):
         twice = next(version for version in versions if versions.count(version) > 1)
         raise BadInput("versions", f"{twice!r} twice", "different versions")
