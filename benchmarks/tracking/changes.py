@@ -1,8 +1,8 @@
 """From two versions to what changed between them: changes of conclusions, not of digits.
 
-A conclusion is that a run reaches its end, an order, that something is conserved, drifts little or drifts, that energy is gained
-or lost, and how large the error and the time are within a factor. Two versions differ in one only where all that was measured
-beside them, which should not matter, differs alike. Source: our own.
+A conclusion is that a run reaches its end, an order, that something is conserved, drifts little or drifts, that energy is
+gained or lost, and how large the error and the time are within a factor. Two versions differ in one only where all that was
+measured beside them, which should not matter, differs alike. Source: our own.
 """
 
 from __future__ import annotations
@@ -12,17 +12,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-from conservative.outcome import Outcome, OutcomeKind
+from conservative.outcome import Outcome
 
 from ..measures.drift_class import DriftClass, classify
 from .observation import Fit, Observation, Spread
+from .step_times import StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
 """Two orders differ from this difference on, if that is also so many of their standard errors."""
 FACTOR = 3.0
 """Errors and drifts differ from this factor on."""
-TIME_FACTOR = 1.25
-"""Times differ from this factor on, or from the largest factor between repeats on, if that is more."""
 ROUND_OFF = 1e-9
 """Attitude error, rad, below which no two differ: there an error is round-off."""
 
@@ -47,7 +46,7 @@ class Change:
     aspect
         What it is about.
     was, now
-        What was measured.
+        What was measured; of a time, `now` is how many times as long it is.
     quantity
         Name of the invariant that a drift is of; else empty.
     lost
@@ -61,21 +60,21 @@ class Change:
     lost: bool = False
 
 
-def find_changes(was: Observation, now: Observation, time_ratio: Spread | None = None) -> tuple[Change, ...]:
+def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_times: StepTimes) -> tuple[Change, ...]:
     """Return what changed from one version to another, on one scene and with one setting, most important first.
 
     Parameters
     ----------
     was, now
         What was seen of both.
-    time_ratio
-        How many times as long a step takes in the later one, without a unit; None where that is not known.
+    was_times, now_times
+        What a step takes in both (n,), s; empty where that is not known.
     """
     if was.outcome.kind is not now.outcome.kind:
         return (Change(Aspect.OUTCOME, was.outcome, now.outcome, lost=was.outcome.ok),)
     if not was.outcome.ok:
         return ()
-    return (*_orders(was, now), *_drifts(was, now), *_error(was, now), *_time(time_ratio))
+    return (*_orders(was, now), *_drifts(was, now), *_error(was, now), *_time(was_times, now_times))
 
 
 def _orders(was: Observation, now: Observation) -> Iterator[Change]:
@@ -111,12 +110,9 @@ def _error(was: Observation, now: Observation) -> Iterator[Change]:
         yield Change(Aspect.ERROR, was.error, now.error)
 
 
-def _time(ratio: Spread | None) -> Iterator[Change]:
-    if ratio is None or math.isnan(ratio.value):
-        return
-    factor = max(TIME_FACTOR, ratio.high / ratio.low)
-    if ratio.low > factor or ratio.high < 1 / factor:
-        yield Change(Aspect.TIME, Spread(1.0, 1.0, 1.0), ratio)
+def _time(was: StepTimes, now: StepTimes) -> Iterator[Change]:
+    if differ(was, now):
+        yield Change(Aspect.TIME, Spread.of(was), ratio(was, now))
 
 
 def direction(was: Spread, now: Spread) -> int:

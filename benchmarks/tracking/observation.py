@@ -47,6 +47,19 @@ class Fit:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class Point:
+    """Largest errors at a step dt, s, of attitude, rad, and of rates, relative; nan where the run did not reach its end.
+
+    `reached` is False where there was no time for the run, which says nothing of the version.
+    """
+
+    dt: float
+    attitude: float
+    rates: float
+    reached: bool = True
+
+
 @dataclass(frozen=True, kw_only=True)
 class Observation:
     """What is seen of one version of an engine, with one setting, on one scene.
@@ -59,8 +72,10 @@ class Observation:
         Step, s, of everything but the orders.
     outcome
         How the run ended.
+    points
+        Errors at shorter and shorter steps; none of a method whose accuracy does not depend on a step.
     attitude_order, rates_order
-        Orders over shorter and shorter steps.
+        Orders that the errors show, over the steps that all versions have.
     error
         Largest attitude error, rad.
     drifts
@@ -73,6 +88,7 @@ class Observation:
     label: str
     dt: float
     outcome: Outcome = OK
+    points: tuple[Point, ...] = ()
     attitude_order: Fit = Fit()
     rates_order: Fit = Fit()
     error: Spread = NOTHING

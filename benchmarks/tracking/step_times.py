@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 
 from conservative.method import Method, grid_for
 from conservative.scene import Scene
@@ -20,12 +21,17 @@ REPEATS = 3
 ROUNDS = 3
 """Rounds of a repeat; the fastest call of them counts."""
 
+TIME_FACTOR = 1.25
+"""Times differ from this factor on."""
 StepTimes = tuple[float, ...]
 """Shortest time of a step, s, in each repeat."""
 
 
 def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> dict[str, StepTimes]:
-    """Return what a step takes by version; versions whose run does not reach its end are left out."""
+    """Return what a step takes by version; versions whose run does not reach its end are left out.
+
+    Where a time seems to differ from that of the version before, all are measured again: a real difference shows again.
+    """
     grid = keep_end(grid_for(scene, scene.dt))
     cases = {version: shorten(study, Case(study.name, scene, method, grid)) for version, method in methods.items()}
     tried = {version: attempt_here(study.hang_limit, case, study.skip_missing) for version, case in cases.items()}
@@ -34,7 +40,15 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
         for version, done in tried.items()
         if isinstance(done, Success)
     }
-    repeats = [_repeat(study, ready, seed) for seed in range(REPEATS)]
+    times = _repeats(study, ready, range(REPEATS))
+    if any(differ(was, now) for was, now in pairwise(times.values())):
+        again = _repeats(study, ready, range(REPEATS, 2 * REPEATS))
+        return {version: times[version] + again[version] for version in ready}
+    return times
+
+
+def _repeats(study: Study, ready: Mapping[str, TimedRun], seeds: range) -> dict[str, StepTimes]:
+    repeats = [_repeat(study, ready, seed) for seed in seeds]
     return {version: tuple(repeat[version] for repeat in repeats) for version in ready}
 
 
@@ -45,7 +59,13 @@ def _repeat(study: Study, ready: Mapping[str, TimedRun], seed: int) -> dict[str,
     return {version: timings[version].minimum / steps[version] for version in ready}
 
 
-def ratio(before: StepTimes, after: StepTimes) -> Spread:
-    """Return how many times as long a step takes after, from the repeats one by one: no unit."""
-    ratios = sorted(b / a for a, b in zip(before, after, strict=True))
-    return Spread.of([ratios[len(ratios) // 2], *ratios])
+def differ(was: StepTimes, now: StepTimes) -> bool:
+    """Return whether every time (n,), s, of one version is longer than every time of the other by `TIME_FACTOR`."""
+    if not was or not now:
+        return False
+    return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
+
+
+def ratio(was: StepTimes, now: StepTimes) -> Spread:
+    """Return how many times as long a step takes, of the shortest times, and of the repeats one by one: no unit."""
+    return Spread.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])

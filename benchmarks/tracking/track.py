@@ -18,6 +18,7 @@ from ..studies.study import Progress, Study
 from .changes import Change, find_changes
 from .observation import Observation, Spread
 from .observe import observe
+from .orders import fit_orders
 from .step_times import StepTimes, ratio, time_versions
 
 
@@ -101,7 +102,8 @@ class History:
 
 def _transitions(line: Line) -> Iterator[Transition]:
     for was, now in pairwise(line.observations):
-        yield Transition(was, now, find_changes(was, now, line.time_ratio(now.version, was.version)))
+        times = line.times.get(was.version, ()), line.times.get(now.version, ())
+        yield Transition(was, now, find_changes(was, now, *times))
 
 
 def make_plan(environments: Iterable[Environment], settings: Iterable[str], scene_names: Iterable[str]) -> Plan:
@@ -112,7 +114,7 @@ def make_plan(environments: Iterable[Environment], settings: Iterable[str], scen
     environments
         Of one engine, two or more.
     settings
-        As a method's name has them, `RK4` or `integrator=RK4`; by default those that tables show, and the engine's own defaults.
+        As a method's name has them, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as installed.
     scene_names
         By default those of a report, without those that no setting takes.
 
@@ -135,7 +137,9 @@ def require_several(versions: list[str]) -> None:
         twice = next(version for version in versions if versions.count(version) > 1)
         raise BadInput("versions", f"{twice!r} twice", "different versions")
     if len(versions) < 2:
-        raise BadInput("versions", f"{', '.join(versions) or 'none'}, nothing to compare", "two or more, --last N, or --against")
+        raise BadInput(
+            "versions", f"{', '.join(versions) or 'none'}, nothing to compare", "two or more, --last N, or --against"
+        )
 
 
 def _methods(environments: tuple[Environment, ...], settings: tuple[str, ...]) -> Iterator[Mapping[str, Method]]:
@@ -171,5 +175,5 @@ def track(plan: Plan, progress: Progress, time_limit: float | None = None) -> Hi
             seen.append(observe(study, scene, method, version))
         progress((place + 1) * (len(row) + 1) - 1, total, f"{scene.name}: timing {seen[-1].setting}")
         good = {each.version: row[each.version] for each in seen if each.outcome.ok}
-        lines.append(Line(scene.name, seen[-1].setting, tuple(seen), time_versions(study, scene, good)))
+        lines.append(Line(scene.name, seen[-1].setting, fit_orders(seen), time_versions(study, scene, good)))
     return History(plan, tuple(lines))

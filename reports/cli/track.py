@@ -18,6 +18,7 @@ from .options import FilePath, epilog, split_names
 if TYPE_CHECKING:
     from conservative.benchmarks.tracking.track import Plan
 
+    from ..tables.cells import Row
     from ..tables.track import Answer
 
 PAGE = ("track.html", "track.md", "track.json")
@@ -84,9 +85,7 @@ def _open(files: ExitStack, options: dict[str, Any]) -> Texts:
     return {name: files.enter_context(text_file(path, arguments.get(name, "out"))) for name, path in paths.items()}
 
 
-def _answer(
-    engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]
-) -> Answer:
+def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Answer:
     """Return what the history of the versions says.
 
     Raises
@@ -141,12 +140,18 @@ def _write(answer: Answer, streams: Texts) -> None:
 
 def _show(answer: Answer) -> None:
     """Print tables, what changed, and the verdict."""
-    from ..tables.track import NOTHING_CHANGED
-    from ..terminal.tables import TerminalTable, print_tables, print_text
+    from ..tables.track import NOTHING_CHANGED, UNFINISHED
+    from ..terminal.tables import TerminalTable, print_tables
 
     for caption, (header, rows) in answer.tables:
-        print_tables([TerminalTable(caption, header, [[str(cell) for cell in row] for row in rows])])
-    print_text("What changed", style="bold")
-    print_text("\n".join(answer.sentences) or NOTHING_CHANGED)
-    if answer.gated:
-        print_text("\n".join([answer.verdict, *answer.failures]), style="bold")
+        print_tables([TerminalTable(caption, _narrow(header), [_narrow(row) for row in rows])])
+    sections = [("What changed", answer.sentences or (NOTHING_CHANGED,)), (UNFINISHED, answer.unfinished)]
+    for title, texts in [*sections, *([(answer.verdict, tuple(answer.failures))] if answer.gated else [])]:
+        if texts or title == answer.verdict:
+            click.echo("\n".join([title, *(f"  {text}" for text in texts), ""]))
+
+
+def _narrow(row: Row) -> list[str]:
+    """Return a row for a terminal: setting and version in one cell, and of a ratio not what differs between repeats."""
+    setting, version, *others, ratio = map(str, row)
+    return [f"{setting} {version}", *others, ratio.partition(" (")[0]]

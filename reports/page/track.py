@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from ..tables.track import NOTHING_CHANGED, Answer
+from ..tables.track import NOTHING_CHANGED, UNFINISHED, Answer
 
 
 def render(answer: Answer) -> str:
     """Return the page."""
     loader = PackageLoader("conservative.reports")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    return environment.get_template("track.html.j2").render(answer=answer, nothing_changed=NOTHING_CHANGED)
+    template = environment.get_template("track.html.j2")
+    return template.render(answer=answer, nothing_changed=NOTHING_CHANGED, unfinished=UNFINISHED)

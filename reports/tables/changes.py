@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from conservative.benchmarks.measures.drift_class import SMALL
 from conservative.benchmarks.tracking.changes import Aspect, Change
@@ -23,7 +23,7 @@ def sentence(transition: Transition) -> str:
         return ""
     now = transition.now
     head = f"{now.setting or 'default'} on {now.scene}: from {transition.was.version} to {now.version} "
-    return head + ", ".join(_phrase(change, now.dt) for change in transition.changes)
+    return head + ", ".join(_phrases(transition.changes, now.dt))
 
 
 def order_text(order: float) -> str:
@@ -35,6 +35,16 @@ def order_text(order: float) -> str:
 def drift_text(drift: float) -> str:
     """Return a relative drift: in per cent where it is large."""
     return f"{100 * drift:.2g} %" if SMALL < abs(drift) < math.inf else number(drift, 1)
+
+
+def _phrases(changes: Sequence[Change], dt: float) -> list[str]:
+    """Return a phrase for each change, and one for both orders where they say the same."""
+    texts = [_phrase(change, dt) for change in changes]
+    attitude, rates = Aspect.ATTITUDE_ORDER.value, Aspect.RATES_ORDER.value
+    both = [text.replace(attitude, rates) for text in texts[:1] if attitude in text]
+    if both == texts[1:2]:
+        return [texts[0].replace(f"the {attitude}", "the orders of attitude and rates"), *texts[2:]]
+    return texts
 
 
 def _phrase(change: Change, dt: float) -> str:
@@ -51,10 +61,10 @@ def _outcome(change: Change, dt: float) -> str:
     was, now = change.was, change.now
     assert isinstance(was, Outcome)
     assert isinstance(now, Outcome)
-    if was.kind is OutcomeKind.UNSUPPORTED and now.ok:
-        return "it appeared"
-    if was.ok and now.kind is OutcomeKind.UNSUPPORTED:
-        return "it disappeared: unsupported"
+    if was.kind is OutcomeKind.UNSUPPORTED:
+        return "it appeared" + ("" if now.ok else f", {_with_reason(now)} at dt = {dt:g} s")
+    if now.kind is OutcomeKind.UNSUPPORTED:
+        return "it disappeared"
     return f"the outcome at dt = {dt:g} s went from {outcome_text(was)} to {_with_reason(now)}"
 
 

@@ -11,12 +11,14 @@ from typing import Any
 from conservative.benchmarks.measures.drift_class import DriftClass, classify
 from conservative.benchmarks.tracking.observation import Fit, Observation, Spread
 from conservative.benchmarks.tracking.track import History, Line, Transition
+from conservative.outcome import Outcome
 
 from .cells import DASH, Cell, Grade, Row, Table, finite_or_none, markdown, number, outcome_cell, outcome_record
 from .changes import drift_text, order_text, sentence
 from .junit import TestCase, junit_xml
 
 NOTHING_CHANGED = "No conclusion changed."
+UNFINISHED = "What did not reach its end"
 NOTHING_COMPARED = "nothing was compared: no setting reaches the end of a run in both of the last two versions"
 _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
 
@@ -66,6 +68,11 @@ class Answer:
         return tuple((_caption(scene, lines), _table(lines)) for scene, lines in _by_scene(self.history).items())
 
     @property
+    def unfinished(self) -> tuple[str, ...]:
+        """The runs that did not reach their end: setting, scene and versions, and how the last of these ended."""
+        return tuple(text for line in self.history.lines for text in _unfinished(line))
+
+    @property
     def environments(self) -> Table:
         """What each version ran with."""
         rows = [(each.version, each.python, ", ".join(each.packages)) for each in self.history.plan.environments]
@@ -78,7 +85,9 @@ class Answer:
             "engine": plan.engine,
             "passed": self.passed,
             "failures": list(self.failures) if self.gated else [],
-            "versions": [{"version": each.version, "python": each.python, "packages": each.packages} for each in plan.environments],
+            "versions": [
+                {"version": each.version, "python": each.python, "packages": each.packages} for each in plan.environments
+            ],
             "rows": [_record(line, each) for line in self.history.lines for each in line.observations],
             "changes": [_change_record(each) for each in self.history.transitions if each.changes],
         }
@@ -91,6 +100,8 @@ class Answer:
         verdict = ["", f"**{self.verdict}**", *(["", *failures] if failures else [])] if self.gated else []
         tables = [part for caption, table in self.tables for part in ("", f"### {caption}", "", markdown(table))]
         head = [f"## {self.title}", *verdict, "", "### What changed", "", changes]
+        if self.unfinished:
+            tables += ["", f"### {UNFINISHED}", "", *(f"- {text}" for text in self.unfinished)]
         return "\n".join([*head, *tables, "", "### Versions", "", markdown(self.environments)]) + "\n"
 
     def junit_text(self) -> str:
@@ -118,9 +129,17 @@ def _caption(scene: str, lines: list[Line]) -> str:
     return f"{scene}, dt = {lines[0].observations[0].dt:g} s"
 
 
+def _unfinished(line: Line) -> Iterator[str]:
+    kinds = dict.fromkeys(each.outcome.kind for each in line.observations if not each.outcome.ok)
+    for kind in kinds:
+        found = [each for each in line.observations if each.outcome.kind is kind]
+        versions = ", ".join(each.version for each in found)
+        yield f"{line.setting or 'default'} on {line.scene} in {versions}: {found[-1].outcome}"
+
+
 def _table(lines: list[Line]) -> Table:
     names = list(dict.fromkeys(name for line in lines for each in line.observations for name in each.drifts))
-    header = ("setting", "version", "order of attitude", "order of rates", *(f"{name} drift" for name in names))
+    header = ("setting", "version", "order", "order of rates", *(f"{name} drift" for name in names))
     times = ("attitude error, rad", "outcome", "µs a step", "time ratio")
     return (*header, *times), [_row(line, each, names) for line in lines for each in line.observations]
 
@@ -129,7 +148,15 @@ def _row(line: Line, seen: Observation, quantities: list[str]) -> Row:
     drifts = [_drift_cell(seen.drifts[name].value if name in seen.drifts else math.nan) for name in quantities]
     orders = (_order_cell(seen.attitude_order), _order_cell(seen.rates_order))
     times = (number(1e6 * _step_time(line, seen)), _ratio_cell(line, seen))
-    return (seen.setting or "default", seen.version, *orders, *drifts, number(seen.error.value), outcome_cell(seen.outcome), *times)
+    return (
+        seen.setting or "default",
+        seen.version,
+        *orders,
+        *drifts,
+        number(seen.error.value),
+        _outcome_cell(seen.outcome),
+        *times,
+    )
 
 
 def _order_cell(fit: Fit) -> str:
@@ -142,6 +169,11 @@ def _drift_cell(drift: float) -> Cell:
         return Cell(DASH, Grade.NONE)
     symbol, colour = _GRADES[grade]
     return Cell(f"{symbol} {drift_text(drift)}", colour)
+
+
+def _outcome_cell(outcome: Outcome) -> Cell:
+    """Return the kind alone: how and why is said below the tables."""
+    return outcome_cell(Outcome(outcome.kind))
 
 
 def _step_time(line: Line, seen: Observation) -> float:
@@ -159,7 +191,11 @@ def _ratio_cell(line: Line, seen: Observation) -> str:
     ratio = _ratio(line, seen)
     if ratio is None:
         return DASH
-    return number(ratio.value) if ratio.low == ratio.high else f"{number(ratio.value)} ({number(ratio.low)} to {number(ratio.high)})"
+    return (
+        number(ratio.value)
+        if ratio.low == ratio.high
+        else f"{number(ratio.value)} ({number(ratio.low)} to {number(ratio.high)})"
+    )
 
 
 def _record(line: Line, seen: Observation) -> dict[str, Any]:
