@@ -14,7 +14,7 @@ from conservative.errors import BadInput
 
 from .catalogue import Distribution
 from .uv_command import UvFailed, run_uv
-from .versions import describe_versions
+from .versions import describe_versions, version_key
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
 _VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
@@ -194,11 +194,14 @@ def _resolves(python: str, wanted: str, source: Source) -> bool:
 
 def list_versions(package: str, source: Source) -> list[str]:
     """Return the versions of a package that have wheels, newest first; none where nobody can tell."""
-    options = [option for option in source.options if option != ":all:"]
-    options = [f"{option}=:all:" if option == "--only-binary" else option for option in options]
+    if source.find_links is not None:
+        names = (path.name.split("-") for path in source.find_links.glob("*.whl"))
+        found = {parts[1] for parts in names if normal_name(parts[0]) == normal_name(package)}
+        return sorted(found, key=version_key, reverse=True)
+    options = () if source.allow_build else ("--only-binary=:all:",)
     try:
         listing = run_uv("tool", "run", "--quiet", "pip", "index", "versions", package, *options)
     except UvFailed:
         return []
-    found = re.search(r"Available versions: (.+)", listing)
-    return found[1].split(", ") if found else []
+    line = re.search(r"Available versions: (.+)", listing)
+    return line[1].split(", ") if line else []

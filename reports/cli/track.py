@@ -13,7 +13,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import FilePath, epilog, split_names
+from .options import FilePath, allow_build_option, epilog, find_links_option, split_names
 
 if TYPE_CHECKING:
     from conservative.benchmarks.tracking.track import Plan
@@ -50,8 +50,8 @@ Texts = dict[str, IO[str]]
 @click.option("--junit", type=FilePath(), help="Write a report as JUnit has them.")
 @click.option("--markdown", type=FilePath(), help="Write tables and changes as Markdown.")
 @click.option("--out", type=FilePath(), help=f"Folder for {', '.join(PAGE)}.")
-@click.option("--find-links", type=FilePath(), help="Folder of wheels to take everything from, without a network.")
-@click.option("--allow-build", is_flag=True, help="Run the code of --against, or of a package without a wheel, to build it.")
+@find_links_option
+@allow_build_option
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and say what changed from one to the next.
 

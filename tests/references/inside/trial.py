@@ -9,6 +9,9 @@ import numpy as np
 
 
 def prepare(given):
+    given.stages = 4
+    if given.do == "as_packaged":
+        given.do, given.stages = what_is_packaged()
     if given.at == "prepare":
         misbehave(given.do)
     inertia = given.moments
@@ -38,12 +41,22 @@ def march(derivative, y, given):
     for n_steps in np.diff(given.steps):
         for _ in range(n_steps):
             k1 = derivative(y)
+            if given.stages == 1:
+                y = y + dt * k1
+                continue
             k2 = derivative(y + dt / 2 * k1)
             k3 = derivative(y + dt / 2 * k2)
             k4 = derivative(y + dt * k3)
             y = y + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         states.append(y)
     return np.array(states)
+
+
+def what_is_packaged():
+    """Return what the installed version of the engine does by mistake, and the stages of its integrator."""
+    import trial
+
+    return trial.DO, trial.STAGES
 
 
 def misbehave(do):
