@@ -19,7 +19,7 @@ from .junit import TestCase, junit_xml
 
 NOTHING_CHANGED = "No conclusion changed."
 UNFINISHED = "What did not reach its end"
-NOTHING_COMPARED = "nothing was compared: no setting reaches the end of a run in both of the last two versions"
+NO_END = "no setting reaches the end of a run"
 _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
 
 
@@ -32,17 +32,17 @@ class Answer:
 
     @property
     def passed(self) -> bool:
-        """Whether the last version, where it is gated, lost nothing and could be compared."""
-        return not self.gated or not list(self.failures)
+        """Whether the last version, where it is gated, lost nothing and reaches an end at all."""
+        return not list(self.failures)
 
     @property
     def failures(self) -> Iterator[str]:
-        """Why it is not passed, where it is gated."""
-        last = self.history.plan.versions[-1]
-        reached = [each for each in self.history.transitions if each.now.version == last and each.was.outcome.ok]
-        if not reached:
-            yield NOTHING_COMPARED
+        """Why it is not passed; nothing where it is not gated."""
+        if not self.gated:
+            return
         yield from (sentence(each) for each in self.history.lost_last)
+        if not any(line.observations[-1].outcome.ok for line in self.history.lines):
+            yield f"{self.history.plan.versions[-1]}: {NO_END}"
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -84,7 +84,7 @@ class Answer:
         content = {
             "engine": plan.engine,
             "passed": self.passed,
-            "failures": list(self.failures) if self.gated else [],
+            "failures": list(self.failures),
             "versions": [
                 {"version": each.version, "python": each.python, "packages": each.packages} for each in plan.environments
             ],
@@ -96,7 +96,7 @@ class Answer:
     def markdown_text(self) -> str:
         """Return tables, changes and versions as Markdown."""
         changes = "\n".join(f"- {text}" for text in self.sentences) or NOTHING_CHANGED
-        failures = [f"- {text}" for text in self.failures] if self.gated else []
+        failures = [f"- {text}" for text in self.failures]
         verdict = ["", f"**{self.verdict}**", *(["", *failures] if failures else [])] if self.gated else []
         tables = [part for caption, table in self.tables for part in ("", f"### {caption}", "", markdown(table))]
         head = [f"## {self.title}", *verdict, "", "### What changed", "", changes]
@@ -107,8 +107,9 @@ class Answer:
     def junit_text(self) -> str:
         """Return a case for each setting on each scene and two versions that follow each other, as JUnit has them."""
         cases = [self._case(each) for each in self.history.transitions]
-        if self.gated and NOTHING_COMPARED in self.failures:
-            cases.append(TestCase("all", self.verdict, failure=NOTHING_COMPARED))
+        last = self.history.plan.versions[-1]
+        if not self.passed and not self.history.lost_last:
+            cases.append(TestCase("all", last, failure="\n".join(self.failures)))
         return junit_xml(f"conservative track {self.history.plan.engine}", cases)
 
     def _case(self, transition: Transition) -> TestCase:

@@ -63,7 +63,7 @@ def test_the_doctor_finds_nothing_wrong_with_a_build(wheels, tmp_path):
 def test_a_file_that_is_no_wheel_of_the_engine_is_refused(name, tmp_path):
     with zipfile.ZipFile(tmp_path / name, "w"):
         pass
-    with pytest.raises(cv.BadInput, match="against: got .*allowed: a wheel of trial"):
+    with pytest.raises(cv.BadInput, match=r"against: got .*allowed: a wheel of trial"):
         install_build("trial", tmp_path / name, Source())
 
 
@@ -76,7 +76,7 @@ def test_what_is_neither_wheel_nor_sources_is_refused(tmp_path):
 def test_a_wheel_for_another_python_is_refused(cache, tmp_path):
     write_wheel(tmp_path, "2.0", "cp27-cp27m-any")
     write_numpy(tmp_path)
-    with pytest.raises(cv.BadInput, match="no wheel|uv can install"):
+    with pytest.raises(cv.BadInput, match=r"no wheel|uv can install"):
         install_build("trial", tmp_path / "trial-2.0-cp27-cp27m-any.whl", Source(tmp_path))
     assert environment.list_environments() == ()
 
@@ -95,7 +95,14 @@ def build_wheel(folder, settings=None, metadata=None):
     shutil.copy({source!r}, pathlib.Path(folder) / name)
     return name
 """
-PROJECT = '[build-system]\nrequires = []\nbuild-backend = "backend"\nbackend-path = ["."]\n[project]\nname = "trial"\nversion = "3.0"\n'
+PROJECT = """[build-system]
+requires = []
+build-backend = "backend"
+backend-path = ["."]
+[project]
+name = "trial"
+version = "3.0"
+"""
 
 
 def test_sources_are_built_where_that_is_allowed(wheels, tmp_path):
@@ -122,7 +129,7 @@ def test_the_newest_releases_are_those_of_the_index_oldest_first(wheels):
 
 
 def test_releases_that_nobody_can_list_are_said(tmp_path):
-    with pytest.raises(cv.BadInput, match="no list of versions of trial .*allowed: a network, --find-links FOLDER"):
+    with pytest.raises(cv.BadInput, match=r"no list of versions of trial .*allowed: a network, --find-links FOLDER"):
         newest_releases("trial", 2, Source(tmp_path))
 
 
