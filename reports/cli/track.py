@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,6 +24,15 @@ if TYPE_CHECKING:
 
 PAGE = ("track.html", "track.md", "track.json")
 """The files of `--out`."""
+SHORT = {
+    "order of rates": "rates",
+    " drift": "",
+    "attitude error, rad": "error, rad",
+    "outcome": "end",
+    "✓ done": "✓",
+    "time ratio": "time",
+}
+"""What tables have, and what stands for it on a terminal."""
 Texts = dict[str, IO[str]]
 
 
@@ -35,7 +45,7 @@ Texts = dict[str, IO[str]]
         "conservative track mujoco 4.0.0 --against ~/mujoco/python --allow-build --settings Euler,RK4",
     ),
 )
-@click.argument("engine")
+@click.argument("engine", shell_complete=completion.engines)
 @click.argument("versions", nargs=-1)
 @click.option("--last", type=click.IntRange(1), metavar="N", help="The newest N versions that there are, beside VERSIONS.")
 @click.option(
@@ -152,6 +162,7 @@ def _show(answer: Answer) -> None:
 
 
 def _narrow(row: Row) -> list[str]:
-    """Return a row for a terminal: setting and version in one cell, and of a ratio not what differs between repeats."""
-    setting, version, *others, ratio = map(str, row)
-    return [f"{setting} {version}", *others, ratio.partition(" (")[0]]
+    """Return a row, or the header, as a terminal has room for it: without the time in seconds, and in short words."""
+    setting, version, *others, _, ratio = map(str, row)
+    texts = [f"{setting} {version}", *others, ratio.partition(" (")[0]]
+    return [re.sub("|".join(SHORT), lambda found: SHORT[found[0]], text) for text in texts]

@@ -13,6 +13,8 @@ from conservative.outcome import Outcome, OutcomeKind
 
 from .cells import number, outcome_text
 
+PER_CENT = 0.01
+"""Relative drift from which on it is written in per cent."""
 WHOLE = 0.25
 """An order that is nearer than this to a whole number is called that number."""
 
@@ -33,8 +35,8 @@ def order_text(order: float) -> str:
 
 
 def drift_text(drift: float) -> str:
-    """Return a relative drift: in per cent where it is large."""
-    return f"{100 * drift:.2g} %" if SMALL < abs(drift) < math.inf else number(drift, 1)
+    """Return a relative drift: in per cent where it is at least one."""
+    return f"{100 * drift:.2g} %" if PER_CENT <= abs(drift) < math.inf else number(drift, 1)
 
 
 def _phrases(changes: Sequence[Change], dt: float) -> list[str]:
