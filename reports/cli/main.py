@@ -19,6 +19,7 @@ from .options import epilog
 from .recommend import recommend
 from .report import report
 from .run import run
+from .track import track
 
 
 class _UserError(click.ClickException):
@@ -92,5 +93,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new, engines):
+for command in (report, run, list_all, recommend, gate, new, engines, track):
     main.add_command(command)
