@@ -117,8 +117,7 @@ def evaluate(figures: Iterable[Figure], engines: Sequence[str] = (EVERY_ENGINE,)
 
 def _find_motion(figure: Figure, engines: Sequence[str]) -> Finding:
     found = judge(figure, "the two truths", *_measure(figure, None))
-    at_hand = [method for method in best_methods() if allowed(method, engines)]
-    beside = tuple(_beside(figure, method) for method in at_hand)
+    beside = tuple(_beside(figure, method) for method in best_methods(engines))
     return Finding(figure, found.verdict, found.label, found.measured, found.off, found.reason, beside)
 
 
@@ -132,7 +131,7 @@ def _find(figure: Figure, engines: Sequence[str]) -> Finding:
         method = registry.method(figure.method)
     except MissingEngine as error:
         return Finding(figure, Verdict.CANNOT, reason=describe_missing(error))
-    if not allowed(method, engines):
+    if method.role is Role.ENGINE and not named(method.family, engines):
         return Finding(figure, Verdict.CANNOT, reason=f"{method.family} is left out by --engines")
     return judge(figure, method.label, *_measure(figure, method))
 
@@ -143,9 +142,9 @@ def describe_missing(error: MissingEngine) -> str:
     return f"{wanted} is not installed: {str(error).partition('allowed after: ')[2]}"
 
 
-def allowed(method: Method, engines: Sequence[str]) -> bool:
-    """Return whether a method may run: all of ours, and those engines that are named."""
-    return method.role is not Role.ENGINE or EVERY_ENGINE in engines or method.family.partition("@")[0] in engines
+def named(engine: str, engines: Sequence[str]) -> bool:
+    """Return whether an engine, of whatever version, is among those that may run."""
+    return EVERY_ENGINE in engines or engine.partition("@")[0] in engines
 
 
 def _not_registered(name: str) -> str:
@@ -199,12 +198,16 @@ def distance(figure: Figure, measured: Array) -> float:
     return float(ways[figure.relation]().max())
 
 
-def best_methods() -> list[Method]:
-    """Return, of each engine that has an environment, the newest version in that of its settings which has the highest order."""
+def best_methods(engines: Sequence[str]) -> list[Method]:
+    """Return, of each engine that is named and has an environment, that of its settings which has the highest order."""
     there = {environment.engine for environment in list_environments()}
-    families = [registry.engine(name) for name in registry.list_engines() if name in there]
-    settings = [tuple(family.variants()) or (family(),) for family in families]
-    return [max(each, key=lambda method: float("inf") if method.order is None else method.order) for each in settings]
+    families = [registry.engine(name) for name in registry.list_engines() if name in there and named(name, engines)]
+    return [max(family.variants(), key=_order) for family in families]
+
+
+def _order(method: Method) -> float:
+    """Return its order; infinity where it chooses its steps, or needs none."""
+    return float("inf") if method.order is None else method.order
 
 
 def _beside(figure: Figure, method: Method) -> Beside:
