@@ -6,8 +6,8 @@
     [[figure]]      name, source, motion, what (in words), setting (as printed), method (what is run here, or `truth`), dt, s,
                     quantity (one of `quantities.QUANTITIES`), printed; see `Figure`
 
-A printed number is a text, so that its last digit is known: a unit of that is the tolerance, as programs round digits or cut them
-off, unless there is a `tolerance`.
+A printed number is a text, so that its last digit is known: a unit of that is the tolerance, as programs round digits or cut
+them off, unless there is a `tolerance`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from conservative.body import RigidBody
 from conservative.errors import BadInput
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
+
+from .quantities import QUANTITIES
 
 DATA = Path(__file__).with_name("figures.toml")
 TRUTH = "truth"
@@ -124,13 +126,13 @@ def read(path: Path = DATA) -> tuple[Figure, ...]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise BadInput("figures", f"{str(path)!r} ({error})", "a TOML file with sources, motions and figures") from None
+        raise _unusable(f"{str(path)!r} ({error})", "a TOML file with sources, motions and figures") from None
     sources = {key: _source(key, entry) for key, entry in content.get("source", {}).items()}
     motions = {key: _motion(key, entry) for key, entry in content.get("motion", {}).items()}
     figures = tuple(_figure(entry, sources, motions) for entry in content.get("figure", ()))
-    names = [figure.name for figure in figures]
+    names = [f"{figure.source.key}: {figure.name}" for figure in figures]
     for name in {name for name in names if names.count(name) > 1}:
-        raise BadInput("figures", f"{name!r} twice", "a name of its own for each figure")
+        raise _unusable(f"{name!r} twice", "a name of its own for each figure")
     return figures
 
 
@@ -147,9 +149,9 @@ def _motion(key: str, entry: Mapping[str, Any]) -> Scene:
         start, rates, t_end = given.pop("start", np.eye(3)), given.pop("rates"), given.pop("t_end")
         potential = UniformGravity(given.pop("weight"), given.pop("com")) if "weight" in given else None
     except KeyError as missing:
-        raise BadInput("figures", f"motion {key!r} without {missing}", "a motion with moments or inertia, rates, t_end") from None
+        raise _unusable(f"motion {key!r} without {missing}", "a motion with moments or inertia, rates and t_end") from None
     if given:
-        raise BadInput("figures", f"motion {key!r} with {', '.join(given)}", "moments, inertia, start, rates, t_end, weight, com")
+        raise _unusable(f"motion {key!r} with {', '.join(given)}", "moments, inertia, start, rates, t_end, weight, com")
     return Scene(key, body, start, rates, t_end, potential)
 
 
@@ -165,18 +167,18 @@ def _figure(entry: Mapping[str, Any], sources: Mapping[str, Source], motions: Ma
 
 def _known(field: str, name: str, key: str, known: Mapping[str, Any]) -> Any:
     if key not in known:
-        raise BadInput("figures", f"{name!r} with {field} {key!r}", f"one of {', '.join(known)}")
+        raise _unusable(f"{name!r} with {field} {key!r}", f"one of {', '.join(known)}")
     return known[key]
 
 
 def _make(kind: type[Any], name: str, given: Mapping[str, Any]) -> Any:
-    unknown = set(given) - {field.name for field in fields(kind)}
-    if unknown:
-        raise BadInput("figures", f"{name!r} with {', '.join(sorted(unknown))}", ", ".join(field.name for field in fields(kind)))
+    known = [field.name for field in fields(kind)]
+    if unknown := sorted(set(given) - set(known)):
+        raise _unusable(f"{name!r} with {', '.join(unknown)}", ", ".join(known))
     try:
         return kind(**given)
     except TypeError as missing:
-        raise BadInput("figures", f"{name!r} ({missing})", "all fields that have no default") from None
+        raise _unusable(f"{name!r} ({missing})", "all fields that have no default") from None
 
 
 def check(figure: Figure) -> Figure:
@@ -187,15 +189,23 @@ def check(figure: Figure) -> Figure:
     BadInput
         A printed number is none, the source has no citation, address or place, or nothing says how it is measured.
     """
-    try:
-        numbers = bool(figure.printed) and all(math.isfinite(Decimal(number)) for number in figure.printed)
-    except (InvalidOperation, TypeError):
-        numbers = False
-    if not numbers:
-        raise BadInput("figures", f"{figure.name!r} with printed {figure.printed}", "numbers, as texts with the digits printed")
-    source = figure.source
+    name, source = repr(figure.name), figure.source
+    if not (figure.printed and all(map(is_number, figure.printed))):
+        raise _unusable(f"{name} with printed {figure.printed}", "numbers, as texts with the digits that are printed")
     if not all((source.citation, source.place, source.url.startswith("https://"))):
-        raise BadInput("figures", f"{figure.name!r} of source {source.key!r}", "a source with a citation, an address and a place")
-    if not figure.cannot and not (figure.motion and figure.quantity and figure.dt > 0):
-        raise BadInput("figures", f"{figure.name!r}", "a motion, a quantity and a dt, or why it cannot be measured")
+        raise _unusable(f"{name} of source {source.key!r}", "a source with a citation, an address and a place")
+    if not figure.cannot and not (figure.motion and figure.quantity in QUANTITIES and figure.dt > 0):
+        raise _unusable(name, "a motion, a dt and a quantity that there is, or why it cannot be measured")
     return figure
+
+
+def is_number(text: object) -> bool:
+    """Return whether a text is a finite number."""
+    try:
+        return isinstance(text, str) and math.isfinite(Decimal(text))
+    except InvalidOperation:
+        return False
+
+
+def _unusable(got: str, allowed: str) -> BadInput:
+    return BadInput("figures", got, allowed)

@@ -23,7 +23,7 @@ FINE = 16
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What a figure is measured with: a scene, a method (None: the truth), a step, s, and the method that it is compared with."""
+    """What a figure is measured with: a scene, a method (None: the truth), its step, s, and a method to compare it with."""
 
     scene: Scene
     method: Method | None
@@ -175,7 +175,7 @@ def rates_against_other(runs: Runs) -> Array:
 
 
 def halving_ratio(runs: Runs) -> Array:
-    """Return how many times nearer the quaternion at the end is after halving the step; nearer to that of a far shorter step."""
+    """Return how many times nearer the quaternion at the end comes to that of far shorter steps after halving the step."""
     ends = [to_quaternion(runs.end(runs.dt / part).R_WB[-1]) for part in (1, 2, FINE)]
     coarse, fine = (min(np.linalg.norm(q - ends[2]), np.linalg.norm(q + ends[2])) for q in ends[:2])
     return np.array([coarse / fine])
