@@ -25,7 +25,7 @@ def count_turns_over(trajectory: Trajectory) -> int:
 
 
 def momentum_along_spin(scene: Scene, w_WB_B: Array) -> Array:
-    """Return the momentum (n,), kg m^2/s, along the principal axis that has most of it at the start, for rates (n, 3), rad/s."""
+    """Return the momentum (n,), kg m^2/s, along the principal axis that has most at the start, for rates (n, 3), rad/s."""
     along = scene.body.momentum(w_WB_B) @ scene.body.R_BP
     start = scene.body.momentum(scene.w_WB_B0) @ scene.body.R_BP
     found: Array = along[:, int(np.argmax(np.abs(start)))]

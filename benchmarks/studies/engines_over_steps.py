@@ -6,7 +6,7 @@ Impulse-based engines in single precision get worse as steps get shorter: there 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
