@@ -28,6 +28,10 @@ WORSE = "worse with smaller steps"
 """Reason of an outcome without an order: the error rises as steps get shorter."""
 DEAR = 1.0
 """Preparation, s, from which on a method gets every second step only: some engines compile for each."""
+PREPARATIONS = 30.0
+"""Time, s, for all preparations of a method on a scene; steps for which none is left are skipped."""
+TOO_DEAR = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
+"""Outcome of what is left out for that."""
 TIMED = 1.0
 """Largest attitude error, rad, of a run that is timed: beyond it the motion is another one."""
 CALL = 0.002
@@ -71,7 +75,10 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
     """Yield the errors of one method; return its points."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     found: list[Point] = []
-    for case, outcome in attempt_each(study, drop_dear(cases_of(study, scene, method), found)):
+    cases = cases_of(study, scene, method)
+    tried: list[Case] = []
+    for case, outcome in attempt_each(study, drop_dear(cases, found)):
+        tried.append(case)
         if isinstance(outcome, Failure):
             yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
             continue
@@ -79,14 +86,18 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
         found.append(Point(case, outcome, error.value))
         yield case.row(error)
+    yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), TOO_DEAR) for case in cases if case not in tried)
     return found
 
 
 def drop_dear(cases: list[Case], found: list[Point]) -> Iterator[Case]:
-    """Yield the first case, then the others, or every second where what was found says that preparing each is dear."""
+    """Yield the first case, then the others as long as there is time; every second where preparing the first was dear."""
     yield cases[0]
     dear = bool(found) and found[0].done.cost.prepare > DEAR
-    yield from cases[2::2] if dear else cases[1:]
+    for case in cases[2::2] if dear else cases[1:]:
+        if sum(point.done.cost.prepare for point in found) > PREPARATIONS:
+            return
+        yield case
 
 
 def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:

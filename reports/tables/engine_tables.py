@@ -14,6 +14,7 @@ from .cells import DASH, SMALL, Cell, Grade, Row, Table, grade_drift, number, ou
 from .engine_rows import ERROR, USABLE, Drift, EngineRow
 
 AT_ITS_BEST = "at its best"
+BOTH = "both"
 ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 FAR_FROM_ORDER = 0.5
 """How far an order may be below the claimed one without being marked."""
@@ -24,23 +25,20 @@ TERMS = (
         "as installed: nothing set but the step; at its best: the smallest attitude error of all settings in this table.",
     ),
     ("bits", "of the engine's numbers: 64 double precision, 32 single."),
-    ("attitude error", "largest angle between attitude and truth over the run; of what chooses its steps, with its tolerance."),
+    ("error", "largest angle between attitude and truth over the run; of what chooses its steps, with its tolerance."),
     (
-        "order seen",
-        "fit of log(error) over log(step), beside the order that is expected of the integrator; ✗ where it is lower. Impulse-based "
-        f"engines in single precision get {WORSE}: an order is not a number there.",
+        "order",
+        "fit of log(error) over log(step), in brackets the order that is expected of the integrator; ✗ where it is lower. "
+        f"Impulse-based engines in single precision get {WORSE}: an order is not a number there.",
     ),
     ("energy drift, world momentum drift", "largest over the run, relative; gained or lost: at the end of the run."),
     ("turns over", "how often a free body turns over, of how often the exact motion does: the quality of the motion."),
-    (
-        f"longest step within {USABLE:g} rad",
-        "the longest of the measured steps with which the attitude stays so close; – where none does.",
-    ),
+    ("longest step", f"the longest measured one with which the error stays within {USABLE:g} rad; – where there is none."),
     ("µs a step", "wall time at the step of the scene, the fastest of interleaved rounds, taken inside the engine's process."),
     (
-        f"µs a simulated second at {ERROR:.0e} rad",
-        "wall time for one second of motion at this error, between two measured steps or tolerances interpolated log-log; – where "
-        "no measured run gets there.",
+        f"µs per s at {ERROR:g} rad",
+        "wall time of a simulated second at this error, between two measured steps or tolerances interpolated log-log; – where no "
+        "measured run gets there.",
     ),
 )
 """What the columns say, in words."""
@@ -52,15 +50,14 @@ def every_setting(rows: Sequence[EngineRow], dt: str) -> Table:
         "engine==version/setting",
         "taken",
         "bits",
-        f"attitude error at dt {dt}, rad",
-        "order seen",
-        "expected",
+        f"error at dt {dt}, rad",
+        "order (expected)",
         "energy drift",
         "world momentum drift",
         "turns over",
-        f"longest step within {USABLE:g} rad, s",
+        "longest step, s",
         "µs a step",
-        f"µs a simulated second at {ERROR:.0e} rad",
+        f"µs per s at {ERROR:g} rad",
         "run",
     ]
     there = [[row.label, *_cells(row)] for row in rows if row.outcome.kind not in ABSENT]
@@ -73,7 +70,6 @@ def _cells(row: EngineRow) -> list[str | Cell]:
         _integer(row.bits),
         number(row.error),
         order(row),
-        _integer(row.expected_order),
         drift(row.energy),
         drift(row.momentum),
         turns(row),
@@ -107,16 +103,21 @@ def _absent(rows: Sequence[EngineRow], columns: int) -> list[Row]:
 
 def taken(row: EngineRow) -> str:
     """Return how an engine is taken in a row: as installed, at its best, both or neither."""
-    return ", ".join(text for text, applies in ((AS_INSTALLED, row.as_installed), (AT_ITS_BEST, row.best)) if applies)
+    if row.as_installed and row.best:
+        return BOTH
+    return AS_INSTALLED if row.as_installed else AT_ITS_BEST if row.best else ""
 
 
 def order(row: EngineRow) -> str | Cell:
-    """Return the order that was seen, marked where it is below the one claimed; or why there is none."""
-    if row.no_order:
-        return Cell(f"{DASH} none: {row.no_order}", Grade.BAD if row.no_order == WORSE else Grade.NONE)
-    if math.isnan(row.order):
+    """Return the order that was seen, marked where it is below the one expected, which is in brackets; or that there is none."""
+    if math.isnan(row.expected_order):
         return DASH
-    text = f"{row.order:.2f} ± {row.order_stderr:.2f}"
+    expected = f"({row.expected_order:.0f})"
+    if row.no_order == WORSE:
+        return Cell(f"{DASH} none {expected}: {WORSE}", Grade.BAD)
+    if math.isnan(row.order):
+        return f"{DASH} not seen {expected}"
+    text = f"{row.order:.2f} ± {row.order_stderr:.2f} {expected}"
     return Cell(f"✗ {text}", Grade.BAD) if row.order < row.expected_order - FAR_FROM_ORDER else text
 
 
