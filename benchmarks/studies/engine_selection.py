@@ -103,7 +103,7 @@ def _family(engine: str, version: str) -> type[Method]:
     if engine in beside_us and not version:
         return registry.list_families()[engine]
     found: Any = registry.engine(engine)
-    return found.at_version(version) if version else found  # type: ignore[no-any-return]
+    return found.at_version(version) if version else found
 
 
 def _as_installed(family: type[Method]) -> tuple[Method, ...]:

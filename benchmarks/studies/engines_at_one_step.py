@@ -7,7 +7,7 @@ process that crashes or hangs costs the rows of its own method, which say so.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 from conservative.method import Grid, grid_for
@@ -65,7 +65,7 @@ def facts(case: Case) -> list[Measurement]:
     return [case.row(Value(Measure.PRECISION, bits), OK, detail), case.row(Value(Measure.ORDER_EXPECTED, order), OK, detail)]
 
 
-def measure(study: Study, case: Case, truth: Trajectory) -> Iterator[Measurement]:
+def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, TimedRun | None]:
     """Yield the rows of one engine but for its times; return the run to be timed, None where there is none."""
     outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
     yield from accuracy(case, outcome, truth)

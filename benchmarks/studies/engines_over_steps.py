@@ -5,8 +5,10 @@ Impulse-based engines in single precision get worse as steps get shorter: there 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+
+import numpy as np
 
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
@@ -71,7 +73,7 @@ def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
     return [Case(study.name, scene, method, grid) for grid in grids]
 
 
-def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
+def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[Point]]:
     """Yield the errors of one method; return its points."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     found: list[Point] = []
@@ -82,7 +84,8 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         if isinstance(outcome, Failure):
             yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
             continue
-        values = errors.measure_errors(outcome.trajectory, truth)
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+            values = errors.measure_errors(outcome.trajectory, truth)
         error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
         found.append(Point(case, outcome, error.value))
         yield case.row(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..charts import engines, vega_embed
@@ -25,7 +25,7 @@ def charts(scenes: Iterable[EngineScene]) -> dict[str, Any]:
     return {scene.name: engines.work_precision(scene.points, scene.name) for scene in scenes if len(scene.points)}
 
 
-def figures(scenes: Iterable[EngineScene], pictures: dict[str, Any]) -> dict[str, PageFigure]:
+def figures(scenes: Iterable[EngineScene], pictures: Mapping[str, Any]) -> dict[str, PageFigure]:
     """Return the figures of the page by scene, made of the same pictures."""
     return {scene.name: _figure(scene, pictures[scene.name]) for scene in scenes if scene.name in pictures}
 

@@ -24,8 +24,8 @@ NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes
 def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], draw: Draw) -> str:
     """Return report.md.
 
-    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike; `draw(name, chart)` returns the name
-    of its file.
+    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike; `draw(name, chart)` returns the
+    name of its file.
     """
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False

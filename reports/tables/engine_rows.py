@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pandas as pd
 
@@ -89,8 +90,8 @@ def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[E
     `table` has the rows of the studies of engines, with names (see `labels.with_names`), `points` those of `points_of` it.
     """
     at_step, over_steps = of_study(table, ONE_STEP, scene), of_study(table, OVER_STEPS, scene)
-    lines = dict(list(over_steps.groupby("series", sort=False)))
-    timed = dict(list(points[points["scene"] == scene].groupby("series", sort=False)))
+    lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}
+    timed = {str(name): rows for name, rows in points[points["scene"] == scene].groupby("series", sort=False)}
     found = [_row(rows, lines, timed) for _, rows in at_step.groupby("label", sort=False)]
     return sorted(_mark_best(found), key=lambda row: (math.isnan(row.error), not row.outcome.ok, row.error, row.label))
 
@@ -100,7 +101,7 @@ def points_of(table: pd.DataFrame) -> pd.DataFrame:
     return work_precision.points(table, OVER_STEPS)
 
 
-def _row(rows: pd.DataFrame, lines: Mapping[object, pd.DataFrame], timed: Mapping[object, pd.DataFrame]) -> EngineRow:
+def _row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[str, pd.DataFrame]) -> EngineRow:
     first = rows.iloc[0]
     line = lines.get(first["series"], rows.iloc[:0])
     engine = f"{first['label']}".partition("/")[0]
@@ -119,7 +120,7 @@ def _outcome(rows: pd.DataFrame) -> Outcome:
     return next((outcome for outcome in outcomes(ends) if not outcome.ok), OK)
 
 
-def _facts(rows: pd.DataFrame) -> dict[str, object]:
+def _facts(rows: pd.DataFrame) -> dict[str, Any]:
     return {
         "bits": _value(rows, Measure.PRECISION),
         "expected_order": _value(rows, Measure.ORDER_EXPECTED),
@@ -127,7 +128,7 @@ def _facts(rows: pd.DataFrame) -> dict[str, object]:
     }
 
 
-def _errors(rows: pd.DataFrame) -> dict[str, object]:
+def _errors(rows: pd.DataFrame) -> dict[str, Any]:
     return {
         "error": _value(rows, Measure.ATTITUDE_MAX),
         "energy": _drift(rows, "energy"),
@@ -142,7 +143,7 @@ def _drift(rows: pd.DataFrame, quantity: str) -> Drift:
     return Drift(float(found["value"].iloc[0]), str(found["detail"].iloc[0])) if len(found) else Drift()
 
 
-def _order(line: pd.DataFrame) -> dict[str, object]:
+def _order(line: pd.DataFrame) -> dict[str, Any]:
     found = of_measure(line, Measure.ORDER)
     reason = str(found["reason"].iloc[0]) if len(found) and found["outcome"].iloc[0] == OutcomeKind.NO_ORDER.value else ""
     return {"order": _value(line, Measure.ORDER), "order_stderr": _value(line, Measure.ORDER_STDERR), "no_order": reason}

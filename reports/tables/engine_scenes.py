@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.scene import Scene
 
 from .cells import Table
 from .engine_rows import EngineRow, engine_rows, points_of
-from .engine_tables import AS_INSTALLED, AT_ITS_BEST, beside, every_setting
+from .engine_tables import AT_ITS_BEST, beside, every_setting
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class EngineScene:
     beside, settings
         Each engine as installed beside its best setting, and every setting.
     points
-        Of the picture, coarse to fine: columns name (the engine with its version), kind (as installed, or at its best), setting,
+        Of the picture, coarse to fine: columns name (engine with version), kind (as installed, or at its best), setting,
         dt (s), error (rad), time (s per simulated second).
     """
 

@@ -109,7 +109,7 @@ def taken(row: EngineRow) -> str:
 
 
 def order(row: EngineRow) -> str | Cell:
-    """Return the order that was seen, marked where it is below the one expected, which is in brackets; or that there is none."""
+    """Return the order that was seen, marked where it is below the expected one, in brackets, or that there is none."""
     if math.isnan(row.expected_order):
         return DASH
     expected = f"({row.expected_order:.0f})"
