@@ -10,6 +10,8 @@ import math
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from conservative.method import Grid, grid_for
 from conservative.outcome import OK
 from conservative.references.environments.client import time_limit
@@ -90,9 +92,9 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
     counted = TURNS if case.scene.free else ()
     if isinstance(outcome, Failure):
         return case.blanks([*errors.blanks(case.scene), *blanks(*counted)], outcome.outcome)
-    found = [
-        case.row(value, OK, direction(value, outcome.trajectory)) for value in errors.measure_errors(outcome.trajectory, truth)
-    ]
+    with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+        values = errors.measure_errors(outcome.trajectory, truth)
+        found = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
     turns = (count_turns_over(outcome.trajectory), count_turns_over(truth)) if counted else ()
     return found + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
 

@@ -8,7 +8,7 @@ from itertools import groupby
 
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE
-from conservative.outcome import OutcomeKind
+from conservative.outcome import Outcome, OutcomeKind
 
 from .cells import DASH, SMALL, Cell, Grade, Row, Table, grade_drift, number, outcome_cell
 from .engine_rows import ERROR, USABLE, Drift, EngineRow
@@ -22,7 +22,8 @@ FAR_FROM_ORDER = 0.5
 TERMS = (
     (
         "taken",
-        "as installed: nothing set but the step; at its best: the smallest attitude error of all settings in this table.",
+        "as installed: nothing set but the step, – where its user has to choose a setting or no defaults are stated here; at its "
+        "best: the smallest error of all settings in this table.",
     ),
     ("bits", "of the engine's numbers: 64 double precision, 32 single."),
     ("error", "largest angle between attitude and truth over the run; of what chooses its steps, with its tolerance."),
@@ -37,8 +38,8 @@ TERMS = (
     ("µs a step", "wall time at the step of the scene, the fastest of interleaved rounds, taken inside the engine's process."),
     (
         f"µs per s at {ERROR:g} rad",
-        "wall time of a simulated second at this error, between two measured steps or tolerances interpolated log-log; – where no "
-        "measured run gets there.",
+        "wall time of a simulated second at this error, interpolated log-log between two measured steps or tolerances; – where "
+        "no measured run gets there.",
     ),
 )
 """What the columns say, in words."""
@@ -150,13 +151,12 @@ def beside(rows: Sequence[EngineRow]) -> Table:
 def _pair(engine: str, rows: Sequence[EngineRow]) -> Row:
     best = next(row for row in rows if row.best)
     installed = next((row for row in rows if row.as_installed), None)
-    nothing = ["no default: its user chooses", *[DASH] * 3]
-    return [engine, _integer(best.bits), *(_short(installed) if installed else nothing), *_short(best)]
+    return [engine, _integer(best.bits), *(_short(installed) if installed else [DASH] * 4), *_short(best)]
 
 
 def _short(row: EngineRow) -> list[str | Cell]:
     if math.isnan(row.error):
-        return [_setting(row), _with_reason(row), DASH, DASH]
+        return [_setting(row), outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
     return [_setting(row), number(row.error), drift(row.energy), turns(row)]
 
 
