@@ -22,7 +22,7 @@ FAR_FROM_ORDER = 0.5
 TERMS = (
     (
         "taken",
-        "as installed: nothing set but the step, – where its user has to choose a setting or no defaults are stated here; at its "
+        "as installed: nothing set but the step, – where its user has to choose a setting or no defaults are stated; at its "
         "best: the smallest error of all settings in this table.",
     ),
     ("bits", "of the engine's numbers: 64 double precision, 32 single."),
