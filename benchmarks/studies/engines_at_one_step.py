@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from conservative.method import Grid, grid_for
-from conservative.outcome import OK
+from conservative.outcome import OK, Outcome
 from conservative.references.environments.client import time_limit
 from conservative.trajectory import Trajectory
 
@@ -48,7 +48,6 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for j, method in enumerate(methods):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, grid)
-            yield from facts(case)
             timed = yield from measure(study, case, truth)
             if timed is not None:
                 ready[method.name] = timed
@@ -56,20 +55,22 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         yield from time_rows(study, ready)
 
 
-def facts(case: Case) -> list[Measurement]:
-    """Return what is known of an engine before any run: bits of its numbers, and the order that it claims, nan without one."""
+def facts(case: Case, outcome: Outcome) -> list[Measurement]:
+    """Return what is known of an engine, however its run ended: bits of its numbers, and the order that is expected, or nan."""
     method = case.method
     if isinstance(method, Missing):
         return []
     bits = float(getattr(method, "precision", "f64").removeprefix("f"))
-    detail = AS_INSTALLED if is_as_installed(method) else ""
     order = math.nan if method.order is None else float(method.order)
-    return [case.row(Value(Measure.PRECISION, bits), OK, detail), case.row(Value(Measure.ORDER_EXPECTED, order), OK, detail)]
+    detail = AS_INSTALLED if is_as_installed(method) else ""
+    known = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
+    return [case.row(value, outcome, detail) for value in known]
 
 
 def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, TimedRun | None]:
     """Yield the rows of one engine but for its times; return the run to be timed, None where there is none."""
     outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
+    yield from facts(case, outcome.outcome if isinstance(outcome, Failure) else OK)
     yield from accuracy(case, outcome, truth)
     if isinstance(outcome, Failure):
         yield from case.blanks(blanks(*MEASURES), outcome.outcome)
