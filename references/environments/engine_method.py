@@ -7,7 +7,7 @@ import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter_ns
 from typing import Any, ClassVar
@@ -100,13 +100,14 @@ class EngineMethod(Method):
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
         environment, axes = self.environment, principal_axes(scene)
         given = {"adapter": str(_inside(type(self))), "settings": self._settings(), **describe(axes, grid)}
-        run = WorkerRun(worker_of(environment, self.variables), given, Samples(axes, grid, self.label))
+        samples = Samples(axes, grid, self.label)
+        run = WorkerRun(worker_of(environment, self.variables), given, samples)
         try:
             run.prepare()
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} has: {error}") from None
-        except IntegrationFailed:
-            return run  # which fails again when it is called, and then says so in its trajectory
+        except IntegrationFailed as failure:
+            return partial(samples.failure, failure)
         return run
 
     def _settings(self) -> dict[str, Any]:

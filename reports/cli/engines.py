@@ -38,21 +38,28 @@ def engines() -> None:
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @find_links_option
 @allow_build_option
-def install(names: tuple[str, ...], find_links: Path | None, allow_build: bool) -> None:
-    """Make the environment of each NAME, by default of its newest version, unless it is there."""
+@click.pass_context
+def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool) -> None:
+    """Make the environment of each NAME, by default of its newest version, unless it is there.
+
+    The exit code is 1 if an engine was installed but cannot be imported.
+    """
     _require()
     from conservative.references.environments.install import check, install
 
     source = _source(find_links, allow_build)
     for name in names:
         check(name)  # all of them, before the first takes minutes
+    trouble = False
     for name in names:
+        click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
         done = install(name, source)  # type: ignore[arg-type]
-        found = done.environment
+        found, trouble = done.environment, trouble or bool(done.trouble)
         click.echo(
             f"{found.engine}=={found.version}: {'installed' if done.new else 'was there'}, {len(found.packages)} packages, "
             f"Python {found.python}" + (f"; cannot be imported: {done.trouble}" if done.trouble else "")
         )
+    ctx.exit(int(trouble))
 
 
 @engines.command("list", short_help="Show them.", epilog=epilog("conservative engines list --json"))
