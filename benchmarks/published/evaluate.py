@@ -10,7 +10,7 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.errors import BadInput, IntegrationFailed, MissingEngine, Unsupported
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.method import Method, Role
 from conservative.references.environments.environment import list_environments
 
@@ -163,7 +163,7 @@ def _measure(figure: Figure, method: Method | None) -> tuple[Array | None, str]:
     try:
         other = registry.method(figure.other) if figure.other else None
         return _run(quantity, Runs(scene, method, figure.dt, other)), ""
-    except Unsupported as error:
+    except BadInput as error:  # what it does not support, or a step that is too long for it
         return None, str(error)
     except IntegrationFailed as failure:
         return None, f"the run {failure.outcome}"
