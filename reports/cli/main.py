@@ -20,6 +20,7 @@ from .published import published
 from .recommend import recommend
 from .report import report
 from .run import run
+from .track import track
 
 
 class _UserError(click.ClickException):
@@ -93,5 +94,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new, engines, published):
+for command in (report, run, list_all, recommend, gate, new, engines, track, published):
     main.add_command(command)
