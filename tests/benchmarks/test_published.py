@@ -1,5 +1,6 @@
 """Published figures: the data file, the verdicts, what is measured, and that a wrong figure is found."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +36,15 @@ def test_there_are_figures_enough_each_with_its_source():
         assert each.values, each.name
         assert each.allowed > 0, each.name
         assert each.cannot or each.quantity in QUANTITIES, each.name
+
+
+@pytest.mark.parametrize("name", sorted({name for each in FIGURES for name in (each.method, each.other)} - {"", "truth"}))
+def test_every_method_is_a_setting_of_its_engine(name):
+    family = name.partition(":")[0].partition("@")[0]
+    if family not in {*cv.registry.list_engines(), *cv.registry.list_methods()}:
+        pytest.skip(f"there is no adapter for {family}")
+    with contextlib.suppress(cv.MissingEngine):
+        cv.registry.method(name)
 
 
 def test_every_quantity_is_of_a_figure():
