@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from conservative.check import choice
+from conservative.method import Method
 
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
