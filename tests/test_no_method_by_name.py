@@ -38,6 +38,7 @@ ALLOWED = {
     "benchmarks/verification/interrupts.py": ("scipy", "a run that stays in Python for long"),
     "benchmarks/verification/kills.py": ("moser_veselov", "the method of the report that is killed"),
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
+    "benchmarks/verification/third_truth.py": ("exact precise", "the solution that is compared, and who decides"),
     "reports/documentation/readme_pictures.py": (
         "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy",
         "what the pages picture",
