@@ -23,6 +23,16 @@ class FilePath(click.Path):
         return Path(str(value))
 
 
+find_links_option = click.option(
+    "--find-links",
+    type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
+    help="Folder of wheels to take everything from, without a network.",
+)
+allow_build_option = click.option(
+    "--allow-build", is_flag=True, help="Run a package's own code to build it, where it has no wheel."
+)
+
+
 def epilog(*examples: str) -> str:
     """Return what every --help ends with; a backspace on a line of its own keeps click from joining the lines after it."""
     return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])

@@ -1,0 +1,73 @@
+"""Brax: its three pipelines on one free body, in JAX. Source: its README, https://github.com/google/brax, and its source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+PIPELINES = ("generalized", "positional", "spring")
+
+
+@dataclass(frozen=True)
+class Brax(EngineMethod):
+    """Brax on a free joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+
+    Nothing had to be switched off: damping (`ang_damping`, `vel_damping`) and scaling of inertia (`spring_inertia_scale`) are 0
+    by default (https://github.com/google/brax/blob/main/brax/io/mjcf.py). "spring" and "positional" have no gyroscopic term for
+    a body in itself (`integrate_xdd` in https://github.com/google/brax/blob/main/brax/spring/integrator.py,
+    https://github.com/google/brax/blob/main/brax/positional/integrator.py): the body turns about the axis that it starts with.
+    Its joints have no ball joint at a fixed point.
+
+    Parameters
+    ----------
+    pipeline
+        "generalized", "positional" or "spring".
+    precision
+        "f64" (JAX's `x64`) or "f32", which is JAX's default
+        (https://docs.jax.dev/en/latest/default_dtypes.html).
+
+    Raises
+    ------
+    BadInput
+        The pipeline or the precision is unknown.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    pipeline: str = "generalized"
+    precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
+
+    family: ClassVar[str] = "brax"
+    distribution: ClassVar[Distribution] = Distribution("brax", "brax", oldest="0.14")
+
+    def __post_init__(self) -> None:
+        choice("pipeline", self.pipeline, PIPELINES)
+        choice("precision", self.precision, ("f64", "f32"))
+        super().__post_init__()
+
+    @property
+    def variables(self) -> Mapping[str, str]:
+        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
+
+    @property
+    def setting(self) -> str:
+        return self.pipeline
+
+    @property
+    def order(self) -> int:
+        return 1
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls(precision="f32")
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return cls("generalized"), cls("positional"), cls("spring"), cls("generalized", "f32")

@@ -1,0 +1,65 @@
+"""MuJoCo Warp in its environment. Source: MuJoCo's documentation, MuJoCo Warp; Warp's, Graphs (`ScopedCapture`)."""
+
+from functools import partial
+
+import numpy as np
+
+
+def prepare(given):
+    """Return a run on a free joint, or on a ball joint at the fixed point.
+
+    A step is recorded once and then replayed, as MuJoCo Warp's documentation advises: from Python it takes a hundred times as
+    long. Kernels are compiled here, once in the life of an environment, which takes a minute or two.
+    """
+    import mujoco
+    import mujoco_warp
+    import warp
+
+    warp.config.quiet = True
+    with warp.ScopedDevice("cpu"):
+        host = _model(mujoco, given)
+        model, data = mujoco_warp.put_model(host), mujoco_warp.make_data(host)
+        mujoco_warp.step(model, data)
+        step = _record(warp, partial(mujoco_warp.step, model, data))
+    qpos, qvel = data.qpos.numpy()[0], data.qvel.numpy()[0]  # views of what the engine computes with
+
+    def run():
+        qpos[:-4], qpos[-4:], qvel[:-3], qvel[-3:] = 0, given.q0, 0, given.w0
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                step()
+            q[sample], w[sample] = qpos[-4:], qvel[-3:]
+        return {"q": q, "w": w}
+
+    run.data = data  # what owns the views
+    return run
+
+
+def _record(warp, step):
+    """Return what replays a step; the step itself, where a version of Warp records none on the CPU."""
+    try:
+        with warp.ScopedCapture() as capture:
+            step()
+    except RuntimeError:
+        return step
+    return partial(warp.capture_launch, capture.graph)
+
+
+def _model(mujoco, given):
+    """Return MuJoCo's model: the inertia about the centre of mass, in that inertia's own principal axes."""
+    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
+    moments = np.minimum(given.moments_com, np.roll(given.moments_com, 1) + np.roll(given.moments_com, 2))
+    inertial = {"pos": given.com, "quat": given.q_com, "diaginertia": moments}
+    attributes = " ".join(f'{name}="{" ".join(map(repr, value.tolist()))}"' for name, value in inertial.items())
+    return mujoco.MjModel.from_xml_string(f"""
+        <mujoco>
+          <option gravity="0 0 {-given.gravity!r}" integrator="{given.integrator}" timestep="{given.dt!r}">
+            <flag contact="disable" constraint="disable"/>
+          </option>
+          <worldbody>
+            <body>
+              <joint type="{"free" if given.free else "ball"}"/><inertial mass="{given.mass!r}" {attributes}/>
+            </body>
+          </worldbody>
+        </mujoco>""")

@@ -1,0 +1,72 @@
+"""JaxSim: its integrators on one free body, in JAX. Source: its documentation, https://jaxsim.readthedocs.io."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+ORDERS = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
+
+
+@dataclass(frozen=True)
+class JaxSim(EngineMethod):
+    """JaxSim on a floating base, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+
+    Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none
+    (https://jaxsim.readthedocs.io/en/latest/modules/api.html). `RungeKutta4Fast` needs points of contact, without which it
+    raises (https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py). One of the packages that it needs,
+    pptree, has no wheel: `conservative engines install jaxsim --allow-build`.
+
+    Parameters
+    ----------
+    integrator
+        "SemiImplicitEuler", which is JaxSim's default, or "RungeKutta4".
+    precision
+        "f64", which is JaxSim's default, or "f32", which it calls experimental
+        (https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py).
+
+    Raises
+    ------
+    BadInput
+        The integrator or the precision is unknown.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    integrator: str = "RungeKutta4"
+    precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
+
+    family: ClassVar[str] = "jaxsim"
+    distribution: ClassVar[Distribution] = Distribution("jaxsim", "jaxsim", oldest="0.9")
+
+    def __post_init__(self) -> None:
+        choice("integrator", self.integrator, tuple(ORDERS))
+        choice("precision", self.precision, ("f64", "f32"))
+        super().__post_init__()
+
+    @property
+    def variables(self) -> Mapping[str, str]:
+        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
+
+    @property
+    def setting(self) -> str:
+        return self.integrator
+
+    @property
+    def order(self) -> int:
+        return ORDERS[self.integrator]
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("SemiImplicitEuler")
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return cls("SemiImplicitEuler"), cls("RungeKutta4"), cls("RungeKutta4", "f32")

@@ -1,0 +1,67 @@
+"""MuJoCo Warp: MuJoCo's integrators in Warp, in single precision. Source: MuJoCo's documentation, MuJoCo Warp.
+
+https://mujoco.readthedocs.io/en/stable/mjwarp/index.html
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+INTEGRATORS = ("Euler", "RK4", "implicitfast")
+
+
+@dataclass(frozen=True)
+class MJWarp(EngineMethod):
+    """MuJoCo Warp on the CPU, in single precision, on a free joint or a ball joint at the fixed point.
+
+    Switched off: contacts and constraints (`option/flag`, https://mujoco.readthedocs.io/en/stable/XMLreference.html#option-flag).
+    It launches a few dozen kernels a step from Python, which takes nearly all of the time: on a GPU, with thousands of worlds
+    at once, it is another thing.
+
+    Parameters
+    ----------
+    integrator
+        "Euler", "RK4" or "implicitfast"
+        (https://mujoco.readthedocs.io/en/stable/computation/index.html#numerical-integration).
+
+    Raises
+    ------
+    BadInput
+        The integrator is unknown.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    integrator: str = "RK4"
+
+    family: ClassVar[str] = "mjwarp"
+    precision: ClassVar[str] = "f32"
+    distribution: ClassVar[Distribution] = Distribution("mujoco-warp", "mujoco_warp", oldest="3.10")
+    takes_gravity: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        choice("integrator", self.integrator, INTEGRATORS)
+        super().__post_init__()
+
+    @property
+    def setting(self) -> str:
+        return self.integrator
+
+    @property
+    def order(self) -> int:
+        return 4 if self.integrator == "RK4" else 1
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("Euler")
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return tuple(cls(integrator) for integrator in INTEGRATORS)

@@ -1,0 +1,78 @@
+"""Newton: its solvers on one free body, in single precision. Source: its documentation, Solvers.
+
+https://newton-physics.github.io/newton/stable/api/newton_solvers.html
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.check import choice
+from conservative.errors import BadInput
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+ORDERS = {
+    **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
+    **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
+}
+
+
+@dataclass(frozen=True)
+class Newton(EngineMethod):
+    """Newton on the CPU, in single precision, with one of its solvers on a free joint.
+
+    Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default
+    (https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html), and contacts of
+    `SolverMuJoCo`. Where Warp can record a step, it is recorded once and then replayed; from Python a step takes a hundred
+    times as long. VBD and Kamino are stepped from Python, as what they keep from step to step is lost in a record. Kernels are
+    compiled when a run is prepared, once in the life of an environment: that takes from one to four minutes for each solver.
+
+    Parameters
+    ----------
+    solver
+        "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an
+        integrator: "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
+    as_installed
+        Whether Newton's own defaults stay: damping and contacts.
+
+    Raises
+    ------
+    BadInput
+        The solver is unknown, or as_installed neither True nor False.
+    MissingEngine
+        It is not installed: no environment has it.
+    """
+
+    solver: str = "MuJoCo_rk4"
+    as_installed: bool = False
+
+    family: ClassVar[str] = "newton"
+    precision: ClassVar[str] = "f32"
+    # Versions before 1.8 build and step models in other ways. Bare `newton` lacks MuJoCo.
+    distribution: ClassVar[Distribution] = Distribution("newton[sim]", "newton", oldest="1.8")
+
+    def __post_init__(self) -> None:
+        choice("solver", self.solver, tuple(ORDERS))
+        if not isinstance(self.as_installed, bool):
+            raise BadInput("as_installed", repr(self.as_installed), "True or False")
+        super().__post_init__()
+
+    @property
+    def setting(self) -> str:
+        return self.solver + ",as installed" * self.as_installed
+
+    @property
+    def order(self) -> int:
+        return ORDERS[self.solver]
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("SemiImplicit", as_installed=True)
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return (*(cls(solver) for solver in ORDERS), cls("SemiImplicit", as_installed=True))
