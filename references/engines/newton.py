@@ -27,8 +27,10 @@ class Newton(EngineMethod):
 
     Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default
     (https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html), and contacts of
-    `SolverMuJoCo`. Where Warp can record a step, it is recorded once and then replayed; from Python a step takes a hundred
-    times as long. VBD and Kamino are stepped from Python, as what they keep from step to step is lost in a record. Kernels are
+    `SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as Newton's example `basic_dzhanibekov` has it: thirty
+    times as fast as its default here, with the same motion. A step is recorded by Warp once and then replayed; from Python it
+    takes a hundred times as long. `SolverVBD` alone is stepped from Python, as a record loses what it keeps from step to step,
+    and with it all motion. Kernels are
     compiled when a run is prepared, once in the life of an environment: that takes from one to four minutes for each solver.
 
     Parameters
@@ -37,7 +39,7 @@ class Newton(EngineMethod):
         "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an
         integrator: "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
     as_installed
-        Whether Newton's own defaults stay: damping and contacts.
+        Whether Newton's own defaults stay: damping, contacts, the solver inside Kamino.
 
     Raises
     ------
