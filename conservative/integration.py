@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from . import registry
 from .check import choice, describe, positive_integer, positive_number
 from .errors import BadInput, Unsupported
 from .method import Method, grid_for
@@ -26,7 +27,7 @@ def require_support(method: Method, scene: Scene) -> None:
 def integrate(
     scene: Scene,
     dt: float | None = None,
-    method: Method | None = None,
+    method: Method | str | None = None,
     t_end: float | None = None,
     sample_every: int = 1,
     *,
@@ -42,7 +43,7 @@ def integrate(
     dt
         Step, s, by default 0.01. For adaptive methods, and with `error`, the distance of samples.
     method
-        Default `Reduced()`, the paper's map in three unknowns.
+        A method, or its name, as everywhere: `"mujoco@3.6.0:RK4"`. Default `Reduced()`, the paper's map in three unknowns.
     t_end
         Duration, s; default the scene's. The run ends with the first step at or past it.
     sample_every
@@ -58,6 +59,8 @@ def integrate(
     ------
     BadInput
         An argument cannot be used, the steps do not fit in memory or are too many, or the method has no step of that length.
+    MissingEngine
+        A method of that name needs an engine that is not installed.
     Unsupported
         The method cannot do the scene.
     NotConverged
@@ -93,18 +96,20 @@ def _interrupt_of(failure: SystemError) -> BaseException:
 
 
 def _integrate_with(
-    method: Method | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int
+    method: Method | str | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int
 ) -> Trajectory:
+    if isinstance(method, str):
+        method = registry.method(method)
     method = Reduced() if method is None else method
     if not isinstance(method, Method):
-        raise BadInput("method", describe(method), "a Method, such as Reduced() or conservative.registry.method('mujoco:RK4')")
+        raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
     grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
     require_support(method, scene)
     return method.solve(scene, grid)
 
 
 def _integrate_to(
-    error: float, scene: Scene, dt: float | None, method: Method | None, t_end: float | None, sample_every: int
+    error: float, scene: Scene, dt: float | None, method: Method | str | None, t_end: float | None, sample_every: int
 ) -> Trajectory:
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:

@@ -194,7 +194,8 @@ def _solver(
 
     def solve(t: Reals, scene: Scene | None) -> tuple[str, int, Reals]:
         with integrators.borrow() as integrator:
-            integrator.pars[:] = parameters
+            # Parameters at the end that equations have no use for (a spring's at the pivot, say) are not stored.
+            integrator.pars[:] = parameters[: len(integrator.pars)]
             integrator.time, integrator.state[:] = _real(0, bits), start
             reason = pace_reason(scene, integrator, float(t[-1])) if scene else ""
             integrator.time, integrator.state[:] = _real(0, bits), start

@@ -11,7 +11,7 @@ from typing import Any
 from conservative import files
 from conservative.errors import BadInput
 
-from .page import markdown, page, scene_charts
+from .page import engines, markdown, page, scene_charts
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
@@ -38,12 +38,13 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     """
     source = provenance()  # before any work: files, and the commit, can change while that goes on
     progress = checkpoint.begin(plan, out, source, resume)
+    source = replace(source, resumed=progress.describe_earlier(), environments=plan.locks)
     tell(progress.summary)
     spans = plan.spans(name for name in plan.names if name not in progress.results)
     try:
         with report_folder(out) as folder:
             measurements = measure(plan, step, progress)
-            view = build(plan, measurements, replace(source, resumed=progress.describe_earlier()))
+            view = build(plan, measurements, source)
             render(view, folder, plan.png, lambda what: step(spans[what][0], what))
     except BaseException as error:
         if progress.results or not isinstance(error, BadInput):
@@ -58,10 +59,11 @@ def render(view: View, folder: Path, png: bool, announce: Callable[[str], None])
     """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
     announce("pictures")
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
-    text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
+    of_engines = engines.charts(view.engines)
+    text = markdown.render(view, charts, of_engines, lambda name, chart: draw(chart, folder / name, png))
     files.write_text(folder / "report.md", text, "out")
     announce("page")
-    files.write_text(folder / "index.html", page.render(view, charts), "out")
+    files.write_text(folder / "index.html", page.render(view, charts, of_engines), "out")
     files.write_text(folder / "measurements.csv", view.table.to_csv(index=False, lineterminator="\n"), "out")
     names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
     files.write_text(folder / MANIFEST, manifest(view, names), "out")

@@ -9,6 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import sphere_curves
+from conservative.benchmarks.studies.studies import ENGINES
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -16,7 +17,20 @@ from .labels import with_names
 from .run.measure import Measurements
 from .run.plan import Plan
 from .run.provenance import Provenance
-from .tables import claims, hard_cases, headline, lines, orders, overview, paper, runs, scene, work_precision
+from .tables import (
+    claims,
+    engine_scenes,
+    engine_tables,
+    hard_cases,
+    headline,
+    lines,
+    orders,
+    overview,
+    paper,
+    runs,
+    scene,
+    work_precision,
+)
 from .tables.cells import Table
 
 
@@ -94,6 +108,8 @@ class View:
         What of ours failed at the steps of the paper, one line each.
     hard_cases, stability
         None where the report has no such study.
+    engines, versions
+        What the studies of engines found on each scene, empty without them, and the version of each engine in them.
     """
 
     source: Provenance
@@ -111,11 +127,15 @@ class View:
     truths: Table
     failures: Table
     unsupported: Table
+    engines: tuple[engine_scenes.EngineScene, ...]
+    versions: Table
 
 
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     """Return the view of measurements; every number that a report shows is computed here, and once."""
-    table, samples = with_names(measurements.table), with_names(measurements.samples)
+    every, samples = with_names(measurements.table), with_names(measurements.samples)
+    of_engines = every["study"].isin(ENGINES)
+    table = every[~of_engines].reset_index(drop=True)
     builder = _Builder.of(table, samples, plan.methods)
     return View(
         source=source,
@@ -133,7 +153,17 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         truths=runs.truths(table),
         failures=runs.failures(table),
         unsupported=runs.unsupported(table),
+        engines=engine_scenes.engine_scenes(every[of_engines], plan.scenes) if plan.engines else (),
+        versions=_versions(plan, source),
     )
+
+
+def _versions(plan: Plan, source: Provenance) -> Table:
+    """Return the versions of the engines that are named for their own studies: in environments, and beside us."""
+    apart = {lock.name for lock in source.environments}
+    makers = dict.fromkeys(method.label.partition("/")[0] for method in plan.engines if "/" in method.label)
+    locks = [(lock.name, lock.python, len(lock.packages)) for lock in source.environments if lock.name in makers]
+    return engine_tables.versions(locks, [name for name in makers if name not in apart])
 
 
 def _paper(table: pd.DataFrame, samples: pd.DataFrame) -> PaperView:

@@ -25,6 +25,9 @@ BEND, CALMER = 0.05, 1.1
 
 Dropping a point of a bend lessens the scatter; dropping one of noise does not."""
 
+GROWTH, NO_ROUND_OFF = 3.0, 1e-9
+"""Factor, and size, from which on an error at the shortest step has grown, and not by round-off of double precision alone."""
+
 
 @dataclass(frozen=True)
 class Order:
@@ -100,6 +103,19 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
 
 def _none(floor: float, reason: str) -> Order:
     return Order(float("nan"), float("nan"), (), floor, reason)
+
+
+def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
+    """Return whether the error at the shortest step is more than `GROWTH` times the smallest one, and no round-off.
+
+    Parameters and what is raised are those of `observed_order`.
+    """
+    h, e = check_points(steps, errors)
+    known = np.isfinite(e)
+    if np.count_nonzero(known) < MIN_POINTS:
+        return False
+    last = e[known][np.argmin(h[known])]
+    return bool(last > max(GROWTH * e[known].min(), NO_ROUND_OFF))
 
 
 def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
 
 from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
@@ -28,12 +30,17 @@ class Case:
     method: Method
     grid: Grid
 
+    @cached_property
+    def _names(self) -> dict[str, Any]:
+        """The names of the method, looked up once: the version of an engine can be in a file."""
+        return asdict(names_of(self.method))
+
     def row(self, value: Value, outcome: Outcome = OK, detail: str = "") -> Measurement:
         """Return one row."""
         return Measurement(
             study=self.study,
             scene=self.scene.name,
-            **asdict(names_of(self.method)),
+            **self._names,
             role=Role(self.method.role),
             dt=self.grid.dt,
             quantity=value.quantity,
@@ -48,7 +55,7 @@ class Case:
         return Samples(
             study=self.study,
             scene=self.scene.name,
-            **asdict(names_of(self.method)),
+            **self._names,
             role=Role(self.method.role),
             dt=self.grid.dt,
             quantity=quantity,

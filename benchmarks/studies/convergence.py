@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
@@ -76,7 +76,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
         yield from fit(cases[0], measure, found[measure])
 
 
-def attempt_each(study: Study, cases: list[Case]) -> Iterator[tuple[Case, Success | Failure]]:
+def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Success | Failure]]:
     """Yield the outcome of each case, coarse to fine; what there is no time for is skipped and says so.
 
     A slow method gets fewer points: the coarsest `FEWEST_POINTS`, where all together fit into its time, and of finer ones those

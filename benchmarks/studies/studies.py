@@ -16,6 +16,8 @@ from conservative.scene import Scene
 from ..measures.measurement import Measurement
 from . import (
     convergence,
+    engines_at_one_step,
+    engines_over_steps,
     hard_cases,
     import_time,
     long_runs,
@@ -38,13 +40,17 @@ MAKERS: Mapping[str, Maker] = {
     "sphere_curves": sphere_curves.findings,
     "paper_figures": paper_figures.findings,
     "import_time": import_time.findings,
+    "engines_at_one_step": engines_at_one_step.findings,
+    "engines_over_steps": engines_over_steps.findings,
     "stability": stability.findings,
     "hard_cases": hard_cases.findings,
 }
 """What makes each study, by its name, which is that of its file."""
 HARD = ("stability", "hard_cases")
 """Studies of the hard cases: of scenes chosen for it, and of every registered scene."""
-CROSSED = tuple(name for name in MAKERS if name not in HARD)
+ENGINES = ("engines_at_one_step", "engines_over_steps")
+"""Studies of the scenes that are chosen, and of engines alone."""
+CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES))
 """Studies of the scenes and methods that are chosen."""
 
 
@@ -58,6 +64,18 @@ def cross_studies(
     """Return the studies of the same scenes and methods, in the order of `CROSSED`; they share their truths."""
     truths = Truths()
     return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in CROSSED)
+
+
+def list_engine_studies(
+    scenes: tuple[Scene, ...],
+    engines: tuple[Method, ...],
+    quick: bool = False,
+    skip_missing: bool = False,
+    time_limit: float | None = None,
+) -> tuple[Study, ...]:
+    """Return the studies of engines (see `engine_selection.select_engines`) on some scenes; they share their truths."""
+    truths = Truths()
+    return tuple(Study(name, scenes, engines, quick, skip_missing, truths, time_limit) for name in ENGINES)
 
 
 def list_hard_studies(

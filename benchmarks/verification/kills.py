@@ -13,7 +13,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -76,7 +76,12 @@ def rows(folder: Path) -> list[tuple[str, ...]]:
     """Return the rows of a report, without times."""
     with (folder / "report" / "measurements.csv").open(encoding="utf-8", newline="") as stream:
         found = list(csv.DictReader(stream))
-    return [tuple(row[name] for name in (SAME if row["unit"] in TIMES else row)) for row in found]
+    return [tuple(row[name] for name in (*SAME, *_values(row))) for row in found]
+
+
+def _values(row: Mapping[str, str]) -> list[str]:
+    """Return the columns in which a row is the same again, beside `SAME`: none of a row with a time."""
+    return [] if row["unit"] in TIMES else [name for name in row if name not in SAME]
 
 
 def _resume(folder: Path) -> list[str]:

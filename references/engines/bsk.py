@@ -35,6 +35,11 @@ class Basilisk(EngineMethod):
         The integrator is unknown, or the tolerance out of range.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Spacecraft and its hub: https://avslab.github.io/basilisk/Documentation/simulation/dynamics/spacecraft/spacecraft.html
+    Integrators: https://github.com/AVSLab/basilisk/tree/develop/src/simulation/dynamics/Integrators
     """
 
     integrator: str = "RK4"
@@ -42,6 +47,7 @@ class Basilisk(EngineMethod):
 
     family: ClassVar[str] = "bsk"
     distribution: ClassVar[Distribution] = Distribution("bsk", "Basilisk.simulation.spacecraft", oldest="2.8")
+    free_only: ClassVar[str] = "a spacecraft is free: nothing in Basilisk holds a point of its hub"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, tuple(ORDERS))
@@ -56,6 +62,10 @@ class Basilisk(EngineMethod):
     @property
     def order(self) -> int | None:
         return ORDERS[self.integrator]
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("RK4")
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:

@@ -33,12 +33,18 @@ class Diffrax(EngineMethod):
         The solver is unknown, or the tolerance out of range.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Solvers: https://docs.kidger.site/diffrax/api/solvers/ode_solvers/
+    Choice of steps: https://docs.kidger.site/diffrax/api/stepsize_controller/
     """
 
     solver: str = "Tsit5"
     rtol: float = 0.0
 
     family: ClassVar[str] = "diffrax"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("diffrax", "diffrax", oldest="0.7")
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""MJX: MuJoCo's integrators in JAX, on one free body. Source: MuJoCo's documentation, MJX."""
+"""MJX: MuJoCo's integrators in JAX, on one body. Source: MuJoCo's documentation, MJX."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ INTEGRATORS = ("Euler", "RK4", "implicitfast")
 
 @dataclass(frozen=True)
 class MJX(EngineMethod):
-    """MJX on a free joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+    """MJX on a free joint or a ball joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
 
-    Switched off: contacts and constraints.
+    Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`).
 
     Parameters
     ----------
@@ -34,12 +34,19 @@ class MJX(EngineMethod):
         The integrator or the precision is unknown.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    MJX: https://mujoco.readthedocs.io/en/stable/mjx.html
+    Flags and integrators: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
+    x64: https://docs.jax.dev/en/latest/notebooks/Common_Gotchas_in_JAX.html#double-64bit-precision
     """
 
     integrator: str = "RK4"
     precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
 
     family: ClassVar[str] = "mjx"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
 
     def __post_init__(self) -> None:
@@ -58,6 +65,10 @@ class MJX(EngineMethod):
     @property
     def order(self) -> int:
         return 4 if self.integrator == "RK4" else 1
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("Euler", "f32")
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:

@@ -130,6 +130,10 @@ class MuJoCoVersion(EngineMethod):
         The integrator is unknown.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
     """
 
     integrator: str = "RK4"

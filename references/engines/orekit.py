@@ -17,10 +17,15 @@ class Orekit(EngineMethod):
     ------
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    TorqueFree: https://www.orekit.org/site-orekit-development/apidocs/org/orekit/attitudes/TorqueFree.html
     """
 
     family: ClassVar[str] = "orekit"
     distribution: ClassVar[Distribution] = Distribution("orekit-jpype", "orekit_jpype", oldest="13")
+    free_only: ClassVar[str] = "TorqueFree is the motion of a free body"
 
     @property
     def setting(self) -> str:

@@ -1,4 +1,4 @@
-"""PyBullet: one free body, in Bullet's reduced or maximal coordinates. Source: its quickstart guide."""
+"""PyBullet: one body, in Bullet's reduced or maximal coordinates. Source: its quickstart guide."""
 
 from __future__ import annotations
 
@@ -8,16 +8,22 @@ from typing import ClassVar
 from conservative.check import choice
 from conservative.errors import BadInput
 from conservative.method import Method
+from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, rate_limit_reason
+
+RATE_LIMIT = 100.0
+"""Rate, rad/s, that Bullet keeps a body below as installed (`maxJointVelocity`)."""
 
 
 @dataclass(frozen=True)
 class PyBullet(EngineMethod):
     """PyBullet in double precision, stepped from Python (`stepSimulation`), as it has no loop of its own.
 
-    Switched off: damping, sleeping, the limit of rates.
+    A body about a fixed point is the only link of a base that does not move, on a spherical joint, whose motor is off
+    (`setJointMotorControlMultiDof`, force 0). Switched off: damping (`linearDamping`, `angularDamping`, `jointDamping`),
+    sleeping (`ACTIVATION_STATE_DISABLE_SLEEPING`), the limit of rates (`maxJointVelocity`).
 
     Parameters
     ----------
@@ -32,12 +38,18 @@ class PyBullet(EngineMethod):
         The body is unknown, or as_installed neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControlMultiDof:
+    https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartguide.pdf
     """
 
     body: str = "multibody"
     as_installed: bool = False
 
     family: ClassVar[str] = "pybullet"
+    takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("pybullet", "pybullet", oldest="3.2.5")
 
     def __post_init__(self) -> None:
@@ -45,6 +57,11 @@ class PyBullet(EngineMethod):
         if not isinstance(self.as_installed, bool):
             raise BadInput("as_installed", repr(self.as_installed), "True or False")
         super().__post_init__()
+
+    def unsupported(self, scene: Scene) -> str | None:
+        if self.body == "maximal" and scene.potential is not None:
+            return "PyBullet has no joint to the world for a body in maximal coordinates"
+        return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
 
     @property
     def setting(self) -> str:

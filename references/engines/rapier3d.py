@@ -1,4 +1,4 @@
-"""Rapier: its impulse-based integration of one free body, in single precision. Source: its user guide, Rigid-bodies."""
+"""Rapier: its impulse-based integration of one body, in single precision. Source: its user guide, Rigid-bodies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from ..environments.engine_method import EngineMethod
 class Rapier(EngineMethod):
     """Rapier in single precision, stepped from Python, as it has no loop of its own.
 
-    Gyroscopic forces are on, which they are by default. Switched off: sleeping, and the limit of fast rotation.
+    A body about a fixed point is on a spherical impulse joint. Gyroscopic forces are on (`gyroscopic_forces`), which they are
+    by default, and there is no damping. Switched off: sleeping (`can_sleep`), and the limit of fast rotation
+    (`allow_fast_rotation`), which is an eighth of a turn in a substep.
 
     Parameters
     ----------
@@ -32,12 +34,19 @@ class Rapier(EngineMethod):
         substeps is not an integer of 1 or more, or as_installed neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Limit of fast rotation, substeps: https://rapier.rs/docs/user_guides/python/rigid_body_solver_settings
+    Sleeping, gyroscopic forces: https://rapier.rs/docs/user_guides/python/rigid_bodies
+    Joints: https://rapier.rs/docs/user_guides/python/joints
     """
 
     substeps: int = 4
     as_installed: bool = False
 
     family: ClassVar[str] = "rapier3d"
+    takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("rapier3d", "rapier3d", oldest="0.36")
 

@@ -1,4 +1,4 @@
-"""SAPIEN: PhysX on one free body, in single precision. Source: its API reference."""
+"""SAPIEN: PhysX on one body, in single precision. Source: its API reference."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from typing import ClassVar
 
 from conservative.errors import BadInput
 from conservative.method import Method
+from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, rate_limit_reason
+
+RATE_LIMIT = 100.0
+"""Rate, rad/s, that PhysX keeps a body below as installed (`max_angular_velocity`)."""
 
 
 @dataclass(frozen=True)
 class Sapien(EngineMethod):
     """PhysX on the CPU, as SAPIEN has it, in single precision and stepped from Python (`system.step`).
 
-    Switched off: damping, sleeping, the limit of 100 rad/s.
+    A body about a fixed point is on a D6 joint (`PhysxDriveComponent`) with its translations locked. Switched off: damping,
+    which is 0.05 1/s (`angular_damping`), sleeping (`sleep_threshold`), the limit of 100 rad/s (`max_angular_velocity`).
 
     Parameters
     ----------
@@ -29,11 +34,18 @@ class Sapien(EngineMethod):
         as_installed is neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    PhysX, damping, limit of rates, sleeping: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/RigidBodyDynamics.html
+    D6 joint: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/Joints.html
+    SAPIEN: https://sapien-sim.github.io/docs/
     """
 
     as_installed: bool = False
 
     family: ClassVar[str] = "sapien"
+    takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("sapien", "sapien", oldest="3.0")
 
@@ -41,6 +53,9 @@ class Sapien(EngineMethod):
         if not isinstance(self.as_installed, bool):
             raise BadInput("as_installed", repr(self.as_installed), "True or False")
         super().__post_init__()
+
+    def unsupported(self, scene: Scene) -> str | None:
+        return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
 
     @property
     def setting(self) -> str:

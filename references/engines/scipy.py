@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion
+from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.units import in_own_units
-from conservative.potentials.potential import torque_W
+from conservative.potentials.potential import Potential, torque_W
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import Axes, limit_reason, load, principal_axes, version
+from ..heyoka_equations.accelerations import READERS, FieldInAxes, express_field
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
 
 Derivative = Callable[[float, Array], list[float]]
-Torque = Callable[[float, float, float, float], tuple[float, float, float]]
+Acceleration = Callable[[float, float, float, float], Sequence[float]]
+"""Takes the quaternion to what the field adds to the rates' derivatives, rad/s^2, axes F."""
 
 
 @dataclass(frozen=True)
 class SciPy(Method):
     """`scipy.integrate.solve_ivp` with its own step control; dt is only the distance of samples.
 
-    The state is the quaternion of `R_WF`, scalar first, and the rates in principal axes F. Samples come from the integrator's
-    interpolant, whose error is that of the steps. Any potential works, through its gradient; uniform gravity is written out.
+    The state is the quaternion, scalar first, of principal axes F in world axes whose third is the field's, and the rates in F.
+    Samples come from the integrator's interpolant, whose error is that of the steps. This package's fields are written out;
+    any other potential works as well, through its gradient.
 
     Parameters
     ----------
@@ -72,9 +75,9 @@ class SciPy(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
-        axes = principal_axes(scene)
-        derivative = _derivative(axes)
-        start = np.concatenate([axes.q0, axes.w0])
+        axes, R_WD, acceleration = _express(scene)
+        derivative = _derivative(axes, acceleration)
+        start = np.concatenate([to_quaternion(R_WD.T @ axes.R_WF0), axes.w0])
         atol = self.rtol * np.repeat([1.0, _rate_scale(axes)], [4, 3])
         span = (0.0, float(grid.t[-1]))
 
@@ -83,17 +86,17 @@ class SciPy(Method):
         def run() -> Trajectory:
             solver.steps = 0
             if not np.isfinite(derivative(0.0, start)).all():  # SciPy would look for a first step for ever
-                return axes.trajectory(grid, self.label, from_quaternion(start[None, :4]), start[None, 4:], Counters(0))
+                return finish(start[None], Counters(0))
             try:
                 with np.errstate(all="ignore"):  # a diverging run is reported by its status
                     found = integrate.solve_ivp(derivative, span, start, solver, grid.t, rtol=self.rtol, atol=atol)
             except (ArithmeticError, ValueError) as error:  # implicit solvers refuse matrices that are not finite or singular
-                return axes.trajectory(
-                    grid, self.label, from_quaternion(start[None, :4]), start[None, 4:], Counters(solver.steps), str(error)
-                )
+                return finish(start[None], Counters(solver.steps), str(error))
             y = np.reshape(found.y, (7, -1))  # SciPy has an empty list where the first step failed
-            work = Counters(solver.steps, evaluations=int(found.nfev))
-            return axes.trajectory(grid, self.label, from_quaternion(y[:4].T), y[4:].T, work, found.message)
+            return finish(y.T, Counters(solver.steps, evaluations=int(found.nfev)), found.message)
+
+        def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
+            return axes.trajectory(grid, self.label, R_WD @ from_quaternion(y[:, :4]), y[:, 4:], work, *reason)
 
         return run
 
@@ -126,11 +129,23 @@ def _rate_scale(axes: Axes) -> float:
     return float(np.sqrt(2 * axes.scene.energy_scale / axes.J.max()))
 
 
-def _derivative(axes: Axes) -> Derivative:
+def _express(scene: Scene) -> tuple[Axes, Array, Acceleration | None]:
+    """Return principal axes F, world axes D (3, 3) with the field's as the third, and the field as a function of F in D."""
+    axes, potential = principal_axes(scene), scene.potential
+    if potential is None:
+        return axes, np.eye(3), None
+    if isinstance(potential, UniformGravity):
+        return axes, np.eye(3), _uniform(axes)
+    if type(potential) in READERS:
+        field = express_field(scene)
+        return field.axes, field.R_WD, _written_out(field)
+    return axes, np.eye(3), _general(potential, axes)
+
+
+def _derivative(axes: Axes, acceleration: Acceleration | None) -> Derivative:
     """Return Euler's equations and q' = q w / 2 in plain floats: arrays of three cost more than their arithmetic."""
     J1, J2, J3 = axes.J.tolist()
     a1, a2, a3 = (J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3
-    torque = _torque(axes)
 
     def free(_: float, y: Array) -> list[float]:
         q0, q1, q2, q3, w1, w2, w3 = y.tolist()
@@ -146,35 +161,38 @@ def _derivative(axes: Axes) -> Derivative:
 
     def in_field(t: float, y: Array) -> list[float]:
         out = free(t, y)
-        t1, t2, t3 = torque(*y[:4].tolist())  # type: ignore[misc]
-        out[4] += t1 / J1
-        out[5] += t2 / J2
-        out[6] += t3 / J3
+        b1, b2, b3 = acceleration(*y[:4].tolist())  # type: ignore[misc]
+        out[4] += b1
+        out[5] += b2
+        out[6] += b3
         return out
 
-    return free if torque is None else in_field
+    return free if acceleration is None else in_field
 
 
-def _torque(axes: Axes) -> Torque | None:
-    """Return the torque in axes F as a function of the quaternion of `R_WF`."""
-    potential = axes.scene.potential
-    if potential is None:
-        return None
-    if not isinstance(potential, UniformGravity):
-        return _general_torque(potential, axes.R_BF)
-    m1, m2, m3 = axes.moment.tolist()
+def _uniform(axes: Axes) -> Acceleration:
+    (m1, m2, m3), (J1, J2, J3) = axes.moment.tolist(), axes.J.tolist()
 
-    def uniform(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float, float]:
-        g1, g2, g3 = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
-        return g2 * m3 - g3 * m2, g3 * m1 - g1 * m3, g1 * m2 - g2 * m1
+    def acceleration(*q: float) -> tuple[float, float, float]:
+        g1, g2, g3 = _third_row(*q)
+        return (g2 * m3 - g3 * m2) / J1, (g3 * m1 - g1 * m3) / J2, (g1 * m2 - g2 * m1) / J3
 
-    return uniform
+    return acceleration
 
 
-def _general_torque(potential: Any, R_BF: Array) -> Torque:
-    def torque(*q: float) -> tuple[float, float, float]:
+def _written_out(field: FieldInAxes) -> Acceleration:
+    parameters = tuple(field.parameters)
+    return lambda *q: field.acceleration(parameters, _third_row(*q))
+
+
+def _general(potential: Potential, axes: Axes) -> Acceleration:
+    def acceleration(*q: float) -> list[float]:
         R_WF = from_quaternion(q)
-        t1, t2, t3 = (torque_W(potential, R_WF @ R_BF.T) @ R_WF).tolist()
-        return t1, t2, t3
+        return (torque_W(potential, R_WF @ axes.R_BF.T) @ R_WF / axes.J).tolist()
 
-    return torque
+    return acceleration
+
+
+def _third_row(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float, float]:
+    """Return the last row of the rotation matrix."""
+    return 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3

@@ -7,10 +7,12 @@ import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter_ns
 from typing import Any, ClassVar
+
+import numpy as np
 
 from conservative import registry
 from conservative.errors import IntegrationFailed, Unsupported
@@ -42,6 +44,8 @@ class EngineMethod(Method):
         Of its numbers: "f64" or "f32".
     takes_gravity
         Whether its adapter has bodies about a fixed point in uniform gravity, beside free ones.
+    free_only
+        Why it has free bodies only, where it is the engine that has no others.
     """
 
     role: ClassVar[Role] = Role.ENGINE
@@ -49,6 +53,7 @@ class EngineMethod(Method):
     version: ClassVar[str] = ""
     precision: ClassVar[str] = "f64"
     takes_gravity: ClassVar[bool] = False
+    free_only: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
@@ -88,7 +93,7 @@ class EngineMethod(Method):
         if self.takes_gravity:
             return gravity_or_free(scene) or mass_model_reason(scene)
         if scene.potential is not None:
-            return f"its adapter has free bodies, not {type(scene.potential).__name__}"
+            return self.free_only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
         return mass_model_reason(scene)
 
     @classmethod
@@ -100,13 +105,14 @@ class EngineMethod(Method):
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
         environment, axes = self.environment, principal_axes(scene)
         given = {"adapter": str(_inside(type(self))), "settings": self._settings(), **describe(axes, grid)}
-        run = WorkerRun(worker_of(environment, self.variables), given, Samples(axes, grid, self.label))
+        samples = Samples(axes, grid, self.label)
+        run = WorkerRun(worker_of(environment, self.variables), given, samples)
         try:
             run.prepare()
         except NotImplementedError as error:
             raise Unsupported("method", self.name, f"what {self.label} has: {error}") from None
-        except IntegrationFailed:
-            return run  # which fails again when it is called, and then says so in its trajectory
+        except IntegrationFailed as failure:
+            return partial(samples.failure, failure)
         return run
 
     def _settings(self) -> dict[str, Any]:
@@ -128,6 +134,16 @@ def _class_at(cls: type[EngineMethod], version: str) -> type[EngineMethod]:
 @lru_cache(maxsize=64)
 def _inside(cls: type[EngineMethod]) -> Path:
     return Path(inspect.getfile(cls)).resolve().parent / "inside" / f"{cls.family.partition('@')[0]}.py"
+
+
+def rate_limit_reason(scene: Scene, limit: float) -> str | None:
+    """Return why an engine that limits rates, rad/s, cannot do a scene, None if it can; it names a slower one, where one is."""
+    rate = float(np.linalg.norm(scene.w_WB_B0))
+    if rate <= limit:
+        return None
+    slower = f"slow_{scene.name}"
+    advice = f"; {slower} is a slower one" if slower in registry.list_scenes() else ""
+    return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 
 class WorkerRun:

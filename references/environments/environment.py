@@ -22,6 +22,8 @@ from .versions import version_key
 
 RECORD, LOCK = "record.json", "lock.txt"
 """What is written last into an environment, and the versions of all that is in it, with their hashes."""
+BUILD = "build."
+"""What the local part of a version has where an environment is that of a build, such as 4.0.1+build.1a2b3c4d."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,11 @@ class Environment:
     folder: Path
     python: str
     packages: tuple[str, ...]
+
+    @property
+    def is_build(self) -> bool:
+        """Whether its engine is no release, but somebody's own build."""
+        return BUILD in self.version.partition("+")[2]
 
     @property
     def interpreter(self) -> Path:
@@ -107,7 +114,7 @@ def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
 
 
 def find_environment(engine: str, version: str = "") -> Environment:
-    """Return the environment of a version of an engine, by default of the newest one that is installed.
+    """Return the environment of a version of an engine, by default of the newest release that is installed.
 
     Raises
     ------
@@ -115,7 +122,7 @@ def find_environment(engine: str, version: str = "") -> Environment:
         There is none.
     """
     found = list_environments(engine)
-    matching = [environment for environment in found if version in ("", environment.version)]
+    matching = [each for each in found if each.version == version or (not version and not each.is_build)]
     if not matching:
         raise MissingEnvironment(engine, version, tuple(environment.version for environment in found))
     return matching[-1]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from conservative.errors import BadInput
+from conservative.errors import BadInput, nearest
 from conservative.files import leftovers, temporary
 from conservative.files import remove as remove_tree
 
@@ -17,7 +17,6 @@ from .catalogue import Distribution, distribution_of
 from .environment import (
     LOCK,
     Environment,
-    find_environment,
     folder_of_all,
     interpreter_of,
     list_environments,
@@ -144,13 +143,17 @@ def remove(requirement: str) -> tuple[Environment, ...]:
     Raises
     ------
     BadInput
-        The requirement cannot be read.
-    MissingEnvironment
-        There is no such environment.
+        The requirement cannot be read, or there is no such environment.
     """
     engine, version = split_requirement(requirement)
-    found = list_environments(engine) if not version else ()
-    found = found or (find_environment(engine, version),)
+    there = {f"{each.engine}=={each.version}": each for each in list_environments()}
+    found = tuple(each for each in there.values() if each.engine == engine and version in ("", each.version))
+    if not found:
+        raise BadInput(
+            "engine",
+            repr(requirement),
+            f"what is installed: {nearest(requirement, there)}" if there else "a name after something is installed",
+        )
     for environment in found:
         close_workers(environment)
         drop(environment.folder)

@@ -14,7 +14,7 @@ from conservative.errors import BadInput
 
 from .catalogue import Distribution
 from .uv_command import UvFailed, run_uv
-from .versions import describe_versions
+from .versions import describe_versions, version_key
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
 _VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")
@@ -90,11 +90,30 @@ def resolve(distribution: Distribution, version: str, source: Source) -> Lock:
     package = distribution.package
     pin = f"=={version}" if version else f">={distribution.oldest}" if distribution.oldest else ""
     wanted = "\n".join([package + pin, "numpy", *distribution.requirements])
+    python, text = _compile(package, version, wanted, source)
+    return _lock(package, python, text)
+
+
+def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source: Source) -> Lock:
+    """Return the lock of a wheel of an engine, under a version that is not its own, with NumPy and what else it needs.
+
+    Raises
+    ------
+    BadInput
+        It is for no Python of this machine, what it needs cannot be had, or there is no network.
+    """
+    package = distribution.package
+    wanted = "\n".join([f"{package} @ {wheel.as_uri()}", "numpy", *distribution.requirements])
+    return Lock(version, *_compile(package, version, wanted, source))
+
+
+def _compile(package: str, version: str, wanted: str, source: Source) -> tuple[str, str]:
+    """Return the path of the first Python that there are wheels for, and all requirements with their hashes."""
     tried, failure = [], None
     for python, path in _pythons():
         tried.append(python)
         try:
-            return _lock(package, path, run_uv(*_COMPILE, *source.options, "--python", path, "-", stdin=wanted))
+            return path, run_uv(*_COMPILE, *source.options, "--python", path, "-", stdin=wanted)
         except UvFailed as error:
             failure = error
             if not error.no_wheel:
@@ -109,13 +128,14 @@ _COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--gene
 
 
 def _lock(package: str, python: str, text: str) -> Lock:
-    pattern = rf"^{re.escape(_normal(package))}==([^\s\\;]+)"
+    pattern = rf"^{re.escape(normal_name(package))}==([^\s\\;]+)"
     found = re.search(pattern, text, re.MULTILINE)
     assert found is not None, text
     return Lock(found[1], python, text)
 
 
-def _normal(package: str) -> str:
+def normal_name(package: str) -> str:
+    """Return the name of a package as indexes compare it, without extras."""
     return re.sub(r"[-_.]+", "-", package.partition("[")[0]).lower()
 
 
@@ -174,11 +194,14 @@ def _resolves(python: str, wanted: str, source: Source) -> bool:
 
 def list_versions(package: str, source: Source) -> list[str]:
     """Return the versions of a package that have wheels, newest first; none where nobody can tell."""
-    options = [option for option in source.options if option != ":all:"]
-    options = [f"{option}=:all:" if option == "--only-binary" else option for option in options]
+    if source.find_links is not None:
+        names = (path.name.split("-") for path in source.find_links.glob("*.whl"))
+        found = {parts[1] for parts in names if normal_name(parts[0]) == normal_name(package)}
+        return sorted(found, key=version_key, reverse=True)
+    options = () if source.allow_build else ("--only-binary=:all:",)
     try:
         listing = run_uv("tool", "run", "--quiet", "pip", "index", "versions", package, *options)
     except UvFailed:
         return []
-    found = re.search(r"Available versions: (.+)", listing)
-    return found[1].split(", ") if found else []
+    line = re.search(r"Available versions: (.+)", listing)
+    return line[1].split(", ") if line else []

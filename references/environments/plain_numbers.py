@@ -21,9 +21,9 @@ def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
 
     The start: `q0` (4,), scalar first, and `R0` (3, 3), the attitude of the principal axes F in the world; `w0` (3,), rates in
     F, and `w0_W` (3,), in the world. The body: `moments` (3,) about what stays where it is, the fixed point or a free body's
-    centre of mass; `mass`, `com` (3,) in F, and about that `moments_com` (3,), whose axes are `q_com` (4,) in F; downward
-    `gravity`; `free`, whether nothing holds it. The grid: `dt`, `n_steps`, `every`, and `steps` (n,), numbers of steps after
-    which the state is kept.
+    centre of mass; `mass`, `com` (3,) in F; about the latter `inertia_com` (3, 3) in F, which is `moments_com` (3,) in axes
+    `q_com` (4,) in F; downward `gravity`; `free`, whether nothing holds it. The grid: `dt`, `n_steps`, `every`, and `steps`
+    (n,), numbers of steps after which the state is kept.
     """
     mass = mass_model(axes)
     assert mass is not None  # `unsupported` has seen to it
@@ -38,6 +38,7 @@ def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
         "gravity": mass.gravity,
         "moments_com": mass.body.moments,
         "q_com": to_quaternion(mass.body.R_BP),
+        "inertia_com": mass.body.inertia,
         "free": axes.scene.free,
         "dt": grid.dt,
         "n_steps": grid.n_steps,

@@ -9,9 +9,9 @@ Source: Euler's and Poisson's equations; the slow frame is that of `conservative
 Symbols: q quaternion, scalar first, body to world; w rates in body axes; u rates of the slow frame, world axes; n the body's
 axis of symmetry, world axes.
 
-Tried and not kept: rates and two rows of the attitude for any body in a field (15 products instead of 23, yet no faster at
-equal error); rates scaled so that all coefficients are 1 (8 % less a step, more steps); second-order equations in one rate
-(its square roots lose half the digits at every reversal).
+Tried and not kept: rates scaled so that all coefficients are 1 (8 % less a step, more steps); second-order equations in one
+rate (its square roots lose half the digits at every reversal); cross products of five products instead of six (their sums cost
+more); one angle beside the field's axis in place of a second row (4 products fewer, but a pole, and 10 to 20 % more steps).
 """
 
 from __future__ import annotations
@@ -78,22 +78,48 @@ class Integrators:
 
 
 @lru_cache(maxsize=64)
-def compile_double(form: Form, tol: float) -> Integrators:
+def compile_double(form: Form, tol: float, fast_math: bool = False) -> Integrators:
     """Return integrators of a form in double precision, for a relative tolerance."""
     equations = form.build()
-    return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol))
+    return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol, fast_math=fast_math))
 
 
-def body(parameters: Sequence[Expression]) -> Equations:
-    """Return Euler's equations and the quaternion's, state (q, w), principal axes.
+@dataclass(frozen=True)
+class Turning:
+    """Euler's equations in principal axes with those of the attitude, state (attitude, w).
 
-    Parameters are (J2 - J3)/J1 and its kin (3), then the matrix (9) that takes the vertical to the angular acceleration.
+    Parameters are (J2 - J3)/J1 and its kin (3), then those of the field.
+
+    Attributes
+    ----------
+    attitude
+        Takes rates to the attitude's equations and to the field's axis in the body.
+    acceleration
+        Takes the field's parameters and that axis to what the field adds to w'.
     """
+
+    attitude: Callable[[Sequence[Expression]], tuple[Equations, Sequence[Expression]]]
+    acceleration: Callable[[Sequence[Expression], Sequence[Expression]], Sequence[Expression]]
+
+    def __call__(self, parameters: Sequence[Expression]) -> Equations:
+        """Return the equations with these parameters."""
+        w = heyoka().make_vars("w1", "w2", "w3")
+        equations, axis = self.attitude(w)
+        gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
+        return [*equations, *zip(w, _sums(gyroscopic, self.acceleration(parameters[3:], axis)), strict=True)]
+
+
+def quaternion(w: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
+    """Return the quaternion's equations, 12 products, and the axis in the body: 6 more where all of it is used."""
+    q = heyoka().make_vars("q0", "q1", "q2", "q3")
+    return list(zip(q, kinematics_in_body(q, w), strict=True)), vertical(q)
+
+
+def base_vectors(w: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
+    """Return the equations of the third and the first row of the rotation matrix, 12 products; the third is the axis itself."""
     hy = heyoka()
-    q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
-    gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
-    turning = product(parameters[3:12], vertical(q))
-    return [*zip(q, kinematics_in_body(q, w), strict=True), *zip(w, _sums(gyroscopic, turning), strict=True)]
+    third, first = hy.make_vars("g1", "g2", "g3"), hy.make_vars("a1", "a2", "a3")
+    return [*zip(third, cross(third, w), strict=True), *zip(first, cross(first, w), strict=True)], third
 
 
 def non_spinning(parameters: Sequence[Expression]) -> Equations:
@@ -172,20 +198,21 @@ def to_body(q: Sequence[Expression], vector: Sequence[Expression]) -> list[Expre
     )
     found = [0.0, 0.0, 0.0]
     for component, row in zip(vector, rows, strict=True):
-        if not _is_zero(component):
+        if not is_zero(component):
             found = [x + component * y for x, y in zip(found, row, strict=True)]
     return found
 
 
 def product(matrix: Sequence[Expression], vector: Sequence[Expression]) -> list[Expression]:
     """Return the product of a matrix (9, row by row) and a vector, without the terms that are zero."""
-    terms = ([(c, v) for c, v in zip(matrix[i : i + 3], vector, strict=True) if not _is_zero(c)] for i in (0, 3, 6))
+    terms = ([(c, v) for c, v in zip(matrix[i : i + 3], vector, strict=True) if not is_zero(c)] for i in (0, 3, 6))
     return [sum((c * v for c, v in row), 0.0) for row in terms]
 
 
 def _sums(a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
-    return [x if _is_zero(y) else x + y for x, y in zip(a, b, strict=True)]
+    return [x if is_zero(y) else x + y for x, y in zip(a, b, strict=True)]
 
 
-def _is_zero(x: Expression) -> bool:
+def is_zero(x: Expression) -> bool:
+    """Return whether an expression is left out of a form."""
     return isinstance(x, float) and x == 0

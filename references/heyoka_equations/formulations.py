@@ -6,16 +6,18 @@ The forms are those of `conservative.references.heyoka_equations.forms`. Source:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion, hat
+from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.scene import Scene
 
 from ..engine import Axes, principal_axes, symmetric_axes
 from . import forms
+from .accelerations import express_field, order_axes
 
 _SMALLEST_POLE_DISTANCE = 0.7
 """Least 1 + n_z at which axis and angle are still taken; nearer to the pole they take more steps than they save products."""
@@ -36,6 +38,8 @@ class Formulation:
         Equations, values of their parameters, state at t = 0.
     readout
         Attitudes (n, 3, 3) and rates (n, 3) in F from times (n,) and states (n, m).
+    fast_math
+        Whether it is compiled so that sums may be reordered.
     """
 
     axes: Axes
@@ -43,17 +47,42 @@ class Formulation:
     parameters: list[float]
     start: Array
     readout: Callable[[Array, Array], tuple[Array, Array]]
+    fast_math: bool = False
 
 
 def body(scene: Scene) -> Formulation:
     """Return quaternion and rates in principal axes."""
-    axes = principal_axes(scene)
-    form, parameters = forms.form_of(forms.body, _euler(axes))
+    return _turning(scene, forms.quaternion, to_quaternion, from_quaternion)
+
+
+def base_vectors(scene: Scene) -> Formulation:
+    """Return third and first row of the rotation matrix, in world axes whose third is the field's axis, and rates.
+
+    The second row is the cross product of the two; none is tidied up, so that lost orthonormality shows in the samples.
+    """
+    found = _turning(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), _from_rows)
+    return replace(found, fast_math=True)  # measured: 3 to 7 % less time, where the quaternion takes 2 to 5 % more
+
+
+def _turning(
+    scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], read: Callable[[Array], Array]
+) -> Formulation:
+    """Return Euler's equations with those of the attitude, whose state is written from a matrix and read as matrices."""
+    field = express_field(scene)
+    axes, R_WD = field.axes, field.R_WD
+    equations = forms.Turning(attitude, field.acceleration)
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.parameters])
 
     def readout(_: Array, states: Array) -> tuple[Array, Array]:
-        return from_quaternion(states[:, :4]), states[:, 4:]
+        return R_WD @ read(states[:, :-3]), states[:, -3:]
 
-    return Formulation(axes, form, parameters, np.concatenate([axes.q0, axes.w0]), readout)
+    return Formulation(axes, form, parameters, np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0]), readout)
+
+
+def _from_rows(rows: Array) -> Array:
+    """Return matrices (n, 3, 3) from third and first rows (n, 6)."""
+    third, first = rows[:, :3], rows[:, 3:]
+    return np.stack([first, np.cross(third, first), third], axis=1)
 
 
 def non_spinning(scene: Scene) -> Formulation:
@@ -73,8 +102,10 @@ def lean(scene: Scene) -> Formulation:
     """Return the form with the fewest products that does the scene."""
     axes = symmetric_axes(scene)
     if axes is None:
+        if not scene.free:
+            return base_vectors(scene)
         # A body at rest has no momentum to turn about.
-        return _free_rates_and_angle(scene) if scene.free and scene.kinetic_energy0 > 0 else body(scene)
+        return _free_rates_and_angle(scene) if scene.kinetic_energy0 > 0 else body(scene)
     lowest, highest = _heights(axes)
     if scene.free or max(1 + lowest, 1 - highest) < _SMALLEST_POLE_DISTANCE:
         return non_spinning(scene)
@@ -119,11 +150,6 @@ def _axis_and_angle(axes: Axes, world: Array) -> Formulation:
 def _gyroscopic(axes: Axes) -> list[float]:
     J1, J2, J3 = axes.J.tolist()
     return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
-
-
-def _euler(axes: Axes) -> list[float]:
-    """Return the parameters of Euler's equations; the torque is g x m, with g the vertical and m the moment of the weight."""
-    return [*_gyroscopic(axes), *(-hat(axes.moment) / axes.J[:, None]).ravel().tolist()]
 
 
 def _symmetric(scene: Scene) -> Axes:
@@ -172,10 +198,8 @@ def _order_axes(axes: Axes) -> Axes:
     L0 = axes.J * axes.w0
     order = np.argsort(axes.J)
     third = order[2] if L0 @ axes.w0 * axes.J[order[1]] < L0 @ L0 else order[0]
-    turn = np.roll(np.eye(3), third - 2, axis=1)
-    if L0[third] < 0:
-        turn = turn @ _DOWN
-    return Axes(axes.scene, axes.R_BF @ turn, axes.J @ np.abs(turn))
+    ordered = order_axes(axes, int(third))
+    return Axes(axes.scene, ordered.R_BF @ _DOWN, ordered.J) if L0[third] < 0 else ordered
 
 
 def _least(n: Array) -> Array:

@@ -17,6 +17,11 @@ def methods(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
     return [CompletionItem(before + name) for name in _registered("methods", last)]
 
 
+def engines(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the registered engines that the text may become."""
+    return [CompletionItem(name) for name in _registered("engines", incomplete)]
+
+
 def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the registered scenes, scene files, and folders on the way to one, that the last of several may become."""
     before, last = _last(incomplete)

@@ -9,7 +9,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import epilog
+from .options import allow_build_option, epilog, find_links_option
 
 
 def _require() -> None:
@@ -20,14 +20,6 @@ def _source(find_links: Path | None, allow_build: bool) -> object:
     from conservative.references.environments.lock import Source
 
     return Source(find_links, allow_build)
-
-
-_find_links = click.option(
-    "--find-links",
-    type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
-    help="Folder of wheels to take everything from, without a network.",
-)
-_allow_build = click.option("--allow-build", is_flag=True, help="Run a package's own code to build it, where it has no wheel.")
 
 
 @click.group(
@@ -44,23 +36,30 @@ def engines() -> None:
 
 @engines.command(short_help="Make environments.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
-@_find_links
-@_allow_build
-def install(names: tuple[str, ...], find_links: Path | None, allow_build: bool) -> None:
-    """Make the environment of each NAME, by default of its newest version, unless it is there."""
+@find_links_option
+@allow_build_option
+@click.pass_context
+def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool) -> None:
+    """Make the environment of each NAME, by default of its newest version, unless it is there.
+
+    The exit code is 1 if an engine was installed but cannot be imported.
+    """
     _require()
     from conservative.references.environments.install import check, install
 
     source = _source(find_links, allow_build)
     for name in names:
         check(name)  # all of them, before the first takes minutes
+    trouble = False
     for name in names:
+        click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
         done = install(name, source)  # type: ignore[arg-type]
-        found = done.environment
+        found, trouble = done.environment, trouble or bool(done.trouble)
         click.echo(
             f"{found.engine}=={found.version}: {'installed' if done.new else 'was there'}, {len(found.packages)} packages, "
             f"Python {found.python}" + (f"; cannot be imported: {done.trouble}" if done.trouble else "")
         )
+    ctx.exit(int(trouble))
 
 
 @engines.command("list", short_help="Show them.", epilog=epilog("conservative engines list --json"))
@@ -86,8 +85,8 @@ def remove(names: tuple[str, ...]) -> None:
 
 @engines.command(short_help="Find and mend broken ones.", epilog=epilog("conservative engines doctor"))
 @click.option("--dry-run", is_flag=True, help="Only say what is wrong; exit code 1 if anything is.")
-@_find_links
-@_allow_build
+@find_links_option
+@allow_build_option
 @click.pass_context
 def doctor(ctx: click.Context, dry_run: bool, find_links: Path | None, allow_build: bool) -> None:
     """Check each environment against what was recorded of it, and make those anew that differ."""

@@ -16,9 +16,11 @@ from .gate import gate
 from .list import list_all
 from .new import new
 from .options import epilog
+from .published import published
 from .recommend import recommend
 from .report import report
 from .run import run
+from .track import track
 
 
 class _UserError(click.ClickException):
@@ -92,5 +94,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new, engines):
+for command in (report, run, list_all, recommend, gate, new, engines, track, published):
     main.add_command(command)

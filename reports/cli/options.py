@@ -23,6 +23,16 @@ class FilePath(click.Path):
         return Path(str(value))
 
 
+find_links_option = click.option(
+    "--find-links",
+    type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
+    help="Folder of wheels to take everything from, without a network.",
+)
+allow_build_option = click.option(
+    "--allow-build", is_flag=True, help="Run a package's own code to build it, where it has no wheel."
+)
+
+
 def epilog(*examples: str) -> str:
     """Return what every --help ends with; a backspace on a line of its own keeps click from joining the lines after it."""
     return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])
@@ -34,11 +44,17 @@ def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:
     An option that is given but names nothing, as `--scenes "$EMPTY"` does, would mean everything: it is a mistake.
     """
     names: list[str] = []
-    for item in (item.strip() for text in texts for item in text.split(",")):
+    for item in split_list(argument, texts):
         if names and "=" in item and ":" not in item:
             names[-1] += f",{item}"
-        elif item:
+        else:
             names.append(item)
-    if texts and not names:
-        raise click.BadParameter("it names nothing", param_hint=f"--{argument}")
     return names
+
+
+def split_list(argument: str, texts: tuple[str, ...]) -> list[str]:
+    """Return what is between the commas; an option that is given but names nothing is a mistake, as in `split_names`."""
+    items = [item.strip() for text in texts for item in text.split(",") if item.strip()]
+    if texts and not items:
+        raise click.BadParameter("it names nothing", param_hint=f"--{argument}")
+    return items

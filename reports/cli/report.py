@@ -12,7 +12,7 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import FilePath, epilog, split_names
+from .options import FilePath, epilog, split_list, split_names
 
 
 @click.command(
@@ -21,11 +21,19 @@ from .options import FilePath, epilog, split_names
         "conservative report",
         "conservative report --quick --out quick_report",
         "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
+        "conservative report --engines all --methods reduced",
         "conservative report --resume                 go on after Ctrl-C, with the same options",
     ),
 )
 @click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the paper's two]")
 @click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
+@click.option(
+    "--engines",
+    multiple=True,
+    metavar="E,F",
+    help="Engines to compare in a section of their own: NAME, NAME==VERSION, or all, which stands for all that are installed, "
+    "in environments (see `conservative engines`) or beside us.",
+)
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option(
@@ -51,6 +59,7 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     from ..terminal.progress import progress
     from ..terminal.report_folder import MANIFEST
 
+    extent["engines"] = split_list("engines", extent["engines"])
     plan = plan_report(split_names("scenes", scenes), split_names("methods", methods), **extent)
     _announce(out, resume)
     with interruptible(signal.SIGTERM), progress() as step:

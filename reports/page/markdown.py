@@ -11,7 +11,8 @@ from conservative.benchmarks.studies import long_runs
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
-from ..tables.cells import Table, markdown
+from ..tables import engine_tables
+from ..tables.cells import CONSERVED, SMALL, Table, markdown
 from ..view import PaperView, View
 from .scene_charts import SceneCharts
 
@@ -20,8 +21,12 @@ Draw = Callable[[str, Any], str]
 NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
 
 
-def render(view: View, charts: Mapping[str, SceneCharts], draw: Draw) -> str:
-    """Return report.md; `charts` are those of each scene by its name, `draw(name, chart)` returns the name of its file."""
+def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], draw: Draw) -> str:
+    """Return report.md.
+
+    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike; `draw(name, chart)` returns the
+    name of its file.
+    """
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
     )
@@ -31,6 +36,10 @@ def render(view: View, charts: Mapping[str, SceneCharts], draw: Draw) -> str:
         pictures={name: _pictures(name, of_scene, draw) for name, of_scene in charts.items()},
         default_method=DEFAULT_METHOD,
         durations=f"{long_runs.DURATIONS:g}",
+        engine_pictures={name: draw(f"engines_{name}", chart) for name, chart in of_engines.items()},
+        engine_terms=engine_tables.TERMS,
+        conserved=f"{CONSERVED:.0e}",
+        small=f"{SMALL:.0e}",
         paper=list(_paper(view.paper, draw)),
     )
 

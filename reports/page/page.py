@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -17,27 +18,31 @@ from conservative.benchmarks.studies import long_runs
 from ..charts import spheres
 from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
 from ..charts.vega_embed import PageFigure
-from ..tables import overview
+from ..tables import engine_tables, overview
 from ..tables.cells import CONSERVED, SMALL
 from ..view import View
-from .figures import SceneFigures, scene_figures
+from . import engines
+from .figures import scene_figures
 from .scene_charts import SceneCharts
 
 DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", OLIVE: "#C2C25A", VERMILION: "#FF7F32"}
 """Colours that are too dark on a dark page, and what stands for them there."""
 
 
-def render(view: View, charts: Mapping[str, SceneCharts]) -> str:
-    """Return the page; `charts` are those of each scene by its name."""
+def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any]) -> str:
+    """Return the page; `charts` are those of each scene by its name, `of_engines` the pictures of engines alike."""
     figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
+    engine_figures = engines.figures(view.engines, of_engines)
     return _template().render(
         view=view,
         figures=figures,
+        engine_figures=engine_figures,
+        engine_terms=engine_tables.TERMS,
         errors=", ".join(f"{error:.0e}" for error in overview.ERRORS),
         conserved=f"{CONSERVED:.0e}",
         small=f"{SMALL:.0e}",
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(_charts(figures.values())),
+        charts=_in_script(_charts([*chain.from_iterable(figures.values()), *engine_figures.values()])),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,
@@ -63,7 +68,6 @@ def _in_script(content: Any) -> str:
     return json.dumps(content, separators=(",", ":"), ensure_ascii=False).replace("</", "<\\/")
 
 
-def _charts(scenes: Iterable[SceneFigures]) -> dict[str, Any]:
+def _charts(figures: Iterable[PageFigure]) -> dict[str, Any]:
     """Return what the page's script draws, and the colours of a dark page."""
-    figures: list[PageFigure] = [figure for scene in scenes for figure in scene]
     return {"figures": {figure.name: figure.charts for figure in figures}, "dark": DARK}

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 
-from conservative.benchmarks.studies import selection, studies
+from conservative.benchmarks.studies import engine_selection, selection, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
 from conservative.scene import Scene
+
+from .locks import Lock, locks_of
 
 SECONDS = {
     "paper": 1.4,
@@ -20,6 +22,8 @@ SECONDS = {
     "work_precision": 2.5,
     "stability": 1.0,
     "hard_cases": 2.0,
+    "engines_at_one_step": 0.7,
+    "engines_over_steps": 1.5,
     "long_runs": 0.7,
     "sphere_curves": 0.3,
     "paper_figures": 0.1,
@@ -51,23 +55,31 @@ class Plan:
     png: bool = False
     hard: bool = False
     time_limit: float | None = None
+    engines: tuple[Method, ...] = ()
 
     def __post_init__(self) -> None:
         if self.time_limit is not None:
             positive_number("time_limit", self.time_limit, "a finite duration above 0, s")
         if not self.skip_missing:
-            for method in self.methods:
+            for method in (*self.methods, *self.engines):
                 _ = method.label  # has the engine's version, so it raises `MissingEngine` before any work
 
     @cached_property
+    def locks(self) -> tuple[Lock, ...]:
+        """The locks of the environments that engines run in."""
+        return locks_of((*self.methods, *self.engines))
+
+    @cached_property
     def studies(self) -> tuple[Study, ...]:
-        """What is measured, in this order; the hard cases only where nobody asked for less.
+        """What is measured, in this order: engines only where some are named, hard cases only where nobody asked for less.
 
         Studies of the same scenes and methods share their truths.
         """
         crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing, self.time_limit)
         hard = studies.list_hard_studies(self.methods, self.skip_missing, self.time_limit) if self.hard else ()
-        return (*crossed, *hard)
+        limits = (self.quick, self.skip_missing, self.time_limit)
+        engines = studies.list_engine_studies(self.scenes, self.engines, *limits) if self.engines else ()
+        return (*crossed, *engines, *hard)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,12 +88,15 @@ class Plan:
 
     def spans(self, names: Iterable[str]) -> dict[str, tuple[float, float]]:
         """Return when each of the studies named begins and ends, and each part of rendering, as shares of all the time."""
-        pairs = len(self.scenes) * len(self.methods)
         factor = QUICK if self.quick else 1.0
-        costs = {name: factor * pairs * SECONDS[name] for name in names}
+        costs = {name: factor * self._pairs(name) * SECONDS[name] for name in names}
         costs |= {name: factor * seconds for name, seconds in RENDERING.items()}
         ends = [end / sum(costs.values()) for end in accumulate(costs.values())]
         return dict(zip(costs, pairwise([0.0, *ends]), strict=True))
+
+    def _pairs(self, name: str) -> int:
+        """Return how many pairs of a scene and a method a study is about as long as."""
+        return len(self.scenes) * len(self.engines if name in studies.ENGINES else self.methods)
 
 
 def plan_report(
@@ -91,8 +106,13 @@ def plan_report(
     skip_missing: bool = False,
     png: bool = False,
     time_limit: float | None = None,
+    engines: Iterable[str] = (),
 ) -> Plan:
-    """Return the plan for scenes and methods by name; none stands for the default scenes, and for every registered method."""
+    """Return the plan for scenes, methods and engines by name.
+
+    No scene stands for the default ones, no method for every registered one, and no engine for none.
+    """
     values = selection.scenes(scenes) if scenes else selection.scenes()
-    hard = not (scenes or quick)
-    return Plan(values, selection.methods(methods or None, skip_missing), quick, skip_missing, png, hard, time_limit)
+    chosen = selection.methods(methods or None, skip_missing)
+    competitors = engine_selection.select_engines(engines, skip_missing) if engines else ()
+    return Plan(values, chosen, quick, skip_missing, png, not (scenes or quick), time_limit, competitors)

@@ -12,6 +12,8 @@ from pathlib import Path
 
 from conservative.benchmarks.measures.origin import commit, git, machine
 
+from .locks import Lock
+
 COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy", "numba", "mpmath", "pandas", "altair")
 """Packages whose versions can change a number; a report names them first."""
 
@@ -20,7 +22,8 @@ COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy"
 class Provenance:
     """What it takes to make a report again.
 
-    `resumed` says what earlier processes measured, one sentence each, where this one did not measure everything.
+    `resumed` says what earlier processes measured, one sentence each, where this one did not measure everything. `environments`
+    are the locks of those that engines ran in.
     """
 
     command: str
@@ -30,6 +33,7 @@ class Provenance:
     commit: str
     date: str
     resumed: tuple[str, ...] = ()
+    environments: tuple[Lock, ...] = ()
 
     @property
     def compared(self) -> dict[str, str]:

@@ -22,6 +22,8 @@ def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
         "studies": list(plan.names),
         "scenes": {scene.name: define_scene(scene) for scene in plan.scenes},
         "methods": {method.name: method.label for method in plan.methods},
+        "engines": {method.name: method.label for method in plan.engines},
+        "environments": {lock.name: ", ".join(lock.packages) for lock in plan.locks},
         "--quick": plan.quick,
         "--skip-missing": plan.skip_missing,
         "--time-limit": plan.time_limit,

@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from conservative.benchmarks.measures.drift_class import CONSERVED as CONSERVED
+from conservative.benchmarks.measures.drift_class import SMALL as SMALL
 from conservative.outcome import Outcome, OutcomeKind
 
 DASH = "–"
-CONSERVED, SMALL = 1e-10, 1e-4
-"""Relative drift up to which a quantity counts as conserved, and as drifting little."""
 
 
 class Grade(StrEnum):

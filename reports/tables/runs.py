@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.studies import HARD
+from conservative.benchmarks.studies.studies import ENGINES, HARD
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
@@ -13,7 +13,7 @@ from .cells import Table, number, outcome_text
 from .rows import of_study, outcomes, with_outcome, without_outcome
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
-_ELSEWHERE = (*HARD, "import_time")
+_ELSEWHERE = (*HARD, *ENGINES, "import_time")
 """Studies with tables of their own."""
 
 

@@ -54,13 +54,13 @@ class Contest:
         return self.theirs is not None and (self.ours is None or self.ratio < 1)
 
 
-def points(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the measured points of the work-precision study.
+def points(table: pd.DataFrame, study: str = "work_precision") -> pd.DataFrame:
+    """Return the measured points of the work-precision study, or of another one with errors and times over steps.
 
     Columns scene, series, name (what to call its line), method, family, version, setting (of the line), role, dt, error (rad),
     time (s per simulated second); of each line coarse to fine. An error below what the truth is known to is raised to that.
     """
-    rows = with_outcome(of_study(table, "work_precision"), OutcomeKind.OK)
+    rows = with_outcome(of_study(table, study), OutcomeKind.OK)
     rows = rows[rows["measure"].isin(list(_VALUES))]
     wide = rows.pivot_table(index=_KEYS, columns="measure", values="value").reset_index()
     wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys

@@ -84,5 +84,16 @@
     [...table.tHead.rows[0].cells].forEach((cell, k) => cell.querySelector("button").addEventListener("click", () => sort(table, k)));
   }
 
+  // A filter keeps the rows of its table that have all of its words.
+  for (const part of document.querySelectorAll(".filter")) {
+    const rows = [...part.nextElementSibling.querySelectorAll("tbody tr")];
+    const keep = () => {
+      const words = part.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean);
+      rows.forEach((row) => { row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word)); });
+      part.querySelector("output").textContent = words.length ? `${rows.filter((row) => !row.hidden).length} of ${rows.length}` : "";
+    };
+    part.querySelector("input").addEventListener("input", keep);
+  }
+
   drawAll(night.matches);
 })();

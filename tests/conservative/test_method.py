@@ -103,3 +103,11 @@ def test_what_fits_in_memory_is_told_before_any_work(monkeypatch):
     assert caught.value.argument == "sample_every"
     assert caught.value.allowed.startswith("6 or more, or longer steps")
     assert len(cv.integrate(BRICK, 0.01, sample_every=6)) == 101
+
+
+def test_a_name_is_the_method_of_that_name():
+    by_name, by_value = (
+        cv.integrate(cv.scenes.turned_brick(t_end=0.5), 0.01, each) for each in ("reduced:order=4", cv.Reduced(4))
+    )
+    assert by_name.label == by_value.label
+    assert np.array_equal(by_name.R_WB, by_value.R_WB)

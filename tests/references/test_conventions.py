@@ -18,6 +18,7 @@ TIGHT = [
     (Heyoka(1e-16), 3e-14),  # measured 3e-15
     (Heyoka(1e-16, "non_spinning"), 3e-14),  # measured 2e-15
     (Heyoka(1e-16, "lean"), 3e-14),  # measured 3e-15
+    (Heyoka(1e-16, "base_vectors"), 3e-14),  # measured 3e-15
     (MuJoCo("RK4"), 2e-8),  # measured 4e-9 at dt = 0.025
     (Pinocchio("RK4"), 2e-8),  # measured 7e-9
 ]
@@ -64,7 +65,8 @@ def test_a_motion_does_not_depend_on_the_body_axes(method, free):
     assert np.abs(a.w_WB_B @ B - b.w_WB_B).max() < 3e-14  # measured 2e-15
 
 
-STEEP = [MuJoCo("Euler"), MuJoCo("RK4"), Pinocchio("Euler"), Pinocchio("RK4"), Heyoka(), Heyoka(frame="lean"), SciPy()]
+STEEP = [MuJoCo("Euler"), MuJoCo("RK4"), Pinocchio("Euler"), Pinocchio("RK4"), SciPy()]
+STEEP += [Heyoka(frame=frame) for frame in ("body", "lean", "base_vectors")]
 
 
 @pytest.mark.parametrize("every", [1, 100])

@@ -64,6 +64,7 @@ def test_the_last_of_several_is_completed(folder):
         ("recommend brick_flip --engine muj", ("plain", "mujoco")),
         ("report --re", ("plain", "--resume")),
         ("gate --times k", ("plain", "known")),
+        ("track exu", ("plain", "exudyn")),
         ("gate res", ("file", "res")),
         ("run brick_flip --csv s", ("file", "s")),
     ],

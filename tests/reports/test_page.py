@@ -27,7 +27,7 @@ def text():
 
 def rendered(plan, source):
     view = build(plan, measurements(), source)
-    return page.render(view, {scene.name: scene_charts.build(scene) for scene in view.scenes})
+    return page.render(view, {scene.name: scene_charts.build(scene) for scene in view.scenes}, {})
 
 
 class Outward(HTMLParser):

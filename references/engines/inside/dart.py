@@ -1,10 +1,10 @@
-"""DART in its environment. Source: its documentation, dynamics::FreeJoint, simulation::World."""
+"""DART in its environment. Source: its documentation, dynamics::FreeJoint, BallJoint, simulation::World."""
 
 import numpy as np
 
 
 def prepare(given):
-    """Return a run of one body on a free joint; DART's loop is one step a call."""
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point; DART's loop is one step a call."""
     import dartpy as dart
 
     world, joint, body = _build(dart, given)
@@ -28,14 +28,20 @@ def prepare(given):
 
 def _build(dart, given):
     world = dart.simulation.World()
-    world.setGravity([0, 0, 0])
+    world.setGravity([0, 0, -given.gravity])
     world.setTimeStep(given.dt)
     skeleton = dart.dynamics.Skeleton("skeleton")
-    joint, body = skeleton.createFreeJointAndBodyNodePair()
-    body.setInertia(dart.dynamics.Inertia(given.mass, np.zeros(3), np.diag(given.moments)))
+    joint, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
+    body.setInertia(dart.dynamics.Inertia(given.mass, given.com, given.inertia_com))
     world.addSkeleton(skeleton)
+    joint.setPositions(_positions(dart, given))
+    joint.setVelocities(np.concatenate([given.w0, np.zeros(3 * given.free)]))  # spatial velocity in body axes
+    return world, joint, body
+
+
+def _positions(dart, given):
+    if not given.free:
+        return dart.dynamics.BallJoint.convertToPositions(given.R0)
     place = dart.math.Isometry3()
     place.set_rotation(given.R0)
-    joint.setPositions(dart.dynamics.FreeJoint.convertToPositions(place))
-    joint.setVelocities(np.concatenate([given.w0, np.zeros(3)]))  # spatial velocity in body axes
-    return world, joint, body
+    return dart.dynamics.FreeJoint.convertToPositions(place)

@@ -14,10 +14,15 @@ def prepare(given):
     times = jnp.array(given.steps * given.dt)
     controller = diffrax.PIDController(given.rtol, given.rtol) if given.rtol else diffrax.ConstantStepSize()
 
+    weight, com = given.mass * given.gravity, jnp.array(given.com)
+
     def derivative(t, y, _):
         q, w = y[:4], y[4:]
+        # of the unit quaternion's rotation, the third row: the vertical in body axes
+        up = jnp.array([2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]), 1 - 2 * (q[1] ** 2 + q[2] ** 2)])
         turn = jnp.concatenate([-jnp.dot(q[1:], w)[None], q[0] * w + jnp.cross(q[1:], w)]) / 2
-        return jnp.concatenate([turn, jnp.cross(moments * w, w) / moments])
+        torque = jnp.cross(moments * w, w) - weight * jnp.cross(com, up)
+        return jnp.concatenate([turn, torque / moments])
 
     @jax.jit
     def solve():

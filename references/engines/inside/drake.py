@@ -4,38 +4,70 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run of one free body on a quaternion floating joint, advanced from sample to sample by Drake's Simulator."""
+    """Return a run of one body, advanced from sample to sample by Drake's Simulator.
+
+    A free body is on a quaternion floating joint; a body about a fixed point on Drake's only ball joint, whose coordinates are
+    roll, pitch and yaw. Where its first principal axis comes to stand upright, the run ends.
+    """
     import pydrake.all as drake
 
     plant, body, simulator = _build(drake, given)
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
-    pose = drake.RigidTransform(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)), np.zeros(3))
-    spin = drake.SpatialVelocity(given.w0_W, np.zeros(3))
+    start = _start(drake, plant, body, inner, given)
     times = given.steps * given.dt
 
     def run():
-        context.SetTime(0.0)
-        plant.SetFreeBodyPose(inner, body, pose)
-        plant.SetFreeBodySpatialVelocity(context=inner, body=body, V_JpJc=spin)
-        simulator.Initialize()
-        R, w = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
-        for sample, time in enumerate(times.tolist()):
-            simulator.AdvanceTo(time)
-            R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
-            w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
-        return {"R": R, "w_W": w}
+        R, w = np.full((len(times), 3, 3), np.nan), np.full((len(times), 3), np.nan)
+        reason = ""
+        try:
+            context.SetTime(0.0)
+            start()
+            simulator.Initialize()
+            for sample, time in enumerate(times.tolist()):
+                if sample:  # at its start a discrete plant would be updated
+                    simulator.AdvanceTo(time)
+                R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
+                w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
+        except RuntimeError as error:
+            if "singularity" not in str(error):
+                raise
+            reason = "Drake's BallRpyJoint has reached a singularity"
+        return {"R": R, "w_W": w, "reason": reason}
 
     return run
+
+
+def _start(drake, plant, body, context, given):
+    """Return what sets the body's attitude and rates to those of the start."""
+    turn = drake.RotationMatrix(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)))
+    if given.free:
+        pose, spin = drake.RigidTransform(turn, np.zeros(3)), drake.SpatialVelocity(given.w0_W, np.zeros(3))
+
+        def start():
+            plant.SetFreeBodyPose(context, body, pose)
+            plant.SetFreeBodySpatialVelocity(context=context, body=body, V_JpJc=spin)
+
+    else:
+        joint, angles = plant.GetJointByName("support"), drake.RollPitchYaw(turn).vector()
+
+        def start():
+            joint.set_angles(context, angles)
+            joint.set_angular_velocity(context, given.w0_W)
+
+    return start
 
 
 def _build(drake, given):
     discrete = given.integrator == "discrete"
     builder = drake.DiagramBuilder()
     plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
-    inertia = drake.RotationalInertia(*given.moments)
-    body = plant.AddRigidBody("body", drake.SpatialInertia.MakeFromCentralInertia(given.mass, np.zeros(3), inertia))
-    plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    inertia = drake.RotationalInertia(xx, yy, zz, xy, xz, yz)
+    body = plant.AddRigidBody("body", drake.SpatialInertia.MakeFromCentralInertia(given.mass, given.com, inertia))
+    plant.mutable_gravity_field().set_gravity_vector([0, 0, -given.gravity])
+    if not given.free:
+        plant.AddJoint(drake.BallRpyJoint("support", plant.world_frame(), body.body_frame()))
     plant.Finalize()
     simulator = drake.Simulator(builder.Build())
     if not discrete:
@@ -45,6 +77,9 @@ def _build(drake, given):
 
 def _choose(drake, simulator, given):
     """Choose the integrator: in fixed steps, or in its own to an accuracy."""
+    if given.integrator == "default":
+        simulator.get_mutable_integrator().set_maximum_step_size(given.dt)
+        return
     if given.integrator not in drake.GetIntegrationSchemes():
         raise NotImplementedError(f"Drake has no integrator {given.integrator}, but {', '.join(drake.GetIntegrationSchemes())}")
     drake.ResetIntegratorFromFlags(simulator, given.integrator, given.dt)

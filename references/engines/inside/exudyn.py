@@ -6,27 +6,35 @@ EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5
 
 
 def prepare(given):
-    """Return a run of one free rigid body on the node that Exudyn's Lie group integrators take."""
+    """Return a run of one rigid body on the node that Exudyn's Lie group integrators take.
+
+    Explicit integrators take no joints. A body about a fixed point turns as a free one does that has its moments, about the
+    fixed point, as central ones, where weight pulls at the centre of mass and the support's force that is its opposite at the
+    fixed point.
+    """
     import exudyn as exu
     from exudyn.utilities import RigidBodyInertia, SensorBody
 
-    mbs = exu.SystemContainer().AddSystem()
+    mbs, default = exu.SystemContainer().AddSystem(), given.integrator == "default"
+    # With Euler parameters, which are the default, the explicit integrators raise.
+    kind = {} if default else {"nodeType": exu.NodeType.RotationRotationVector}
     body = mbs.CreateRigidBody(
         inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
-        nodeType=exu.NodeType.RotationRotationVector,  # with Euler parameters the explicit integrators raise
         referenceRotationMatrix=given.R0,
         initialAngularVelocity=given.w0_W,
-        gravity=[0, 0, 0],
+        **kind,
     )
+    _load(mbs, body, given)
     outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
     sampled = len(given.steps) > 2
     sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
     mbs.Assemble()
-    settings, solver = _settings(exu, given), getattr(exu.DynamicSolverType, given.integrator)
+    settings = _settings(exu, given)
+    solver = {} if default else {"solverType": getattr(exu.DynamicSolverType, given.integrator)}
     start = given.R0.ravel(), given.w0
 
     def run():
-        mbs.SolveDynamic(settings, solverType=solver)
+        mbs.SolveDynamic(settings, **solver)
         end = [np.array(mbs.GetObjectOutputBody(body, output, [0, 0, 0])).ravel() for output in outputs]
         between = [mbs.GetSensorStoredData(sensor)[1:-1, 1:] for sensor in sensors] or [np.empty((0, 9)), np.empty((0, 3))]
         R, w = (np.vstack(parts) for parts in zip(start, between, end, strict=True))
@@ -35,12 +43,22 @@ def prepare(given):
     return run
 
 
+def _load(mbs, body, given):
+    from exudyn.itemInterface import LoadForceVector, MarkerBodyRigid
+
+    for place, sign in ((given.com, -1), (np.zeros(3), 1)) if given.gravity else ():
+        marker = mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=place.tolist()))
+        mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=[0, 0, sign * given.mass * given.gravity]))
+
+
 def _settings(exu, given):
     settings = exu.SimulationSettings()
-    settings.solutionSettings.writeSolutionToFile = False
     settings.solutionSettings.sensorsWritePeriod = given.steps[1] * given.dt
     time = settings.timeIntegration
     time.numberOfSteps, time.endTime, time.verboseMode = given.n_steps, given.n_steps * given.dt, 0
+    if given.integrator == "default":
+        return settings
+    settings.solutionSettings.writeSolutionToFile = False
     time.automaticStepSize = False  # fixed steps with DOPRI5, too
     if given.integrator in EXPLICIT:
         time.explicitIntegration.useLieGroupIntegration = True

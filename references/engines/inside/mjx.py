@@ -6,9 +6,10 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run on a free joint, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
+    """Return a run on a free joint, or on a ball joint at the fixed point, compiled as a whole.
 
-    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process.
+    It is a `lax.scan` over samples, with a `fori_loop` over the steps between them. Whether JAX computes in double precision is
+    said by the variable JAX_ENABLE_X64 of the process.
     """
     import jax
     import mujoco
@@ -17,9 +18,8 @@ def prepare(given):
     model = mjx.put_model(_model(mujoco, given))
     start = mjx.make_data(model)
     number = start.qpos.dtype
-    start = start.replace(
-        qpos=jax.numpy.array([0, 0, 0, *given.q0], number), qvel=jax.numpy.array([0, 0, 0, *given.w0], number)
-    )
+    place = [0, 0, 0] * given.free
+    start = start.replace(qpos=jax.numpy.array([*place, *given.q0], number), qvel=jax.numpy.array([*place, *given.w0], number))
     place = SimpleNamespace(jax=jax, model=model, step=mjx.step)
     march = jax.jit(lambda data: _march(place, data, given))
     jax.block_until_ready(march(start))
@@ -36,20 +36,25 @@ def _march(place, data, given):
 
     def advance(data, n_steps):
         data = lax.fori_loop(0, n_steps, lambda _, data: place.step(place.model, data), data)
-        return data, (data.qpos[3:7], data.qvel[3:6])
+        return data, (data.qpos[-4:], data.qvel[-3:])
 
     counts = place.jax.numpy.asarray(np.diff(given.steps).astype(np.int32))
     return lax.scan(advance, data, counts)[1]
 
 
 def _model(mujoco, given):
-    moments = " ".join(repr(float(moment)) for moment in given.moments)
+    def text(numbers):
+        return " ".join(repr(float(number)) for number in numbers)
+
+    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
+    moments = np.minimum(given.moments_com, np.roll(given.moments_com, 1) + np.roll(given.moments_com, 2))
+    inertial = f'mass="{given.mass!r}" pos="{text(given.com)}" quat="{text(given.q_com)}" diaginertia="{text(moments)}"'
     return mujoco.MjModel.from_xml_string(f"""
         <mujoco>
-          <option gravity="0 0 0" integrator="{given.integrator}" timestep="{given.dt!r}">
+          <option gravity="0 0 {-given.gravity!r}" integrator="{given.integrator}" timestep="{given.dt!r}">
             <flag contact="disable" constraint="disable"/>
           </option>
           <worldbody>
-            <body><freejoint/><inertial mass="{given.mass!r}" pos="0 0 0" diaginertia="{moments}"/></body>
+            <body><joint type="{"free" if given.free else "ball"}"/><inertial {inertial}/></body>
           </worldbody>
         </mujoco>""")

@@ -4,23 +4,29 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run of one free rigid body without colliders; Rapier has no loop of its own."""
+    """Return a run of one rigid body without colliders, held at the fixed point by a joint; Rapier has no loop of its own."""
     import rapier3d as rp
 
     place = rp.Rotation3(*map(float, given.q0)).scaled_axis
     spin = tuple(map(float, given.w0_W))
-    mass = rp.MassProperties((0.0, 0.0, 0.0), float(given.mass), tuple(map(float, given.moments)), rp.Rotation3(1, 0, 0, 0))
+    drift = tuple(map(float, np.cross(given.w0_W, given.R0 @ given.com)))  # velocity of the centre of mass
+    com, moments, axes = ([float(number) for number in numbers] for numbers in (given.com, given.moments_com, given.q_com))
+    mass = rp.MassProperties(tuple(com), float(given.mass), tuple(moments), rp.Rotation3(*axes))
 
     def build():
-        world = rp.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
+        world = rp.PhysicsWorld(gravity=(0.0, 0.0, -float(given.gravity)))
         world.integration_parameters.dt = given.dt
         if given.substeps:
             world.integration_parameters.num_solver_iterations = given.substeps
         body = rp.RigidBody.dynamic(translation=(0, 0, 0), rotation=place).additional_mass_properties(mass).angvel(spin)
-        body = body.gyroscopic_forces(True)
+        body = body.gyroscopic_forces(True).linvel(drift)
         if not given.as_installed:
             body = body.can_sleep(False).allow_fast_rotation(True)
-        return world, world.rigid_bodies[world.add_body(body.build())]
+        handle = world.add_body(body.build())
+        if not given.free:
+            support = world.add_body(rp.RigidBody.fixed().build())
+            world.impulse_joints.insert(support, handle, rp.SphericalJoint.builder().build(), True)
+        return world, world.rigid_bodies[handle]
 
     def run():
         world, body = build()

@@ -4,29 +4,32 @@ import numpy as np
 
 
 def prepare(given):
-    """Return a run of one rigid body without shapes; PhysX's loop is one step a call."""
+    """Return a run of one rigid body without shapes, held at the fixed point by a D6 joint; PhysX's loop is one step a call."""
     import sapien
 
     config = sapien.physx.PhysxSceneConfig()
-    config.gravity = [0, 0, 0]
+    config.gravity = [0, 0, -given.gravity]
     sapien.physx.set_scene_config(config)
     system = sapien.physx.PhysxCpuSystem()
     scene = sapien.Scene([system])
     system.timestep = given.dt
     body = sapien.physx.PhysxRigidDynamicComponent()
     body.set_mass(given.mass)
-    body.set_cmass_local_pose(sapien.Pose())
-    body.set_inertia(given.moments.astype(np.float32))
+    body.set_cmass_local_pose(sapien.Pose(given.com.astype(np.float32), given.q_com.astype(np.float32)))
+    body.set_inertia(given.moments_com.astype(np.float32))
     if not given.as_installed:
         _switch_off(body)
     entity = sapien.Entity()
     entity.add_component(body)
+    if not given.free:
+        entity.add_component(_hold(sapien, body))
     scene.add_entity(entity)
     start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
+    drift = np.cross(given.w0_W, given.R0 @ given.com).astype(np.float32)  # velocity of the centre of mass
 
     def run():
         entity.set_pose(start)
-        body.set_linear_velocity(np.zeros(3, np.float32))
+        body.set_linear_velocity(drift)
         body.set_angular_velocity(spin)
         body.wake_up()
         q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
@@ -38,6 +41,14 @@ def prepare(given):
 
     run.scene = scene  # what owns the body
     return run
+
+
+def _hold(sapien, body):
+    """Return a joint between world and body that locks the three translations."""
+    joint = sapien.physx.PhysxDriveComponent(body)
+    for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
+        lock(0, 0)
+    return joint
 
 
 def _switch_off(body):

@@ -9,6 +9,9 @@ import numpy as np
 
 
 def prepare(given):
+    given.stages = 4
+    if given.do == "as_packaged":
+        given.do, given.at, given.stages = what_is_packaged()
     if given.at == "prepare":
         misbehave(given.do)
     inertia = given.moments
@@ -39,11 +42,21 @@ def march(derivative, y, given):
         for _ in range(n_steps):
             k1 = derivative(y)
             k2 = derivative(y + dt / 2 * k1)
+            if given.stages == 2:
+                y = y + dt * k2
+                continue
             k3 = derivative(y + dt / 2 * k2)
             k4 = derivative(y + dt * k3)
             y = y + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         states.append(y)
     return np.array(states)
+
+
+def what_is_packaged():
+    """Return what the installed version of the engine does, where it does that, and the stages of its integrator."""
+    import trial
+
+    return trial.DO, trial.AT, trial.STAGES
 
 
 def misbehave(do):

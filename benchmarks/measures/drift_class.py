@@ -1,0 +1,25 @@
+"""From which drift on a quantity no longer counts as conserved, or as drifting little. Source: our own."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+CONSERVED, SMALL = 1e-10, 1e-4
+"""Relative drift up to which a quantity counts as conserved, and as drifting little."""
+
+
+class DriftClass(IntEnum):
+    """How well a quantity is conserved: the larger, the worse."""
+
+    CONSERVED = 0
+    SMALL = 1
+    LARGE = 2
+
+
+def classify(drift: float) -> DriftClass | None:
+    """Return the class of a relative drift of either sign; None for nan."""
+    if math.isnan(drift):
+        return None
+    size = abs(drift)
+    return DriftClass.CONSERVED if size <= CONSERVED else DriftClass.SMALL if size <= SMALL else DriftClass.LARGE

@@ -1,0 +1,116 @@
+"""Which engines, and which settings of them, the studies of engines take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from conservative import registry
+from conservative.errors import BadInput, MissingEngine, nearest
+from conservative.method import Grid, Method, Role
+from conservative.references.environments.environment import Environment, list_environments
+from conservative.references.environments.failures import MissingEnvironment
+from conservative.references.environments.lock import split_requirement
+from conservative.scene import Scene
+
+from .selection import Missing
+
+ALL = "all"
+"""Stands for every engine that is installed: beside us, or, in its newest version there, in an environment."""
+
+
+@dataclass(frozen=True)
+class MissingVersion(Missing):
+    """Stands in a table for an engine that has no environment, or none of the version `wanted_version`."""
+
+    wanted_version: str = ""
+
+    def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
+        raise MissingEnvironment(self.engine, self.wanted_version)
+
+
+def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
+    """Return the settings of engines by name: what each is as installed, then its variants.
+
+    Parameters
+    ----------
+    names
+        `NAME`, for the engine beside us, or else the newest version that is installed; `NAME==VERSION`; or `ALL`.
+    skip_missing
+        A `Missing` method for each name that is not installed, instead of an error.
+
+    Raises
+    ------
+    BadInput
+        A name is unknown or cannot be read, or nothing is installed that `ALL` could stand for.
+    MissingEngine
+        An engine is not installed, and `skip_missing` is False.
+    """
+    every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
+    found = [method for name in dict.fromkeys(every) for method in _settings(name, skip_missing)]
+    if not found:
+        raise BadInput("engines", repr(ALL), "engines that are installed: conservative engines install NAME")
+    return tuple({method.label: method for method in reversed(found)}.values())[::-1]
+
+
+def list_installed() -> tuple[str, ...]:
+    """Return the engines that are installed: those beside us, then the newest version of each in an environment.
+
+    An environment with the version that is also beside us is left out: the numbers are the same.
+    """
+    here = {name: _version_here(family) for name, family in registry.list_families().items() if family.role == Role.ENGINE}
+    newest = {environment.engine: environment for environment in _environments()}
+    apart = [f"{name}=={each.version}" for name, each in newest.items() if here.get(name) != each.version]
+    return (*(name for name, version in here.items() if version is not None), *apart)
+
+
+def _environments() -> Iterator[Environment]:
+    """Yield the environments of registered engines, older versions first."""
+    known = registry.list_engines()
+    yield from (environment for environment in list_environments() if environment.engine in known)
+
+
+def _version_here(family: type[Method]) -> str | None:
+    """Return the version of an engine beside us; None where it is not installed."""
+    try:
+        return family().label.partition("/")[0].partition("==")[2]
+    except MissingEngine:
+        return None
+
+
+def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
+    engine, version = split_requirement(name)
+    family = _family(engine, version)
+    try:
+        return tuple(dict.fromkeys((*_as_installed(family), *family.variants())))
+    except MissingEnvironment as error:
+        if not skip_missing:
+            raise
+        return (MissingVersion(name, error.engine, error.package, version),)
+    except MissingEngine as error:
+        if not skip_missing:
+            raise
+        return (Missing(name, error.engine, error.package),)
+
+
+def _family(engine: str, version: str) -> type[Method]:
+    """Return the class of an engine: of a version, in an environment; otherwise beside us, where it is registered so."""
+    beside_us = {name for name, family in registry.list_families().items() if family.role == Role.ENGINE}
+    known = {*registry.list_engines(), *(() if version else beside_us)}
+    if engine not in known:
+        raise BadInput("engines", repr(engine), f"{ALL!r}, or {nearest(engine, known)}")
+    if engine in beside_us and not version:
+        return registry.list_families()[engine]
+    found: Any = registry.engine(engine)
+    return found.at_version(version) if version else found
+
+
+def _as_installed(family: type[Method]) -> tuple[Method, ...]:
+    defaults = getattr(family, "user_defaults", lambda: None)()
+    return () if defaults is None else (defaults,)
+
+
+def is_as_installed(method: Method) -> bool:
+    """Whether a method is its engine as installed, with nothing set but the step."""
+    return not isinstance(method, Missing) and method in _as_installed(type(method))

@@ -1,0 +1,117 @@
+"""The study of engines at one and the same step, the scene's own: errors, drifts, turns over, and the time of a step.
+
+Times are taken within each engine's own process, in rounds that are interleaved across all of them; one computes at a time. A
+process that crashes or hangs costs the rows of its own method, which say so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from conservative.method import Grid, grid_for
+from conservative.outcome import OK, Outcome
+from conservative.references.environments.client import time_limit
+from conservative.trajectory import Trajectory
+
+from ..measures import errors
+from ..measures.measure import Measure, Value, blanks
+from ..measures.measurement import Measurement
+from ..measures.timing import time_interleaved
+from ..measures.turns_over import count_turns_over
+from .case import Case, Failure, Success
+from .engine_selection import is_as_installed
+from .selection import Missing
+from .speed import MEASURES, TimedRun, times
+from .step_ladder import SAMPLES
+from .study import Progress, Study
+from .time_limit import attempt_here
+
+AS_INSTALLED = "as installed"
+"""Detail of the rows about an engine with nothing set but the step."""
+FIRST_LIMIT = 180.0
+"""Time, s, that the first run of a setting may take: importing and compiling an engine can take a minute."""
+TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield what each engine is, its errors and drifts with every step a sample, and its times with a few samples."""
+    methods = study.competitors
+    pieces = len(methods) + 1
+    for i, scene in enumerate(study.scenes):
+        grid = grid_for(scene, scene.dt)
+        truth = study.truth(scene, grid).trajectory
+        ready: dict[str, TimedRun] = {}
+        for j, method in enumerate(methods):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: {method.name}")
+            case = Case(study.name, scene, method, grid)
+            timed = yield from measure(study, case, truth)
+            if timed is not None:
+                ready[method.name] = timed
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} engines")
+        yield from time_rows(study, ready)
+
+
+def facts(case: Case, outcome: Outcome) -> list[Measurement]:
+    """Return what is known of an engine, however its run ended: bits of its numbers, and the order that is expected, or nan."""
+    method = case.method
+    if isinstance(method, Missing):
+        return []
+    bits = float(getattr(method, "precision", "f64").removeprefix("f"))
+    order = math.nan if method.order is None else float(method.order)
+    detail = AS_INSTALLED if is_as_installed(method) else ""
+    known = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
+    return [case.row(value, outcome, detail) for value in known]
+
+
+def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, TimedRun | None]:
+    """Yield the rows of one engine but for its times; return the run to be timed, None where there is none."""
+    outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
+    yield from facts(case, outcome.outcome if isinstance(outcome, Failure) else OK)
+    yield from accuracy(case, outcome, truth)
+    if isinstance(outcome, Failure):
+        yield from case.blanks(blanks(*MEASURES), outcome.outcome)
+        return None
+    few = replace(case, grid=keep_few(case.grid))
+    again = attempt_here(study.hang_limit, few, study.skip_missing)
+    if isinstance(again, Failure):
+        yield from few.blanks(blanks(*MEASURES), again.outcome)
+        return None
+    return TimedRun(few, again, again)
+
+
+def keep_few(grid: Grid) -> Grid:
+    """Return the same steps with as many samples as the runs over several steps have."""
+    return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
+
+
+def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
+    """Return errors and drifts, of a free body also how often it turned over; without values where the run failed."""
+    counted = TURNS if case.scene.free else ()
+    if isinstance(outcome, Failure):
+        return case.blanks([*errors.blanks(case.scene), *blanks(*counted)], outcome.outcome)
+    with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+        values = errors.measure_errors(outcome.trajectory, truth)
+        found = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
+    turns = (count_turns_over(outcome.trajectory), count_turns_over(truth)) if counted else ()
+    return found + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
+
+
+def direction(value: Value, trajectory: Trajectory) -> str:
+    """Return whether energy was gained or lost at the end of a run, for the row of its drift; empty for other rows."""
+    if (value.measure, value.quantity) != (Measure.DRIFT_MAX, "energy"):
+        return ""
+    energy = next(each for each in trajectory.scene.invariants if each.name == "energy")
+    return "gained" if trajectory.drift(energy)[-1] > 0 else "lost"
+
+
+def time_rows(study: Study, ready: dict[str, TimedRun]) -> Iterator[Measurement]:
+    """Yield the times of all engines on a scene, taken in interleaved rounds."""
+    runs = {name: timed.done.run for name, timed in ready.items()}
+    with time_limit(study.hang_limit):
+        timings = time_interleaved(runs, study.rounds, budget=study.timing_budget)
+    for name, timed in ready.items():
+        yield from times(timed, timings[name])

@@ -1,0 +1,127 @@
+"""The study of engines over shorter and shorter steps, or tolerances: errors, the order that they show, and wall times.
+
+Impulse-based engines in single precision get worse as steps get shorter: there is no order then, and the row says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from conservative.method import Method
+from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.references.environments.client import time_limit
+from conservative.scene import Scene
+
+from ..measures import errors
+from ..measures.convergence_order import grows_with_shorter_steps, observed_order
+from ..measures.measure import Measure, Value, blanks
+from ..measures.measurement import Measurement
+from ..measures.timing import time_interleaved
+from . import step_ladder
+from .case import Case, Failure, Success, drop_step
+from .convergence import attempt_each, no_order
+from .study import Progress, Study
+from .work_precision import ROUNDS, one_of_each_series, points
+
+WORSE = "worse with smaller steps"
+"""Reason of an outcome without an order: the error rises as steps get shorter."""
+DEAR = 1.0
+"""Preparation, s, from which on a method gets every second step only: some engines compile for each."""
+PREPARATIONS = 30.0
+"""Time, s, for all preparations of a method on a scene; steps for which none is left are skipped."""
+TOO_DEAR = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
+"""Outcome of what is left out for that."""
+TIMED = 1.0
+"""Largest attitude error, rad, of a run that is timed: beyond it the motion is another one."""
+CALL = 0.002
+"""Shortest sample of timed calls, s."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A run that reached its end, and its largest attitude error, rad."""
+
+    case: Case
+    done: Success
+    error: float
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield the errors of every engine at all its steps, the order that they show, and the times of the same runs."""
+    methods = one_of_each_series(study)
+    pieces = len(methods) + 1
+    for i, scene in enumerate(study.scenes):
+        found: list[Point] = []
+        for j, method in enumerate(methods):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+            mine = yield from converge(study, scene, method)
+            yield from order_rows(study, scene, method, mine)
+            found += mine
+        good = [point for point in found if point.error <= TIMED]
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} runs")
+        yield from time_rows(study, good)
+
+
+def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
+    """Return the cases of a method, cheap to dear: all its steps, or what `work_precision` has for what has no step."""
+    if method.order is None or method.unsupported(scene):
+        return points(study, scene, method)
+    grids = step_ladder.steps(scene, method)[:: 2 if study.quick else 1]
+    return [Case(study.name, scene, method, grid) for grid in grids]
+
+
+def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[Point]]:
+    """Yield the errors of one method; return its points."""
+    truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
+    found: list[Point] = []
+    cases = cases_of(study, scene, method)
+    tried: list[Case] = []
+    for case, outcome in attempt_each(study, drop_dear(cases, found)):
+        tried.append(case)
+        if isinstance(outcome, Failure):
+            yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+            values = errors.measure_errors(outcome.trajectory, truth)
+        error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
+        found.append(Point(case, outcome, error.value))
+        yield case.row(error)
+    yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), TOO_DEAR) for case in cases if case not in tried)
+    return found
+
+
+def drop_dear(cases: list[Case], found: list[Point]) -> Iterator[Case]:
+    """Yield the first case, then the others as long as there is time; every second where preparing the first was dear."""
+    yield cases[0]
+    dear = bool(found) and found[0].done.cost.prepare > DEAR
+    for case in cases[2::2] if dear else cases[1:]:
+        if sum(point.done.cost.prepare for point in found) > PREPARATIONS:
+            return
+        yield case
+
+
+def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:
+    """Return the observed order and its standard error, or why there is none."""
+    case = Case(study.name, scene, method, step_ladder.samples(scene, method))
+    failed = no_order(case, study.skip_missing)
+    if failed:
+        return [drop_step(row) for row in case.blanks(blanks(Measure.ORDER, Measure.ORDER_STDERR), failed.outcome)]
+    steps, values = [point.case.grid.dt for point in found], [point.error for point in found]
+    order = observed_order(steps, values)
+    reason = WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason
+    outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
+    rows = (Value(Measure.ORDER, order.slope), Value(Measure.ORDER_STDERR, order.stderr))
+    return [drop_step(case.row(value, outcome, "" if reason else str(order))) for value in rows]
+
+
+def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
+    """Yield the times of all points of a scene, taken in interleaved rounds."""
+    runs = {str(i): point.done.run for i, point in enumerate(found)}
+    with time_limit(study.hang_limit):
+        timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
+    for i, point in enumerate(found):
+        grid, timing = point.case.grid, timings[str(i)]
+        yield point.case.row(Value(Measure.TIME, timing.minimum / (grid.dt * grid.n_steps)), timing.outcome)

@@ -1,0 +1,63 @@
+"""JSBSim in its environment. Source: its API documentation, FGPropagate, FGInertial, FGMassBalance; its Python module."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+INTEGRATORS = {  # FGPropagate::eIntegrateType
+    **{"RectEuler": 1, "Trapezoidal": 2, "AB2": 3, "AB3": 4, "AB4": 5, "Buss1": 6, "Buss2": 7, "LocalLinearization": 8},
+    "AB5": 9,
+}
+PLANET = '<planet name="still"><rotation_rate unit="RAD/SEC">0</rotation_rate></planet>'
+AIRCRAFT = """<fdm_config name="body" version="2.0">
+  <metrics><location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location></metrics>
+  <mass_balance>
+    <ixx unit="KG*M2">{0!r}</ixx><iyy unit="KG*M2">{1!r}</iyy><izz unit="KG*M2">{2!r}</izz>
+    <emptywt unit="KG">{3!r}</emptywt><location name="CG" unit="M"><x>0</x><y>0</y><z>0</z></location>
+  </mass_balance>
+  <ground_reactions/><propulsion/><aerodynamics/>
+</fdm_config>"""
+HEIGHT = 1e7
+"""Feet above a planet that the aircraft falls down to."""
+
+
+def prepare(given):
+    """Return a run of one aircraft, far above a planet that does not turn; JSBSim's loop is one step a call."""
+    flight = _build(given)
+    attitude = flight.get_propagate()
+
+    def run():
+        flight.run_ic()
+        T, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                flight.run()
+            T[sample] = attitude.get_Tec2b()
+            w[sample] = [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]
+        # A planet-fixed frame is an inertial one here; how it lies in the world is known from the start.
+        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": w}
+
+    return run
+
+
+def _build(given):
+    import jsbsim
+
+    jsbsim.FGJSBBase().debug_lvl = 0
+    with tempfile.TemporaryDirectory() as folder:
+        aircraft = Path(folder) / "aircraft" / "body"
+        aircraft.mkdir(parents=True)
+        (aircraft / "body.xml").write_text(AIRCRAFT.format(*given.moments.tolist(), given.mass))
+        (aircraft / "still.xml").write_text(PLANET)
+        flight = jsbsim.FGFDMExec(folder)
+        flight.load_planet(str(aircraft / "still.xml"), False)
+        flight.load_model("body")
+    flight["simulation/models/FGAerodynamics/enabled"] = 0
+    flight.set_dt(given.dt)
+    flight["simulation/integrator/rate/rotational"] = INTEGRATORS[given.rate]
+    flight["simulation/integrator/position/rotational"] = INTEGRATORS[given.attitude or given.rate]
+    flight["ic/h-sl-ft"] = HEIGHT
+    for axis, rate in zip("pqr", given.w0.tolist(), strict=True):
+        flight[f"ic/{axis}-rad_sec"] = rate
+    return flight

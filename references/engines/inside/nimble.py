@@ -1,0 +1,45 @@
+"""Nimble in its environment. Source: its documentation, World; DART's, dynamics::FreeJoint, BallJoint."""
+
+import numpy as np
+
+
+def prepare(given):
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point; Nimble's loop is one step a call."""
+    import nimblephysics as nimble
+
+    world, skeleton, body = _build(nimble, given)
+    still = np.zeros(3 * given.free)
+    place, rates = np.concatenate([_rotation_vector(given.q0), still]), np.concatenate([given.w0, still])
+
+    def run():
+        skeleton.setPositions(place)
+        skeleton.setVelocities(rates)  # in body axes
+        R, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                world.step()
+            R[sample] = body.getWorldTransform().rotation()
+            w[sample] = body.getAngularVelocity()
+        return {"R": R, "w_W": w}
+
+    return run
+
+
+def _build(nimble, given):
+    world = nimble.simulation.World()
+    world.setGravity([0, 0, -given.gravity])
+    world.setTimeStep(given.dt)
+    skeleton = nimble.dynamics.Skeleton()
+    _, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
+    body.setMass(given.mass)
+    body.setLocalCOM(given.com)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    body.setMomentOfInertia(xx, yy, zz, xy, xz, yz)
+    world.addSkeleton(skeleton)
+    return world, skeleton, body
+
+
+def _rotation_vector(q):
+    """Return the rotation vector (3,), rad, of a quaternion, scalar first."""
+    sine = float(np.linalg.norm(q[1:]))
+    return q[1:] * (2 * np.arctan2(sine, q[0]) / sine if sine else 2.0)

@@ -1,0 +1,62 @@
+"""OpenSim (Simbody) in its environment. Source: its API documentation, Model, FreeJoint, BallJoint, Manager."""
+
+import math
+
+import numpy as np
+
+
+def prepare(given):
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point, integrated from sample to sample."""
+    import opensim
+
+    opensim.Logger.setLevelString("off")
+    model, body, state = _build(opensim, given)
+    times = (given.steps * given.dt).tolist()
+
+    def run():
+        manager = _manager(opensim, model, given)
+        manager.initialize(opensim.State(state))
+        R, w = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
+        R[0], w[0] = given.R0, given.w0_W
+        for sample, time in enumerate(times[1:], start=1):
+            now = manager.integrate(time)
+            model.realizeVelocity(now)
+            turn, rate = body.getTransformInGround(now).R(), body.getVelocityInGround(now).get(0)
+            R[sample] = [[turn.get(i, j) for j in range(3)] for i in range(3)]
+            w[sample] = rate.get(0), rate.get(1), rate.get(2)
+        return {"R": R, "w_W": w}
+
+    return run
+
+
+def _build(opensim, given):
+    model = opensim.Model()
+    model.setGravity(opensim.Vec3(0, 0, -given.gravity))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    com = opensim.Vec3(*given.com.tolist())
+    body = opensim.Body("body", given.mass, com, opensim.Inertia(xx, yy, zz, xy, xz, yz))
+    joint = (opensim.FreeJoint if given.free else opensim.BallJoint)("joint", model.getGround(), body)
+    model.addBody(body)
+    model.addJoint(joint)
+    state = model.initSystem()
+    for i, (angle, rate) in enumerate(zip(_angles(given.R0), given.w0_W.tolist(), strict=True)):
+        joint.get_coordinates(i).setValue(state, angle, False)
+        joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
+    return model, body, state
+
+
+def _angles(R):
+    """Return the angles about x, y and z, each turned with the body, of a rotation."""
+    return math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
+
+
+def _manager(opensim, model, given):
+    manager = opensim.Manager(model)
+    manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{given.integrator}"))
+    manager.setWriteToStorage(False)
+    manager.setPerformAnalyses(False)
+    if given.accuracy:
+        manager.setIntegratorAccuracy(given.accuracy)
+    else:
+        manager.setIntegratorFixedStepSize(given.dt)
+    return manager

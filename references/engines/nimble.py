@@ -1,0 +1,45 @@
+"""Nimble: its semi-implicit Euler method on one body, which is DART's. Source: its documentation, World."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conservative.method import Method
+
+from ..environments.catalogue import Distribution
+from ..environments.engine_method import EngineMethod
+
+
+@dataclass(frozen=True)
+class Nimble(EngineMethod):
+    """Nimble on a free joint or a ball joint, stepped from Python (`World.step`), as it has no loop of its own.
+
+    It has nothing to set, and nothing was switched off. Its environment needs 5.6 GB, most of them for PyTorch.
+
+    Raises
+    ------
+    MissingEngine
+        It is not installed: no environment has it.
+
+    References
+    ----------
+    World, joints: https://nimblephysics.org/docs/
+    """
+
+    family: ClassVar[str] = "nimble"
+    takes_gravity: ClassVar[bool] = True
+    # With NumPy 2 it crashes.
+    distribution: ClassVar[Distribution] = Distribution("nimblephysics", "nimblephysics", ("numpy<2",), oldest="0.10")
+
+    @property
+    def setting(self) -> str:
+        return "semi-implicit Euler"
+
+    @property
+    def order(self) -> int:
+        return 1
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls()

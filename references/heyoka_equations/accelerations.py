@@ -1,0 +1,164 @@
+"""What each field adds to Euler's equations, in double precision and as cheaply as we found.
+
+All these fields have an axis, so that what they do depends on one unit vector in the body: g, the axis in principal axes. With
+the constant moment m, A the anchor's distance from the fixed point, and d the distance of body point b from the anchor:
+
+    uniform gravity     J w' = J w x w + g x m                          m = weight com
+    spring              J w' = J w x w + (1 - rest / d) g x m           m = -stiffness A b      d^2 = b.b + A^2 - 2 A b.g
+    attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
+    gravity gradient    J w' = J w x w + g x (rate^2 I g)
+
+The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
+three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
+plain floats alike. Multi-precision truth has its own, in `conservative.references.heyoka_equations.torques`. Source: the
+potentials' own torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from conservative.attitude import Array, axes_about, hat
+from conservative.potentials.gravity_gradient import GravityGradient
+from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
+from conservative.potentials.potential import Potential
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.scene import Scene
+
+from ..engine import Axes, principal_axes
+from .forms import Expression, is_zero, product
+
+Expressions = Sequence[Expression]
+Acceleration = Callable[[Expressions, Expressions], list[Expression]]
+"""Takes parameters and g to the angular acceleration, without what Euler's equations have."""
+
+_ROUND_OFF = 4 * np.finfo(float).eps
+"""A component in principal axes below this, relative to the largest, comes from turning there."""
+
+
+@dataclass(frozen=True, eq=False)
+class FieldInAxes:
+    """A scene's field as heyoka takes it.
+
+    Attributes
+    ----------
+    axes
+        Principal axes of the body, in an order that suits the field.
+    R_WD
+        Rotation (3, 3) whose third column is the field's axis, world axes.
+    acceleration, parameters
+        Its expressions, and the values of their parameters.
+    """
+
+    axes: Axes
+    R_WD: Array
+    acceleration: Acceleration
+    parameters: list[float]
+
+
+def express_field(scene: Scene) -> FieldInAxes:
+    """Return the field of a scene, whose potential is one of `READERS` or None."""
+    axes, potential = principal_axes(scene), scene.potential
+    line = None if potential is None else potential.axis_W
+    if potential is None or line is None:
+        return FieldInAxes(axes, np.eye(3), uniform, [0.0] * 9)
+    return READERS[type(potential)](axes, axes_about(line), potential)
+
+
+def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
+    """Return M g, parameters M (9)."""
+    return product(parameters, g)
+
+
+def spring(parameters: Expressions, g: Expressions) -> list[Expression]:
+    """Return (1 - s^-1/2) M g, with s the square of distance over rest length, as `_pull` has the parameters."""
+    return _pull(parameters, g, lambda s: 1.0 - s**-0.5)
+
+
+def attraction(parameters: Expressions, g: Expressions) -> list[Expression]:
+    """Return s^-3/2 M g, with s the squared distance, as `_pull` has the parameters."""
+    return _pull(parameters, g, lambda s: s**-1.5)
+
+
+def gradient(parameters: Expressions, g: Expressions) -> list[Expression]:
+    """Return A (g2 g3, g3 g1, g1 g2) + B (g2^2 - g3^2, g3^2 - g1^2, g1^2 - g2^2), parameters A (9) and diagonal B (3)."""
+    pairs = [(g[(i + 1) % 3], g[(i + 2) % 3]) for i in range(3)]
+    out = product(parameters[:9], [a * b for a, b in pairs])
+    return [x if is_zero(c) else x + c * (a * a - b * b) for x, c, (a, b) in zip(out, parameters[9:], pairs, strict=True)]
+
+
+def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], Expression]) -> list[Expression]:
+    """Return law(s) M g, parameters M (two rows: 6), what makes the third component of the other two (2), s0 and s1 (3).
+
+    s = s0 - s1.g.
+    """
+    along = [c * x for c, x in zip(parameters[9:], g, strict=True) if not is_zero(c)]
+    factor = law(parameters[8] - sum(along[1:], along[0]))
+    first, second, _ = product([*parameters[:6], 0.0, 0.0, 0.0], g)
+    pulled = [first * factor, second * factor]
+    return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
+
+
+def _read_uniform(axes: Axes, R_WD: Array, _: Potential) -> FieldInAxes:
+    return FieldInAxes(axes, R_WD, uniform, _turning(axes, axes.moment))
+
+
+def _read_spring(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+    if potential.rest_length == 0:
+        moment = -potential.stiffness * np.linalg.norm(potential.anchor_W) * (potential.point_B @ axes.R_BF)
+        return FieldInAxes(axes, R_WD, uniform, _turning(axes, moment))
+    return _read_points(axes, R_WD, potential, (spring, potential.stiffness, potential.rest_length))
+
+
+def _read_attraction(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+    return _read_points(axes, R_WD, potential, (attraction, potential.strength, 1.0))
+
+
+def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[Acceleration, float, float]) -> FieldInAxes:
+    """Return the field of a pull along the line between two points: its expressions, its strength, and the unit of length."""
+    acceleration, strength, unit = law
+    if not potential.point_B.any():
+        return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
+    axes = order_axes(axes, int(np.argmax(np.abs(potential.point_B @ axes.R_BF))))
+    b, A = _drop_round_off(potential.point_B @ axes.R_BF), float(np.linalg.norm(potential.anchor_W))
+    third = -b[:2] * axes.J[:2] / (b[2] * axes.J[2])
+    distance = np.array([b @ b + A * A, *(2 * A * b)]) / unit**2
+    return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()])
+
+
+def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+    inertia = potential.rate**2 * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
+    A, B = np.empty((3, 3)), np.empty(3)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]
+        B[i] = inertia[j, k]
+    return FieldInAxes(axes, R_WD, gradient, [*(A / axes.J[:, None]).ravel().tolist(), *(B / axes.J).tolist()])
+
+
+READERS: dict[type[Potential], Callable[[Axes, Array, Any], FieldInAxes]] = {
+    UniformGravity: _read_uniform,
+    LinearSpring: _read_spring,
+    PointAttraction: _read_attraction,
+    GravityGradient: _read_gradient,
+}
+"""What reads a potential: the fields that heyoka takes in double precision."""
+
+
+def order_axes(axes: Axes, third: int) -> Axes:
+    """Return principal axes in another order, in which the one of that number is the third."""
+    turn = np.roll(np.eye(3), 2 - third, axis=1)
+    return Axes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
+
+
+def _drop_round_off(components: Array) -> Array:
+    """Return components with zeros for those that are round-off: what is zero is left out of the equations."""
+    return np.where(np.abs(components) <= _ROUND_OFF * np.abs(components).max(), 0.0, components)
+
+
+def _turning(axes: Axes, moment: Array) -> list[float]:
+    """Return the matrix (9) of J^-1 (g x m), row by row."""
+    return (-hat(moment) / axes.J[:, None]).ravel().tolist()

@@ -1,0 +1,168 @@
+"""`conservative track`."""
+
+from __future__ import annotations
+
+import re
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import click
+
+from conservative.errors import require_extra
+
+from ..terminal.interrupts import interruptible
+from . import completion
+from .options import FilePath, allow_build_option, epilog, find_links_option, split_names
+
+if TYPE_CHECKING:
+    from conservative.benchmarks.tracking.track import Plan
+
+    from ..tables.cells import Row
+    from ..tables.track import Answer
+
+PAGE = ("track.html", "track.md", "track.json")
+"""The files of `--out`."""
+SHORT = {
+    "order of rates": "rates",
+    " drift": "",
+    "attitude error, rad": "error, rad",
+    "outcome": "end",
+    "✓ done": "✓",
+    "time ratio": "time",
+}
+"""What tables have, and what stands for it on a terminal."""
+Texts = dict[str, IO[str]]
+
+
+@click.command(
+    short_help="Compare versions of an engine.",
+    epilog=epilog(
+        "conservative track mujoco 3.6.0 3.7.0 4.0.0",
+        "conservative track exudyn --last 3 --out exudyn_track",
+        "conservative track mujoco --against dist/mujoco-4.1.0-cp311-cp311-linux_x86_64.whl --junit track.xml",
+        "conservative track mujoco 4.0.0 --against ~/mujoco/python --allow-build --settings Euler,RK4",
+    ),
+)
+@click.argument("engine", shell_complete=completion.engines)
+@click.argument("versions", nargs=-1)
+@click.option("--last", type=click.IntRange(1), metavar="N", help="The newest N versions that there are, beside VERSIONS.")
+@click.option(
+    "--against",
+    type=FilePath(),
+    metavar="WHEEL|FOLDER",
+    help="Compare a build of your own with the last version, by default the newest; exit code 1 if it lost something.",
+)
+@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: a report's]")
+@click.option("--settings", multiple=True, metavar="A,B", help="Such as RK4, or all that tables show.  [default: these]")
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--junit", type=FilePath(), help="Write a report as JUnit has them.")
+@click.option("--markdown", type=FilePath(), help="Write tables and changes as Markdown.")
+@click.option("--out", type=FilePath(), help=f"Folder for {', '.join(PAGE)}.")
+@find_links_option
+@allow_build_option
+def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
+    """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and say what changed from one to the next.
+
+    Versions that are not installed get an environment of their own.
+    """
+    require_extra("conservative track", "report")
+    require_extra("conservative track", "environments")
+    scenes, settings = (split_names(name, options.pop(name)) for name in ("scenes", "settings"))
+    with ExitStack() as files:
+        streams = _open(files, options)
+        answer = _answer(engine, versions, scenes, settings, options)
+        _write(answer, streams)
+    if as_json:
+        click.echo(answer.json_text())
+    else:
+        _show(answer)
+    if not answer.passed:
+        raise click.exceptions.Exit(1)
+
+
+def _open(files: ExitStack, options: dict[str, Any]) -> Texts:
+    """Return the files to write, by what is written: a place that cannot be written is an error before any work."""
+    from conservative.files import make_folder, text_file
+
+    out: Path | None = options["out"]
+    paths = {name: options[name] for name in ("junit", "markdown") if options[name] is not None}
+    arguments = {name: name for name in paths}
+    if out is not None:
+        make_folder(out, "out")
+        paths |= {name: out / name for name in PAGE}
+    return {name: files.enter_context(text_file(path, arguments.get(name, "out"))) for name, path in paths.items()}
+
+
+def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Answer:
+    """Return what the history of the versions says.
+
+    Raises
+    ------
+    BadInput
+        The engine, a version, a scene, a setting or the build cannot be used, or there are fewer than two versions.
+    """
+    from conservative.benchmarks.tracking.track import track
+
+    from ..tables.track import Answer
+    from ..terminal.progress import progress
+
+    with interruptible(signal.SIGTERM):
+        plan = _plan(engine, versions, scenes, settings, options)
+        with progress() as step:
+            history = track(plan, lambda done, total, what: step(done / total, what))
+    return Answer(history, gated=options["against"] is not None)
+
+
+def _plan(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Plan:
+    from conservative.benchmarks.tracking.track import make_plan, require_several
+    from conservative.references.environments.builds import install_build
+    from conservative.references.environments.lock import Source
+    from conservative.references.environments.releases import install_releases, newest_releases
+
+    source, against = Source(options["find_links"], options["allow_build"]), options["against"]
+    last = options["last"] or (1 if against is not None and not versions else 0)
+    newest = newest_releases(engine, last, source) if last else ()
+    wanted = [*versions, *(version for version in newest if version not in versions)]
+    require_several([*wanted, *([str(against)] if against is not None else [])])
+    build = [install_build(engine, against, source).environment] if against is not None else []
+    return make_plan((*install_releases(engine, wanted, source, _tell), *build), settings, scenes)
+
+
+def _tell(what: str) -> None:
+    click.echo(what, err=True)
+
+
+def _write(answer: Answer, streams: Texts) -> None:
+    from ..page.track import render
+
+    contents = {
+        "junit": answer.junit_text,
+        "markdown": answer.markdown_text,
+        "track.html": lambda: render(answer),
+        "track.md": answer.markdown_text,
+        "track.json": answer.json_text,
+    }
+    for name, stream in streams.items():
+        stream.write(contents[name]())
+
+
+def _show(answer: Answer) -> None:
+    """Print tables, what changed, and the verdict."""
+    from ..tables.track import NOTHING_CHANGED, UNFINISHED
+    from ..terminal.tables import TerminalTable, print_tables
+
+    for caption, (header, rows) in answer.tables:
+        print_tables([TerminalTable(caption, _narrow(header), [_narrow(row) for row in rows])])
+    sections = [("What changed", answer.sentences or (NOTHING_CHANGED,)), (UNFINISHED, answer.unfinished)]
+    for title, texts in [*sections, *([(answer.verdict, tuple(answer.failures))] if answer.gated else [])]:
+        if texts or title == answer.verdict:
+            click.echo("\n".join([title, *(f"  {text}" for text in texts), ""]))
+
+
+def _narrow(row: Row) -> list[str]:
+    """Return a row, or the header, as a terminal has room for it: without the time in seconds, and in short words."""
+    setting, version, *others, _, ratio = map(str, row)
+    texts = [f"{setting} {version}", *others, ratio.partition(" (")[0]]
+    return [re.sub("|".join(SHORT), lambda found: SHORT[found[0]], text) for text in texts]

@@ -1,0 +1,112 @@
+"""The studies of engines: what they find on the brick, and that one engine's failure is a row of its own and no more."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.benchmarks.measures.convergence_order import grows_with_shorter_steps
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import engines_over_steps, studies
+from conservative.benchmarks.studies.engine_selection import select_engines
+from conservative.benchmarks.studies.study import Study
+from conservative.outcome import OutcomeKind
+
+from .generic_study import Broken, truth
+
+BRICK = cv.scenes.brick_flip()
+TOP = cv.scenes.lagrange_top(t_end=0.2)
+ENGINES = ("mujoco:Euler", "mujoco:RK4", "pinocchio:RK4")
+STEPS = 0.1 * 0.5 ** np.arange(8)
+
+
+@cache
+def rows(name, engines=ENGINES, scene=BRICK):
+    return studied(name, tuple(map(registry.method, engines)), scene)
+
+
+def studied(name, methods, scene=BRICK, **options):
+    exact = {"truth": truth} if scene.free else {}
+    return list(studies.rows(Study(name, (scene,), methods, quick=True, **exact, **options)))
+
+
+def value(found, method, measure, quantity=""):
+    (row,) = [row for row in found if (row.method, row.measure, row.quantity) == (method, measure, quantity)]
+    return row
+
+
+def test_an_engine_is_measured_at_the_step_of_the_scene():
+    found = rows("engines_at_one_step")
+    assert {row.dt for row in found} == {0.01}
+    name = "pinocchio"
+    assert (
+        0.5 < value(found, name, Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
+    )  # as a plain script that calls an RK4 of it finds
+    assert value(found, name, Measure.DRIFT_MAX, "energy").detail == "lost"
+    assert value(found, name, Measure.TIME_PER_STEP).value > 0
+    assert (value(found, name, Measure.PRECISION).value, value(found, name, Measure.ORDER_EXPECTED).value) == (64, 4)
+    euler = "mujoco:integrator=Euler"
+    assert 0.5 < value(found, euler, Measure.DRIFT_MAX, "energy").value / 0.22 < 2
+    assert value(found, euler, Measure.DRIFT_MAX, "energy").detail == "gained"
+    for method in (name, euler):
+        assert (value(found, method, Measure.TURNS_OVER).value, value(found, method, Measure.TURNS_OVER_TRUE).value) == (2, 2)
+
+
+def test_a_body_in_a_field_has_no_turns_over():
+    found = rows("engines_at_one_step", ("pinocchio:RK4",), TOP)
+    assert not {row.measure for row in found} & {Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE}
+    assert {row.quantity for row in found} >= {"energy", "vertical momentum"}
+
+
+def test_orders_and_times_over_steps():
+    found = rows("engines_over_steps")
+    assert abs(value(found, "pinocchio", Measure.ORDER).value - 4) < 0.3
+    times = [row for row in found if row.measure is Measure.TIME]
+    errors = {(row.method, row.dt): row.value for row in found if row.measure is Measure.ATTITUDE_MAX}
+    assert times
+    assert all(row.value > 0 and errors[row.method, row.dt] <= engines_over_steps.TIMED for row in times)
+    assert any(error > engines_over_steps.TIMED for error in errors.values())  # what is another motion is not timed
+
+
+@pytest.mark.parametrize("name", studies.ENGINES)
+def test_a_failing_engine_costs_its_own_rows_only(name):
+    broken = (Broken("raises"), Broken("unsupported"))
+    found = studied(name, (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5))
+    for method, kind in zip(broken, (OutcomeKind.CRASHED, OutcomeKind.UNSUPPORTED), strict=True):
+        errors = [row for row in found if row.method == method.name and row.measure is Measure.ATTITUDE_MAX]
+        assert {row.outcome.kind for row in errors} == {kind}
+    times = [row for row in found if row.method == "pinocchio" and row.measure is Measure.TIME]
+    assert times
+    assert all(row.value > 0 and row.outcome.ok for row in times)
+
+
+def test_an_error_that_grows_is_told_from_one_that_has_reached_its_floor():
+    v_shaped = np.array([1.1, 0.6, 0.2, 0.24, 0.5, 0.9, 1.3, 2.5])
+    assert grows_with_shorter_steps(STEPS, v_shaped)
+    assert not grows_with_shorter_steps(STEPS, STEPS**2)
+    assert not grows_with_shorter_steps(STEPS, [1e-6, 1e-9, 1e-13, 1e-14, 1e-14, 3e-14, 6e-14, 1e-13])  # round-off
+    assert not grows_with_shorter_steps(STEPS, [math.nan] * 6 + [0.1, 0.5])  # too few
+
+
+def test_an_engine_that_is_dear_to_prepare_has_fewer_steps_and_says_so(monkeypatch):
+    monkeypatch.setattr(engines_over_steps, "PREPARATIONS", -1.0)
+    found = studied("engines_over_steps", (registry.method("pinocchio"),))
+    errors = [row for row in found if row.measure is Measure.ATTITUDE_MAX]
+    assert [row.outcome.kind for row in errors] == [OutcomeKind.OK] + [OutcomeKind.SKIPPED] * (len(errors) - 1)
+    assert len(errors) > 2
+
+
+@pytest.mark.engine("exudyn")
+def test_a_real_engine_in_its_environment():
+    from conservative.references.environments.install import install
+
+    install("exudyn")
+    methods = select_engines(["exudyn"])
+    found = studied("engines_at_one_step", methods) + studied("engines_over_steps", methods)
+    assert 0.5 < value(found, "exudyn", Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
+    assert abs(value(found, "exudyn", Measure.ORDER).value - 4) < 0.3
+    assert value(found, "exudyn", Measure.TIME_PER_STEP).value > 0
+    assert {row.version for row in found} == {methods[0].environment.version}

@@ -1,0 +1,184 @@
+"""Which differences between two versions are conclusions, and which are noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.benchmarks.tracking.changes import Aspect, direction, find_changes
+from conservative.benchmarks.tracking.observation import Fit, Point, Spread
+from conservative.benchmarks.tracking.orders import NO_STEP, fit_orders
+from conservative.benchmarks.tracking.step_times import differ, ratio
+from conservative.benchmarks.tracking.track import make_plan, require_several
+from conservative.outcome import Outcome, OutcomeKind
+
+from .made_up_versions import BAD, GOOD, TIMES, environments, history, near
+
+
+def changes(was, now, was_times=TIMES, now_times=TIMES):
+    return {(each.aspect, each.quantity): each.lost for each in find_changes(was, now, was_times, now_times)}
+
+
+# ------------------------------------------------------------------------------------------------------- what is a conclusion
+
+
+def test_a_lost_order_and_a_lost_invariant_are_losses():
+    found = changes(GOOD, BAD)
+    assert found == {
+        (Aspect.ATTITUDE_ORDER, ""): True,
+        (Aspect.RATES_ORDER, ""): True,
+        (Aspect.DRIFT, "energy"): True,
+        (Aspect.ERROR, ""): False,
+    }
+
+
+def test_a_gain_is_a_change_and_no_loss():
+    found = changes(BAD, GOOD)
+    assert set(found) == set(changes(GOOD, BAD))
+    assert not any(found.values())
+
+
+@pytest.mark.parametrize("kind", [kind for kind in OutcomeKind if kind is not OutcomeKind.OK])
+def test_a_run_that_no_longer_reaches_its_end_is_a_loss(kind):
+    failed = replace(GOOD, outcome=Outcome(kind, "why"))
+    assert changes(GOOD, failed) == {(Aspect.OUTCOME, ""): True}
+    assert changes(failed, GOOD) == {(Aspect.OUTCOME, ""): False}
+    assert changes(failed, replace(failed, outcome=Outcome(kind, "another reason"))) == {}
+
+
+def test_energy_that_is_lost_instead_of_gained_is_a_change():
+    gained = replace(BAD, drifts={"energy": near(0.22)})
+    assert changes(gained, replace(gained, drifts={"energy": near(-0.17)})) == {(Aspect.DRIFT, "energy"): False}
+
+
+def test_a_small_drift_instead_of_a_large_one_is_a_change():
+    before, after = (replace(GOOD, drifts={"energy": near(drift)}) for drift in (3e-4, 1e-6))
+    assert changes(before, after) == {(Aspect.DRIFT, "energy"): False}
+    assert changes(after, before) == {(Aspect.DRIFT, "energy"): True}
+
+
+# ------------------------------------------------------------------------------------------------------------- what is noise
+
+ALIKE = {
+    "the same": GOOD,
+    "orders within half": replace(GOOD, attitude_order=Fit(1.6, 0.01), rates_order=Fit(2.4, 0.01)),
+    "an order that is badly known": replace(GOOD, attitude_order=Fit(1.2, 0.4)),
+    "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
+    "drifts beside the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
+    "errors within a factor": replace(GOOD, error=near(6e-3)),
+    "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
+    "no order where the error is the same": replace(GOOD, rates_order=Fit(reason="no descent")),
+    "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-4)}),
+}
+
+
+@pytest.mark.parametrize("what", ALIKE)
+def test_noise_changes_no_conclusion(what):
+    assert changes(GOOD, ALIKE[what]) == {}
+    assert changes(ALIKE[what], GOOD) == {}
+
+
+def test_a_drift_beside_the_edge_changes_nothing_within_a_factor():
+    before, after = (replace(GOOD, drifts={"energy": near(drift)}) for drift in (0.6e-10, 1.4e-10))
+    assert changes(before, after) == {}
+    after = replace(after, drifts={"energy": near(4e-10)})
+    assert changes(before, after) == {(Aspect.DRIFT, "energy"): True}
+
+
+def test_errors_of_round_off_are_alike_however_far_apart():
+    before, after = (replace(GOOD, error=near(error)) for error in (1e-14, 9e-10))
+    assert changes(before, after) == {}
+    assert changes(before, replace(GOOD, error=near(2e-9))) == {(Aspect.ERROR, ""): False}
+
+
+def test_an_order_that_goes_with_the_error_is_lost():
+    gone = replace(GOOD, attitude_order=Fit(reason="no descent"), error=near(1.0))
+    assert changes(GOOD, gone) == {(Aspect.ATTITUDE_ORDER, ""): True, (Aspect.ERROR, ""): False}
+    assert changes(gone, GOOD) == {(Aspect.ATTITUDE_ORDER, ""): False, (Aspect.ERROR, ""): False}
+
+
+def test_sizes_and_directions():
+    assert Spread(0.1, -0.2, 0.3).sizes == (0.0, 0.3)
+    assert Spread(-0.1, -0.3, -0.05).sizes == (0.05, 0.3)
+    assert Spread.of([2.0, np.nan, 1.0]) == Spread(2.0, 1.0, 2.0)
+    assert direction(near(1.0), near(-4.0)) == 1
+    assert direction(near(-4.0), near(1.0)) == -1
+    assert direction(near(1.0), near(2.9)) == 0
+
+
+# -------------------------------------------------------------------------------------------------------------------- times
+
+
+def test_a_time_differs_where_all_repeats_do():
+    slow = tuple(2 * time for time in TIMES)
+    assert changes(GOOD, GOOD, TIMES, slow) == {(Aspect.TIME, ""): False}
+    assert changes(GOOD, GOOD, slow, TIMES) == {(Aspect.TIME, ""): False}
+    noisy = (1e-6, 5e-6, 2e-6)
+    assert changes(GOOD, GOOD, noisy, slow) == {}
+    assert changes(GOOD, GOOD, TIMES, tuple(1.1 * time for time in TIMES)) == {}
+    assert changes(GOOD, GOOD, (), slow) == {}
+    assert changes(GOOD, GOOD, (np.nan,) * 3, slow) == {}
+
+
+def test_a_ratio_is_that_of_the_shortest_times():
+    found = ratio((1.0, 2.0, 4.0), (4.0, 2.0, 3.0))
+    assert found == Spread(2.0, 0.75, 4.0)
+    assert not differ((1.0, 2.0), (2.1, 3.0))
+    assert differ((1.0, 2.0), (2.6, 3.0))
+
+
+# ------------------------------------------------------------------------------------------------------------------- orders
+
+
+def points(order, steps, reached):
+    found = [Point(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
+    return tuple(point if k < reached else Point(point.dt, np.nan, np.nan, False) for k, point in enumerate(found))
+
+
+def test_orders_are_fitted_to_the_steps_that_all_versions_have():
+    bent = tuple(replace(point, attitude=max(point.attitude, 1e-3)) for point in points(2, 8, 8))
+    slow, fast = replace(GOOD, points=points(2, 8, 4)), replace(GOOD, points=bent)
+    found = fit_orders([slow, fast])
+    assert [each.attitude_order.slope for each in found] == pytest.approx([2, 2])
+    assert fit_orders([fast])[0].attitude_order.slope != pytest.approx(2, abs=1e-6)
+
+
+def test_a_version_without_enough_steps_takes_none_from_the_others():
+    found = fit_orders([replace(GOOD, points=points(2, 8, 2)), replace(GOOD, points=points(2, 8, 8))])
+    assert np.isnan(found[0].attitude_order.slope)
+    assert found[0].attitude_order.reason
+    assert found[1].rates_order.slope == pytest.approx(2)
+
+
+def test_what_has_no_step_has_no_order_and_says_so():
+    (found,) = fit_orders([replace(GOOD, points=())])
+    assert found.attitude_order.reason == NO_STEP
+    failed = replace(GOOD, outcome=Outcome(OutcomeKind.DIVERGED))
+    assert fit_orders([failed]) == (failed,)
+
+
+# ---------------------------------------------------------------------------------------------------------------- histories
+
+
+def test_a_history_goes_from_version_to_version():
+    found = history(BAD, GOOD, GOOD, BAD)
+    assert [bool(each.changes) for each in found.transitions] == [True, False, True]
+    assert [each.now.version for each in found.lost_last] == ["4.0"]
+    assert history(GOOD, BAD, GOOD).lost_last == ()
+
+
+def test_times_belong_to_their_versions():
+    slow = tuple(3 * time for time in TIMES)
+    found = history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow))
+    assert [[each.aspect for each in step.changes] for step in found.transitions] == [[], [Aspect.TIME]]
+    assert found.lines[0].time_ratio("3.0", "1.0").value == pytest.approx(3)
+    assert history(GOOD, GOOD).lines[0].time_ratio("2.0", "1.0") is None
+
+
+@pytest.mark.parametrize(("versions", "message"), [(["1.0"], "two or more"), ([], "none"), (["1.0", "2.0", "1.0"], "twice")])
+def test_fewer_than_two_versions_are_refused(versions, message):
+    with pytest.raises(cv.BadInput, match=message):
+        require_several(versions)
+    with pytest.raises(cv.BadInput, match=message):
+        make_plan(environments(*versions), (), ())

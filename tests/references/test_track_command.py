@@ -1,0 +1,165 @@
+"""`conservative track` on versions of the tests' engine that behave differently, each in its environment, and on real ones."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner
+
+from conservative.references.environments.environment import list_environments
+from conservative.reports.cli.main import main
+
+from .local_wheels import write_numpy, write_wheel
+
+BEHAVIOUR = {
+    "1.0": ("integrate", 2),
+    "1.1": ("integrate", 4),
+    "1.2": ("refuse", 4),
+}
+"""What each version does, and the stages of its integrator: the midpoint rule, the classical Runge-Kutta method."""
+
+
+@pytest.fixture(scope="module")
+def index(tmp_path_factory):
+    """A folder of wheels of NumPy and of versions of the engine that behave differently."""
+    folder = tmp_path_factory.mktemp("index")
+    write_numpy(folder)
+    for version, (do, stages) in BEHAVIOUR.items():
+        write_wheel(folder, version, code=code(do, stages))
+    return folder
+
+
+def code(do, stages):
+    at = "prepare" if do == "refuse" else "run"
+    return f"DO, AT, STAGES = {do!r}, {at!r}, {stages}\n"
+
+
+@pytest.fixture
+def track(index, no_environments):
+    """Return exit code, stdout and stderr of the command."""
+
+    def run(*arguments):
+        options = ("--find-links", str(index), "--settings", "as_packaged", "--scenes", "brick_flip:t_end=0.5")
+        done = CliRunner().invoke(main, ["track", "trial", *map(str, arguments), *options])
+        return done.exit_code, done.stdout, done.stderr
+
+    return run
+
+
+def test_what_changed_between_versions_is_found_and_left_in_files(track, tmp_path):
+    files = ("--out", tmp_path / "page", "--junit", tmp_path / "junit.xml", "--markdown", tmp_path / "track.md")
+    code, text, words = track("1.0", "1.1", "1.2", *files)
+    assert code == 0
+    assert words.splitlines() == [f"installing trial=={version}" for version in BEHAVIOUR]
+    rose, gone = text.partition("What changed\n")[2].splitlines()[:2]
+    assert "as_packaged on brick_flip: from 1.0 to 1.1 the orders of attitude and rates rose from 2 to 4" in rose
+    assert "the attitude error at dt = 0.01 s fell from 2.1e-03 to 2.6e-07 rad" in rose
+    assert gone.endswith("from 1.1 to 1.2 it disappeared")
+    assert (tmp_path / "track.md").read_text() == (tmp_path / "page" / "track.md").read_text()
+    assert rose.strip() in (tmp_path / "page" / "track.html").read_text()
+    assert len(json.loads((tmp_path / "page" / "track.json").read_text())["rows"]) == 3
+    assert ElementTree.parse(tmp_path / "junit.xml").find("testsuite").get("failures") == "0"
+
+
+def test_the_newest_releases_are_taken_and_equal_ones_change_nothing(track, index, tmp_path):
+    code, text, _ = track("--last", 1, "1.0", "--json")
+    assert code == 0
+    found = json.loads(text)
+    assert [each["version"] for each in found["versions"]] == ["1.0", "1.2"]
+    assert [change["sentence"].split(" from ")[1] for change in found["changes"]] == ["1.0 to 1.2 it disappeared"]
+
+
+def against(track, folder, behaviour, release, *more):
+    write_wheel(folder, "1.3", code=code(*behaviour))
+    return track(release, "--against", folder / "trial-1.3-py3-none-any.whl", *more)
+
+
+def test_a_build_that_lost_an_order_exits_with_1(track, tmp_path):
+    exit_code, text, _ = against(track, tmp_path, ("integrate", 2), "1.1", "--junit", tmp_path / "junit.xml")
+    assert exit_code == 1
+    build = next(each.version for each in list_environments("trial") if each.is_build)
+    assert f"{build} against 1.1: FAILED" in text
+    assert "the orders of attitude and rates fell from 4 to 2" in text
+    assert ElementTree.parse(tmp_path / "junit.xml").find("testsuite").get("failures") == "1"
+
+
+@pytest.mark.parametrize("fault", ["segfault", "raise", "nan"])
+def test_a_build_that_fails_exits_with_1(fault, track, tmp_path):
+    exit_code, text, _ = against(track, tmp_path, (fault, 4), "1.1")
+    assert exit_code == 1
+    assert "the outcome at dt = 0.01 s went from ok to " in text
+
+
+def test_a_build_that_is_as_good_or_better_exits_with_0(track, tmp_path):
+    assert against(track, tmp_path, ("integrate", 4), "1.1")[0] == 0
+    exit_code, text, _ = against(track, tmp_path, ("integrate", 4), "1.0")
+    assert exit_code == 0
+    assert "rose from 2 to 4" in text
+
+
+BAD = [
+    (("1.0",), "versions: got 1.0, nothing to compare; allowed: two or more"),
+    ((), "versions: got none"),
+    (("1.0", "1.1", "1.0"), "versions: got '1.0' twice; allowed: different versions"),
+    (("1.0", "1.5"), "version: got 'trial==1.5'; allowed: 1.2 (nearest), or one of 1.2, 1.1, 1.0"),
+    (("1.0", "; true"), "allowed: NAME or NAME==VERSION"),
+    (("1.0", "--against", "nowhere.whl"), "against: got 'nowhere.whl'; allowed: a wheel, or a folder with"),
+    (("1.0", "1.1", "--junit", "/nowhere/at/all.xml"), "junit: got "),
+    (("1.0", "1.1", "--last", "0"), "0 is not in the range"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD)
+def test_what_cannot_be_used_is_said_before_anything_is_measured(arguments, message, track):
+    code, text, words = track(*arguments)
+    assert code == 2
+    assert message in words
+    assert text == ""
+
+
+def test_an_unknown_engine_names_the_nearest():
+    done = CliRunner().invoke(main, ["track", "exudin", "1.0", "1.1"])
+    assert done.exit_code == 2
+    assert "allowed: 'exudyn' (nearest)" in done.stderr
+
+
+def test_no_network_is_said(no_environments, monkeypatch):
+    monkeypatch.setenv("UV_DEFAULT_INDEX", "https://127.0.0.1:9/simple")
+    monkeypatch.setenv("UV_HTTP_RETRIES", "0")
+    for arguments, message in (
+        (("1.0", "1.1"), "no answer for 'trial==1.0'"),
+        (("--last", "2"), "no list of versions of trial"),
+    ):
+        done = CliRunner().invoke(main, ["track", "trial", *arguments])
+        assert done.exit_code == 2
+        assert message in done.stderr
+        assert "allowed: a network, " in done.stderr
+
+
+# ------------------------------------------------------------------------------------------------------------------- MuJoCo
+
+RISE = "the orders of attitude and rates rose from 1 to 2, the energy drift at dt = 0.01 s fell from"
+FALL = "the orders of attitude and rates fell from 2 to 1, the energy drift at dt = 0.01 s rose from 2e-13 to -17 %"
+KNOWN = {
+    ("implicit", "3.6.0", "3.7.0"): f"{RISE} -17 % to 2e-13",
+    ("implicitfast", "3.6.0", "3.7.0"): f"{RISE} 22 % to 2e-13",
+    ("implicit", "3.8.0", "3.8.1"): FALL,
+    ("implicitfast", "3.10.0", "3.11.0"): FALL,
+    ("discrete", "3.11.0", "3.17.0"): "it appeared",
+    ("RK4", "3.17.0", "4.0.0"): "the order of the attitude rose from 2 to 4",
+}
+"""What is known to have changed in MuJoCo, from scripts that call it."""
+VERSIONS = ("3.6.0", "3.7.0", "3.8.0", "3.8.1", "3.10.0", "3.11.0", "3.17.0", "4.0.0")
+
+
+@pytest.mark.engine("mujoco==3.6.0")
+def test_all_that_is_known_to_have_changed_in_mujoco_is_found_and_nothing_else():
+    done = CliRunner().invoke(main, ["track", "mujoco", *VERSIONS, "--scenes", "brick_flip", "--json"])
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    said = {(each["setting"], each["from"], each["to"]): each["sentence"] for each in found["changes"]}
+    measured = {key for key, text in said.items() if "a step takes" not in text or "," in text}
+    assert measured == set(KNOWN)
+    assert all(words in said[key] for key, words in KNOWN.items())
+    orders = {row["version"]: row["rates_order"]["slope"] for row in found["rows"] if row["setting"] == "RK4"}
+    assert all(abs(order - 4) < 0.25 for order in orders.values())

@@ -1,0 +1,140 @@
+"""What a report says of engines, from made-up measurements whose tables and pictures are known."""
+
+import math
+
+import pytest
+
+from conservative import BadInput, MissingEngine, registry, scenes
+from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies.engines_over_steps import WORSE
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.reports.charts import engines as picture
+from conservative.reports.cli.options import split_list
+from conservative.reports.page import engines as section
+from conservative.reports.run.plan import plan_report
+from conservative.reports.tables.cells import Grade
+from conservative.reports.tables.engine_rows import engine_rows, points_of
+from conservative.reports.tables.engine_scenes import engine_scenes
+from conservative.reports.tables.engine_tables import beside, every_setting
+
+from .made_up_engines import SCENE, STEPS, at_step, over_steps
+from .rows import table
+
+NO_ORDER = Outcome(OutcomeKind.NO_ORDER, WORSE)
+CRASHED = Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")
+REFUSED = Outcome(OutcomeKind.UNSUPPORTED, "its adapter has free bodies")
+GOOD, POOR, WRONG, SINGLE = "a==1/RK4", "a==1/Euler", "b==2/RK4", "c==3/default"
+
+
+def measured():
+    return table(
+        at_step("a==1", "Euler", 3.0, as_installed=True, energy=0.22, direction="gained", turns=3, expected=1),
+        over_steps("a==1", "Euler", (3.0, 3.0, 2.0, 1.0), 1.0),
+        at_step("a==1", "RK4", 1e-6),
+        over_steps("a==1", "RK4", (1e-1, 1e-2, 1e-3, 1e-4), 4.0),
+        at_step("b==2", "RK4", 1e-3),
+        over_steps("b==2", "RK4", (1e-1, 3e-2, 1e-2, 3e-3), 2.0),
+        at_step("c==3", "default", 0.2, as_installed=True, bits=32),
+        over_steps("c==3", "default", (0.9, 0.2, 0.4, 0.8), math.nan, outcome=NO_ORDER),
+        at_step("d==4", "x", math.nan, outcome=CRASHED),
+        at_step("e==5", "x", math.nan, outcome=REFUSED),
+        at_step("e==5", "y", math.nan, outcome=REFUSED),
+    )
+
+
+@pytest.fixture(scope="module")
+def rows():
+    found = measured()
+    return {row.label: row for row in engine_rows(found, SCENE, points_of(found))}
+
+
+@pytest.fixture(scope="module")
+def settings(rows):
+    header, body = every_setting(list(rows.values()), "0.01")
+    return {row[0]: dict(zip(header, row, strict=True)) for row in body}
+
+
+def test_accurate_rows_come_first_and_those_without_an_error_last(rows):
+    assert list(rows) == [GOOD, WRONG, SINGLE, POOR, "d==4/x", "e==5/x", "e==5/y"]
+
+
+def test_one_row_of_each_engine_is_its_best(rows):
+    assert {label for label, row in rows.items() if row.best} == {GOOD, WRONG, SINGLE}
+    assert {label for label, row in rows.items() if row.as_installed} == {POOR, SINGLE}
+
+
+def test_values_are_those_measured(rows):
+    row = rows[GOOD]
+    assert (row.error, row.order, row.expected_order, row.bits) == (1e-6, 4.0, 4, 64)
+    assert row.longest_step == STEPS[0]
+    assert row.second_time == pytest.approx(1e-6 / 0.025)  # the error of that very step
+    assert rows[WRONG].second_time is not None
+    assert math.isnan(rows[WRONG].second_time)  # no run gets there
+    assert math.isnan(rows[POOR].longest_step)
+
+
+def test_an_order_that_is_lower_than_expected_is_marked(settings):
+    assert settings[GOOD]["order (expected)"] == "4.00 ± 0.01 (4)"
+    assert settings[WRONG]["order (expected)"].text == "✗ 2.00 ± 0.01 (4)"
+    assert settings[WRONG]["order (expected)"].grade is Grade.BAD
+
+
+def test_an_engine_that_gets_worse_has_no_order_and_says_so(settings):
+    assert str(settings[SINGLE]["order (expected)"]) == f"– none (4): {WORSE}"
+    assert settings[SINGLE]["bits"] == "32"
+
+
+def test_turns_over_and_the_direction_of_energy_are_shown(settings):
+    assert (str(settings[GOOD]["turns over"]), str(settings[POOR]["turns over"])) == ("✓ 2 of 2", "✗ 3 of 2")
+    assert (str(settings[GOOD]["energy drift"]), str(settings[POOR]["energy drift"])) == ("✓ 1.0e-12", "✗ 0.22 gained")
+
+
+def test_a_crash_is_a_marked_row_and_what_is_not_supported_one_for_each_engine(settings):
+    assert str(settings["d==4/x"]["run"]) == "✗ crashed: signal 11 (SIGSEGV)"
+    assert settings["d==4/x"]["run"].grade is Grade.BAD
+    assert str(settings["e==5, 2 settings"]["run"]) == "– unsupported: its adapter has free bodies"
+    assert list(settings)[-1] == "e==5, 2 settings"
+
+
+def test_an_engine_as_installed_stands_beside_its_best(rows):
+    header, body = beside(list(rows.values()))
+    found = {row[0]: dict(zip(header, map(str, row), strict=True)) for row in body}
+    assert list(found) == ["a==1", "b==2", "c==3"]
+    assert [found["a==1"][f"{part}: attitude error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-06"]
+    assert found["b==2"]["as installed: setting"] == "–"
+
+
+def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend():
+    (scene,) = engine_scenes(measured(), (scenes.brick_flip(),))
+    assert scene.count == 3
+    lines = {tuple(line) for line in scene.points[["name", "kind"]].itertuples(index=False)}
+    assert lines == {("a==1", "at its best"), ("a==1", "as installed"), ("b==2", "at its best"), ("c==3", "at its best")}
+    (figure,) = section.figures((scene,), section.charts((scene,))).values()
+    assert [entry.name for entry in figure.legend] == ["a==1", "b==2", "c==3"]
+
+
+def test_forty_engines_have_forty_looks():
+    found = picture.looks(f"engine{i}==1.0" for i in range(40))
+    assert len(set(found.values())) == 40
+    assert len(set(picture.looks(f"engine{i}==1.0" for i in range(41)).values())) == 40
+
+
+def test_a_plan_has_studies_of_engines_only_where_some_are_named():
+    without = plan_report([SCENE], ["reduced"], quick=True)
+    named = plan_report([SCENE], ["reduced"], quick=True, engines=["pinocchio"])
+    assert not set(without.names) & set(studies.ENGINES)
+    assert set(named.names) - set(without.names) == set(studies.ENGINES)
+    assert {method.family for study in named.studies if study.name in studies.ENGINES for method in study.methods} == {
+        "pinocchio"
+    }
+    assert registry.method("pinocchio") not in named.methods
+
+
+@pytest.mark.parametrize(("names", "error"), [(["exudin"], BadInput), (["mujoco==0.0.1"], MissingEngine)])
+def test_an_engine_that_cannot_be_had_is_an_error_before_any_work(names, error):
+    with pytest.raises(error):
+        plan_report([SCENE], ["reduced"], quick=True, engines=names)
+
+
+def test_versions_are_no_settings_of_the_name_before_them():
+    assert split_list("engines", ("all, exudyn,mujoco==3.6.0",)) == ["all", "exudyn", "mujoco==3.6.0"]

@@ -1,0 +1,170 @@
+"""What is said of versions: sentences with figures, tables, JSON, Markdown, JUnit, a page, and the verdict on the last one."""
+
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from conservative.benchmarks.tracking.observation import Fit
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.reports.page.track import render
+from conservative.reports.tables.changes import drift_text, order_text
+from conservative.reports.tables.track import NO_END, NOTHING_CHANGED, Answer
+
+from ..benchmarks.made_up_versions import BAD, FAILED, GOOD, TIMES, history, near
+
+SLOW = tuple(2 * time for time in TIMES)
+
+
+def said(*observations, **more):
+    return Answer(history(*observations, **more)).sentences
+
+
+def with_drift(drift):
+    return replace(GOOD, drifts={"energy": near(drift)})
+
+
+def test_a_gain_is_one_sentence_with_both_versions_and_figures():
+    assert said(BAD, GOOD) == (
+        "midpoint on brick: from 1.0 to 2.0 the orders of attitude and rates rose from 1 to 2, "
+        "the energy drift at dt = 0.01 s fell from -17 % to 2e-13, "
+        "the attitude error at dt = 0.01 s fell from 2.9 to 3.0e-03 rad",
+    )
+
+
+SENTENCES = {
+    "the order of the attitude rose from 1 to 2": (replace(GOOD, attitude_order=Fit(1.0, 0.01)), GOOD),
+    "the order of the rates fell from 4 to 2.5": (
+        replace(GOOD, rates_order=Fit(4.0, 0.1)),
+        replace(GOOD, rates_order=Fit(2.5, 0.1)),
+    ),
+    "the energy drift at dt = 0.01 s turned from +22 % to -17 %": (with_drift(0.22), with_drift(-0.17)),
+    "the energy drift at dt = 0.01 s rose from 2e-13 to -17 %": (with_drift(2e-13), with_drift(-0.17)),
+    "it appeared": (replace(GOOD, outcome=Outcome(OutcomeKind.UNSUPPORTED, "no such integrator")), GOOD),
+    "it disappeared": (GOOD, replace(GOOD, outcome=Outcome(OutcomeKind.UNSUPPORTED, "no such integrator"))),
+    "it appeared, diverged after t = 0.3 s at dt = 0.01 s": (
+        replace(GOOD, outcome=Outcome(OutcomeKind.UNSUPPORTED)),
+        replace(GOOD, outcome=Outcome(OutcomeKind.DIVERGED, time=0.3)),
+    ),
+    "the outcome at dt = 0.01 s went from ok to crashed (signal 11 (SIGSEGV))": (
+        GOOD,
+        replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")),
+    ),
+    "no order of the attitude can be fitted any more, which was 2 (no descent), "
+    "the attitude error at dt = 0.01 s rose from 3.0e-03 to 1 rad": (
+        GOOD,
+        replace(GOOD, attitude_order=Fit(reason="no descent"), error=near(1.0)),
+    ),
+}
+
+
+@pytest.mark.parametrize("words", SENTENCES)
+def test_a_change_is_said(words):
+    assert said(*SENTENCES[words]) == (f"midpoint on brick: from 1.0 to 2.0 {words}",)
+
+
+def test_a_time_is_said_with_what_differs_between_repeats():
+    assert said(GOOD, GOOD, times=(TIMES, SLOW)) == (
+        "midpoint on brick: from 1.0 to 2.0 a step takes 2 times as long (2 to 2)",
+    )
+
+
+def test_noise_is_not_said():
+    assert said(GOOD, replace(GOOD, error=near(4e-3)), times=(TIMES, (1e-6, 9e-6, 2e-6))) == ()
+
+
+def test_numbers_are_written_as_people_say_them():
+    assert [order_text(order) for order in (0.99, 2.3, 4.06)] == ["1", "2.3", "4"]
+    assert [drift_text(drift) for drift in (-0.1677, 4e-4, 2.4e-13)] == ["-17 %", "4e-04", "2e-13"]
+
+
+# -------------------------------------------------------------------------------------------------------------- the verdict
+
+
+def test_a_lost_order_fails_a_build_and_a_gain_does_not():
+    lost = Answer(history(GOOD, BAD), gated=True)
+    assert not lost.passed
+    assert list(lost.failures) == list(lost.sentences)
+    assert lost.verdict == "2.0 against 1.0: FAILED"
+    assert Answer(history(BAD, GOOD), gated=True).passed
+    assert Answer(history(GOOD, GOOD), gated=True).passed
+    assert Answer(history(GOOD, BAD)).passed  # a history is no build to judge
+
+
+def test_only_what_the_last_version_lost_counts():
+    assert Answer(history(GOOD, BAD, BAD), gated=True).passed
+
+
+def test_errors_and_times_alone_do_not_fail_a_build():
+    slower = Answer(history(GOOD, replace(GOOD, error=near(1e-1)), times=(TIMES, SLOW)), gated=True)
+    assert len(slower.sentences) == 1
+    assert slower.passed
+
+
+def test_a_build_that_never_reaches_an_end_is_not_passed_even_if_the_release_does_not():
+    answer = Answer(history(FAILED, FAILED), gated=True)
+    assert not answer.passed
+    assert list(answer.failures) == [f"2.0: {NO_END}"]
+    assert Answer(history(FAILED, GOOD), gated=True).passed
+    assert 'failures="1"' in answer.junit_text()
+
+
+# ---------------------------------------------------------------------------------------------------------------- the files
+
+
+def test_junit_has_a_case_for_each_setting_and_a_failure_for_a_loss():
+    suite = ElementTree.fromstring(Answer(history(GOOD, BAD), gated=True).junit_text()).find("testsuite")
+    assert (suite.get("tests"), suite.get("failures")) == ("1", "1")
+    (case,) = suite.findall("testcase")
+    assert (case.get("classname"), case.get("name")) == ("brick", "midpoint: 1.0 to 2.0")
+    assert "the orders of attitude and rates fell from 2 to 1" in case.find("failure").get("message")
+    passed = ElementTree.fromstring(Answer(history(GOOD, GOOD), gated=True).junit_text())
+    assert passed.find("testsuite").get("failures") == "0"
+    assert passed.find(".//system-out").text == NOTHING_CHANGED
+
+
+def test_junit_takes_what_an_engine_may_say():
+    failed = replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "\x00<&>\x1b[31m"))
+    text = Answer(history(GOOD, failed), gated=True).junit_text()
+    assert "?<&>?[31m" in ElementTree.fromstring(text).find(".//failure").get("message")
+
+
+def test_markdown_has_tables_changes_and_versions():
+    text = Answer(history(BAD, GOOD, FAILED, times=(TIMES, SLOW)), gated=True).markdown_text()
+    assert text.startswith("## made: 1.0, 2.0, 3.0\n\n**3.0 against 2.0: FAILED**\n")
+    assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-04 | 3.0e-03 | ✓ done | 2 | 2 |" in text
+    assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
+    assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text
+    assert "| 1.0 | 3.11.7 | made==1.0 |" in text
+    assert NOTHING_CHANGED in Answer(history(GOOD, GOOD)).markdown_text()
+
+
+def test_json_has_every_figure_and_change():
+    found = json.loads(Answer(history(GOOD, BAD, times=(TIMES, TIMES)), gated=True).json_text())
+    assert (found["engine"], found["passed"], len(found["failures"])) == ("made", False, 1)
+    assert found["versions"][1] == {"version": "2.0", "python": "3.11.7", "packages": ["made==2.0"]}
+    row = found["rows"][1]
+    assert row["drifts"]["energy"]["value"] == -0.17
+    assert row["attitude_order"] == {"slope": 0.99, "stderr": 0.01, "reason": ""}
+    assert row["step_times_s"] == list(TIMES)
+    (change,) = found["changes"]
+    assert (change["from"], change["to"], change["lost"]) == ("1.0", "2.0", True)
+    assert {"aspect": "drift", "quantity": "energy", "lost": True} in change["changes"]
+
+
+def test_what_was_not_measured_is_null_in_json():
+    row = json.loads(Answer(history(GOOD, FAILED)).json_text())["rows"][1]
+    assert row["attitude_error_rad"]["value"] is None
+    assert row["time_ratio"] is None
+
+
+def test_the_page_stands_alone_and_says_what_the_markdown_says():
+    failed = replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "<script>alert(1)</script>"))
+    answer = Answer(history(BAD, GOOD, failed), gated=True)
+    page = render(answer)
+    assert "the orders of attitude and rates rose from 1 to 2" in page
+    assert "3.0 against 2.0: FAILED" in page
+    assert "<script" not in page
+    assert "src=" not in page
+    assert "http" not in page
