@@ -23,8 +23,7 @@ class Genesis(EngineMethod):
     Its kernels are compiled when a run is prepared, once in the life of an environment: with importing it, that takes one to
     four minutes. One of the packages that it needs, pygltflib, has no wheel: `conservative engines install genesis
     --allow-build`; the environment takes 8 GB, nearly all of it PyTorch for GPUs. Switched off: collisions and constraints
-    (`RigidOptions`: `enable_collision`, `disable_constraint`,
-    https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py).
+    (`enable_collision`, `disable_constraint`).
 
     Parameters
     ----------
@@ -41,6 +40,11 @@ class Genesis(EngineMethod):
         The integrator or the precision is unknown, or as_installed neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    RigidOptions: https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py
+    Precision, `gs.init`: https://genesis-world.readthedocs.io
     """
 
     integrator: str = "implicitfast"

@@ -1,7 +1,4 @@
-"""Newton: its solvers on one free body, in single precision. Source: its documentation, Solvers.
-
-https://newton-physics.github.io/newton/stable/api/newton_solvers.html
-"""
+"""Newton: its solvers on one free body, in single precision. Source: its documentation, Solvers."""
 
 from __future__ import annotations
 
@@ -25,8 +22,7 @@ ORDERS = {
 class Newton(EngineMethod):
     """Newton on the CPU, in single precision, with one of its solvers on a free joint.
 
-    Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default
-    (https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html), and contacts of
+    Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default, and contacts of
     `SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as Newton's example `basic_dzhanibekov` has it: thirty
     times as fast as its default here, with the same motion. A step is recorded by Warp once and then replayed; from Python it
     takes a hundred times as long. `SolverVBD` alone is stepped from Python, as a record loses what it keeps from step to step,
@@ -47,6 +43,12 @@ class Newton(EngineMethod):
         The solver is unknown, or as_installed neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Solvers: https://newton-physics.github.io/newton/stable/api/newton_solvers.html
+    Damping: https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html
+    Its own spinning body: https://github.com/newton-physics/newton/blob/main/newton/examples/basic/example_basic_dzhanibekov.py
     """
 
     solver: str = "MuJoCo_rk4"
