@@ -163,6 +163,8 @@ def _measure(figure: Figure, method: Method | None) -> tuple[Array | None, str]:
     try:
         other = registry.method(figure.other) if figure.other else None
         return _run(quantity, Runs(scene, method, figure.dt, other)), ""
+    except MissingEngine as error:  # the other method's, or the truth's
+        return None, describe_missing(error)
     except BadInput as error:  # what it does not support, or a step that is too long for it
         return None, str(error)
     except IntegrationFailed as failure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -36,7 +37,7 @@ class Runs:
 
     def end(self, dt: float | None = None, other: bool = False) -> Trajectory:
         """Return the start and the end of the trajectory, by default at the step of the figure."""
-        return _solve(self.other if other else self.method, self.scene, self._ends(dt or self.dt))
+        return _solve_ends(self.other if other else self.method, self.scene, dt or self.dt)
 
     def true(self) -> Trajectory:
         """Return the motion at all steps."""
@@ -44,10 +45,11 @@ class Runs:
 
     def true_end(self, dt: float | None = None) -> Trajectory:
         """Return the start and the end of the motion."""
-        return reference(self.scene, self._ends(dt or self.dt)).trajectory
+        return _solve_ends(None, self.scene, dt or self.dt)
 
-    def _ends(self, dt: float) -> Grid:
-        return grid_for(self.scene, dt, sample_every=MOST_STEPS)
+    def first_step(self) -> Trajectory:
+        """Return the start and the end of the first step."""
+        return _solve(self.method, self.scene, Grid(self.dt, 1))
 
 
 def _solve(method: Method | None, scene: Scene, grid: Grid) -> Trajectory:
@@ -58,6 +60,12 @@ def _solve(method: Method | None, scene: Scene, grid: Grid) -> Trajectory:
     if trajectory.failure is not None:
         raise trajectory.failure
     return trajectory
+
+
+@lru_cache(maxsize=512)
+def _solve_ends(method: Method | None, scene: Scene, dt: float) -> Trajectory:
+    """Return the start and the end of a run: once, where several figures are of the same."""
+    return _solve(method, scene, grid_for(scene, dt, sample_every=MOST_STEPS))
 
 
 Quantity = Callable[[Runs], Array]
@@ -182,7 +190,7 @@ def position_ratio(runs: Runs) -> Array:
 
 def turn_of_a_step(runs: Runs) -> Array:
     """Return the angle that the body turns in the first step, degrees."""
-    found = reference(runs.scene, Grid(runs.dt, 1)).trajectory
+    found = runs.first_step()
     return np.degrees([angle_between(found.R_WB[1], found.R_WB[0])]).ravel()
 
 

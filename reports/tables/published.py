@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from itertools import groupby
 from typing import Any
@@ -17,14 +17,16 @@ MOST_DIGITS = 16
 BOUNDS = {Relation.EQUALS: "", Relation.BELOW: "< ", Relation.ABOVE: "> "}
 
 
-def lines(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield the figures by source, each with what was measured, and at the end how many came out how."""
+def lines(findings: Iterable[Finding]) -> Iterator[str]:
+    """Yield the figures by source as they are measured, each with what was found, and at the end how many came out how."""
+    shown = []
     for source, group in groupby(findings, lambda finding: finding.figure.source):
         yield from _heading(source)
         for finding in group:
+            shown.append(finding)
             yield from _entry(finding)
         yield ""
-    yield closing(findings)
+    yield closing(shown)
 
 
 def closing(findings: Sequence[Finding]) -> str:

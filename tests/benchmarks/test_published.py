@@ -142,6 +142,11 @@ def test_what_cannot_be_done_says_why(no_engines):
         assert (found.verdict, found.reason) == (Verdict.CANNOT, reason)
 
 
+def test_what_it_is_compared_with_may_be_missing_too(no_engines):
+    (found,) = evaluate.evaluate([figure(method="reduced", other="exudyn:RK44")])
+    assert (found.verdict, found.reason) == (Verdict.CANNOT, "exudyn is not installed: conservative engines install exudyn")
+
+
 @pytest.fixture
 def no_engines(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
