@@ -31,6 +31,8 @@ STEP_LIMIT = 10_000_000
 """Steps that an adaptive engine takes in a run at most: minutes of heyoka, an hour of SciPy."""
 PACE_STEPS = 1000
 """After as many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` at that pace ends there."""
+SHARE = 15 / 16
+"""Of the largest mass that a body about a fixed point can have, the part that it is given: that of the paper's cone."""
 LONG = 1e5
 """Turns of a run, rad, from which on heyoka's pace is tried first: shorter ones stay far below the limit."""
 
@@ -186,8 +188,9 @@ def mass_model(axes: Axes) -> MassModel | None:
     """Return a physical mass model, None if there is none.
 
     With the second moments S = tr(J)/2 - J of the mass distribution about the fixed point, those about the centre of mass are
-    S - m c c', which must not be negative: S itself must not be (the triangle inequality), and m c' S^-1 c <= 1. Half of that
-    largest mass is taken.
+    S - m c c', which must not be negative: S itself must not be (the triangle inequality), and m c' S^-1 c <= 1. `SHARE` of
+    that largest mass is taken. In joint coordinates any mass does; engines whose joints are constraints between free bodies
+    integrate another body with another mass, and lose far more energy with half of it.
     """
     second = axes.J.sum() / 2 - axes.J
     if second.min() < -1e-15 * axes.J.max():
@@ -200,7 +203,7 @@ def mass_model(axes: Axes) -> MassModel | None:
     lever = com != 0
     if second[lever].min() <= 1e-15 * axes.J.max():
         return None
-    mass = 0.5 / float(np.sum(com[lever] ** 2 / second[lever]))
+    mass = SHARE / float(np.sum(com[lever] ** 2 / second[lever]))
     inertia_com = np.diag(axes.J) - mass * (com @ com * np.eye(3) - np.outer(com, com))
     return MassModel(mass, com, potential.weight / mass, RigidBody(inertia_com))
 

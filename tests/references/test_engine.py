@@ -7,6 +7,7 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import orthonormality, rotation_about
 from conservative.references import engine
+from conservative.scenes.lagrange_top import cone
 
 
 @pytest.fixture(autouse=True)
@@ -52,6 +53,16 @@ def test_a_mass_model_gives_back_inertia_and_weight(heavy, top):
         np.testing.assert_allclose(mass.mass * mass.gravity * c, axes.moment, atol=1e-13)  # measured 2e-16
         a, b, largest = np.sort(mass.body.moments)
         assert a + b >= largest
+
+
+def test_the_paper_s_cone_has_its_own_mass_and_so_has_its_slow_motion():
+    """With another mass it would be another body to engines whose joints are constraints between free bodies."""
+    mass, lever, J1, _ = cone(0.1, 2700.0)
+    for scene in (cv.scenes.lagrange_top(), cv.scenes.slow_lagrange_top()):
+        found = engine.mass_model(engine.principal_axes(scene))
+        assert np.isclose(found.mass, mass, rtol=1e-12)
+        ball = (J1 - mass * lever**2) * np.eye(3)
+        np.testing.assert_allclose(found.body.inertia, ball, rtol=1e-12, atol=1e-12 * J1)
 
 
 def test_bodies_without_a_mass_distribution_have_no_mass_model():
