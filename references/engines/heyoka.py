@@ -46,7 +46,7 @@ class Heyoka(Method):
         axis and one at right angles; the second row is their cross product, and none is tidied up. "lean": the fewest products
         an evaluation that we found, the strongest opponent: rates and one angle (asymmetric free body); axis, momentum and one
         angle (symmetric top that stays away from one of the poles); otherwise the non-spinning frame where there is one, and
-        base vectors where not. Below errors of 1e-6 those take 5 to 25 % less time than "body".
+        base vectors where not. At equal error those take 17 to 30 % less time than "body" (measured in four fields).
 
     Raises
     ------
