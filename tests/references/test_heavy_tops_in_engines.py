@@ -23,6 +23,7 @@ ERRORS = {
     ("mjx", "Euler"): EULER,
     ("mjx", "RK4"): (9.13e-6, 2),
     ("mjx", "RK4,f32"): (8.98e-6, None),
+    ("mjwarp", "Euler"): EULER,
     ("diffrax", "Tsit5"): (3.9e-14, 5),
     ("nimble", ""): (7.43e-3, 1),
     ("drake", "discrete"): (2.39e-2, 1),  # angles as coordinates
@@ -35,7 +36,7 @@ ERRORS = {
     ("rapier3d", ""): (4.21e-3, 1),
 }
 LARGEST_ERROR = max(error for error, _ in ERRORS.values())
-FREE_ONLY = ("bsk", "jsbsim", "orekit")
+FREE_ONLY = ("brax", "bsk", "jsbsim", "orekit")
 
 
 def rows():
