@@ -75,7 +75,7 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
     if isinstance(outcome, Failure):
         yield from case.blanks(blanks(*MEASURES), outcome.outcome)
         return None
-    few = replace(case, grid=keep_few(case.grid))
+    few = replace(case, grid=keep_few(case.grid, study.longest_run / outcome.cost.first_call))
     again = attempt_here(study.hang_limit, few, study.skip_missing)
     if isinstance(again, Failure):
         yield from few.blanks(blanks(*MEASURES), again.outcome)
@@ -83,9 +83,10 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
     return TimedRun(few, again, again)
 
 
-def keep_few(grid: Grid) -> Grid:
-    """Return the same steps with as many samples as the runs over several steps have."""
-    return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
+def keep_few(grid: Grid, share: float) -> Grid:
+    """Return the same steps, of a slow run only the first `share`, with as many samples as runs over several steps have."""
+    n_steps = math.ceil(grid.n_steps * min(1.0, share))
+    return Grid(grid.dt, n_steps, math.ceil(n_steps / SAMPLES))
 
 
 def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:

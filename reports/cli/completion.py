@@ -22,6 +22,12 @@ def engines(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
     return [CompletionItem(name) for name in _registered("engines", incomplete)]
 
 
+def engine_lists(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return `all` and the registered engines that the last of several, separated by commas, may become."""
+    before, last = _last(incomplete)
+    return [CompletionItem(before + name) for name in ["all"] * "all".startswith(last) + _registered("engines", last)]
+
+
 def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the registered scenes, scene files, and folders on the way to one, that the last of several may become."""
     before, last = _last(incomplete)

@@ -31,6 +31,7 @@ from .options import FilePath, epilog, split_list, split_names
     "--engines",
     multiple=True,
     metavar="E,F",
+    shell_complete=completion.engine_lists,
     help="Engines to compare in a section of their own: NAME, NAME==VERSION, or all, which stands for all that are installed, "
     "in environments (see `conservative engines`) or beside us.",
 )

@@ -12,7 +12,9 @@ from conservative.benchmarks.measures.convergence_order import grows_with_shorte
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import engines_over_steps, studies
 from conservative.benchmarks.studies.engine_selection import select_engines
+from conservative.benchmarks.studies.engines_at_one_step import keep_few
 from conservative.benchmarks.studies.study import Study
+from conservative.method import Grid
 from conservative.outcome import OutcomeKind
 
 from .generic_study import Broken, truth
@@ -89,6 +91,11 @@ def test_an_error_that_grows_is_told_from_one_that_has_reached_its_floor():
     assert not grows_with_shorter_steps(STEPS, STEPS**2)
     assert not grows_with_shorter_steps(STEPS, [1e-6, 1e-9, 1e-13, 1e-14, 1e-14, 3e-14, 6e-14, 1e-13])  # round-off
     assert not grows_with_shorter_steps(STEPS, [math.nan] * 6 + [0.1, 0.5])  # too few
+
+
+def test_a_slow_run_is_timed_over_its_first_steps_only():
+    grid = Grid(0.01, 600)
+    assert [keep_few(grid, share) for share in (5.0, 0.1, 1e-9)] == [Grid(0.01, 600, 50), Grid(0.01, 60, 5), Grid(0.01, 1, 1)]
 
 
 def test_an_engine_that_is_dear_to_prepare_has_fewer_steps_and_says_so(monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import errors
-from conservative.benchmarks.measures.measure import key
+from conservative.benchmarks.measures.measure import Measure, key
 from conservative.benchmarks.studies import step_ladder, studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
 from conservative.benchmarks.studies.selection import Missing

@@ -9,9 +9,12 @@ from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.charts import engines as picture
+from conservative.reports.cli.completion import engine_lists
 from conservative.reports.cli.options import split_list
 from conservative.reports.page import engines as section
 from conservative.reports.run.plan import plan_report
+from conservative.reports.run.provenance import provenance
+from conservative.reports.run.terms import differences, terms
 from conservative.reports.tables.cells import Grade
 from conservative.reports.tables.engine_rows import engine_rows, points_of
 from conservative.reports.tables.engine_scenes import engine_scenes
@@ -134,6 +137,22 @@ def test_a_plan_has_studies_of_engines_only_where_some_are_named():
 def test_an_engine_that_cannot_be_had_is_an_error_before_any_work(names, error):
     with pytest.raises(error):
         plan_report([SCENE], ["reduced"], quick=True, engines=names)
+
+
+def test_unfinished_work_with_other_engines_is_not_gone_on_with():
+    first, second = (plan_report([SCENE], ["reduced"], quick=True, engines=[name]) for name in ("pinocchio", "scipy"))
+    source = provenance([])
+    assert not list(differences(terms(first, source), terms(first, source)))
+    assert any(text.startswith("engines: pinocchio") for text in differences(terms(first, source), terms(second, source)))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [("", ["all", "mujoco"]), ("al", ["all"]), ("exudyn,muj", ["exudyn,mujoco"]), ("mujoco,exu", ["mujoco,exudyn"])],
+)
+def test_completion_of_engines_goes_on_after_a_comma(text, found):
+    assert set(found) <= {item.value for item in engine_lists(None, None, text)}
+    assert not engine_lists(None, None, "reduc")
 
 
 def test_versions_are_no_settings_of_the_name_before_them():

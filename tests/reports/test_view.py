@@ -1,6 +1,7 @@
 """The view holds every number that a report shows: rendering it integrates nothing and starts no process."""
 
 import dataclasses
+import json
 import subprocess
 
 import pytest
@@ -12,12 +13,14 @@ from conservative.benchmarks.studies import import_time, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.reports import document, view
 from conservative.reports.charts import figures
+from conservative.reports.run.locks import Lock
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import orders, work_precision
 
 from .made_up import curves, measurements
+from .made_up_engines import at_step, over_steps
 from .rows import row
 
 
@@ -60,6 +63,33 @@ def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, not
     names = {path.name for path in tmp_path.iterdir()}
     assert {"report.md", "index.html", "measurements.json", "paper_figure_1.svg", "paper_figure_2.svg"} < names
     assert "sphere_lagrange_top" in (tmp_path / "index.html").read_text()
+
+
+def test_engines_and_locks_are_rendered_from_the_view_alone(report, nothing_is_measured, tmp_path):
+    plan, measured, source = report
+    rows = [*at_step("exudyn==1.0", "RK44", 1e-6), *over_steps("exudyn==1.0", "RK44", (1e-1, 1e-2, 1e-3, 1e-4), 4.0)]
+    named = dataclasses.replace(plan, engines=(registry.method("pinocchio"),))
+    locked = dataclasses.replace(source, environments=(Lock("exudyn==1.0", "3.11.7", ("exudyn==1.0", "numpy==2.0")),))
+    document.render(view.build(named, Measurements(measurement.frame(rows), measured.samples), locked), tmp_path, False, print)
+    text, page = ((tmp_path / name).read_text() for name in ("report.md", "index.html"))
+    for part in ("exudyn==1.0/RK44", "4.00 ± 0.01 (4)", "exudyn==1.0, numpy==2.0"):
+        assert part in text
+        assert part in page
+    assert (tmp_path / "engines_brick_flip.svg").exists()
+
+
+def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_methods(report, nothing_is_measured, tmp_path):
+    plan, measured, source = report
+    document.render(view.build(plan, measured, source), tmp_path, False, print)
+    without = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
+    assert not any("## Engines" in text or 'id="engines"' in text or "Environments of engines" in text for text in without)
+    locked = dataclasses.replace(source, environments=(Lock("exudyn==1.0", "3.11.7", ("numpy==2.0",)),))
+    document.render(view.build(plan, measured, locked), tmp_path, False, print)
+    for name in ("report.md", "index.html"):
+        text = (tmp_path / name).read_text()
+        assert "Environments of engines" in text
+        assert "numpy==2.0" in text.partition("How this was made")[2]
+    assert json.loads((tmp_path / "measurements.json").read_text())["environments"][0]["packages"] == ["numpy==2.0"]
 
 
 @pytest.mark.parametrize(
