@@ -1,4 +1,4 @@
-"""Newton: its solvers on one free body, in single precision. Source: its documentation, Solvers."""
+"""Newton: its solvers on one body, in single precision. Source: its documentation, Solvers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import ClassVar
 from conservative.check import choice
 from conservative.errors import BadInput
 from conservative.method import Method
+from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
@@ -17,10 +18,15 @@ ORDERS = {
     **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
 }
 
+FREE_ONLY = {
+    "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
+    "XPBD": "no settings of SolverXPBD were found with which its ball joint holds a body right",
+}
+
 
 @dataclass(frozen=True)
 class Newton(EngineMethod):
-    """Newton on the CPU, in single precision, with one of its solvers on a free joint.
+    """Newton on the CPU, in single precision, with one of its solvers, on a free joint, or on a ball joint at the fixed point.
 
     Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default, and contacts of
     `SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as Newton's example `basic_dzhanibekov` has it: thirty
@@ -56,6 +62,7 @@ class Newton(EngineMethod):
 
     family: ClassVar[str] = "newton"
     precision: ClassVar[str] = "f32"
+    takes_gravity: ClassVar[bool] = True
     # Versions before 1.8 build and step models in other ways. Bare `newton` lacks MuJoCo.
     distribution: ClassVar[Distribution] = Distribution("newton[sim]", "newton", oldest="1.8")
 
@@ -64,6 +71,9 @@ class Newton(EngineMethod):
         if not isinstance(self.as_installed, bool):
             raise BadInput("as_installed", repr(self.as_installed), "True or False")
         super().__post_init__()
+
+    def unsupported(self, scene: Scene) -> str | None:
+        return super().unsupported(scene) or (FREE_ONLY.get(self.solver) if scene.potential is not None else None)
 
     @property
     def setting(self) -> str:

@@ -23,6 +23,12 @@ ERRORS = {
     ("mjx", "Euler"): EULER,
     ("mjx", "RK4"): (9.13e-6, 2),
     ("mjx", "RK4,f32"): (8.98e-6, None),
+    ("mjwarp", "Euler"): EULER,
+    ("newton", "Featherstone"): EULER,
+    ("newton", "VBD"): (1.83e-2, 1),
+    ("newton", "Kamino"): (3.66e-3, 1),
+    ("newton", "MuJoCo_euler"): EULER,
+    ("newton", "MuJoCo_rk4"): (9e-5, None),  # worse with a smaller step: single precision
     ("diffrax", "Tsit5"): (3.9e-14, 5),
     ("nimble", ""): (7.43e-3, 1),
     ("drake", "discrete"): (2.39e-2, 1),  # angles as coordinates
@@ -35,7 +41,7 @@ ERRORS = {
     ("rapier3d", ""): (6.64e-3, 1),
 }
 LARGEST_ERROR = max(error for error, _ in ERRORS.values())
-FREE_ONLY = ("bsk", "jsbsim", "orekit")
+FREE_ONLY = ("brax", "bsk", "jsbsim", "orekit")
 
 
 def rows():
@@ -67,6 +73,16 @@ def test_one_that_forgot_weight_or_centre_of_mass_would_be_found(heavy, end):
 def test_an_engine_without_fixed_points_says_so(heavy, engine):
     install(engine)
     assert registry.method(engine).unsupported(heavy) == type(registry.method(engine)).free_only != ""
+
+
+@pytest.mark.engine("newton")
+def test_some_solvers_of_newton_have_free_bodies_only(heavy, free):
+    install("newton")
+    for solver in ("SemiImplicit", "XPBD"):
+        method = registry.method(f"newton:{solver}")
+        assert solver in method.unsupported(heavy)
+        assert method.unsupported(free) is None
+    assert registry.method("newton:Featherstone").unsupported(heavy) is None
 
 
 @pytest.mark.engine("drake")

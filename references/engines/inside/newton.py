@@ -12,7 +12,7 @@ NOT_RECORDED = "VBD"
 
 
 def prepare(given):
-    """Return a run of one free body; its kernels are compiled here."""
+    """Return a run of one body; its kernels are compiled here."""
     import newton
     import warp
 
@@ -21,6 +21,7 @@ def prepare(given):
     model = _model(newton, warp, given)
     solver, contacts = _solver(newton, model, given), _contacts(newton, model, given)
     states, start, control = (model.state(), model.state()), model.state(), model.control()
+    newton.eval_ik(model, start, start.joint_q, start.joint_qd)
 
     def step(before, after):
         before.clear_forces()
@@ -74,20 +75,35 @@ def _record(warp, step):
 
 
 def _model(newton, warp, given):
-    builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+    builder = newton.ModelBuilder(gravity=(0.0, 0.0, -given.gravity))
     if given.solver == "Kamino":
         newton.solvers.SolverKamino.register_custom_attributes(builder)
-    w, x, y, z = given.q0.tolist()
-    body = builder.add_body(
-        xform=warp.transform((0.0, 0.0, 0.0), (x, y, z, w)),
-        mass=given.mass,
-        inertia=warp.mat33(*np.diag(given.moments).ravel().tolist()),
-    )
-    velocity = [0.0, 0.0, 0.0, *given.w0_W.tolist()]
-    builder.body_qd[body], builder.joint_qd = warp.spatial_vector(*velocity), velocity
+    body = _add_body(builder, warp, given)
+    lever = given.R0 @ given.com
+    builder.body_qd[body] = warp.spatial_vector(*np.cross(given.w0_W, lever).tolist(), *given.w0_W.tolist())
     if given.solver == "VBD":
         builder.color()
     return builder.finalize(device="cpu")
+
+
+def _add_body(builder, warp, given):
+    """Return the number of the body, on a free joint, or on a ball joint without armature, friction and damping."""
+    w, x, y, z = given.q_com.tolist()
+    axes = np.array(warp.quat_to_matrix(warp.quat(x, y, z, w)), float).reshape(3, 3)
+    w, x, y, z = given.q0.tolist()
+    inertia = axes @ np.diag(given.moments_com) @ axes.T
+    options = {
+        "xform": warp.transform((0.0, 0.0, 0.0), (x, y, z, w)),
+        "com": warp.vec3(*given.com.tolist()),
+        "inertia": warp.mat33(*inertia.ravel().tolist()),
+        "mass": given.mass,
+    }
+    if given.free:
+        return builder.add_body(**options)
+    body = builder.add_link(**options)
+    joint = builder.add_joint_ball(-1, body, armature=0.0, friction=0.0, damping=0.0)
+    builder.add_articulation([joint])
+    return body
 
 
 def _solver(newton, model, given):
