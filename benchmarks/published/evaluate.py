@@ -10,7 +10,7 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.errors import BadInput, IntegrationFailed, MissingEngine, Unsupported
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.method import Method, Role
 from conservative.references.environments.environment import list_environments
 
@@ -163,7 +163,7 @@ def _measure(figure: Figure, method: Method | None) -> tuple[Array | None, str]:
     try:
         other = registry.method(figure.other) if figure.other else None
         return _run(quantity, Runs(scene, method, figure.dt, other)), ""
-    except Unsupported as error:
+    except BadInput as error:  # what it does not support, or a step that is too long for it
         return None, str(error)
     except IntegrationFailed as failure:
         return None, f"the run {failure.outcome}"
@@ -199,15 +199,13 @@ def distance(figure: Figure, measured: Array) -> float:
 
 
 def best_methods(engines: Sequence[str]) -> list[Method]:
-    """Return, of each engine that is named and has an environment, that of its settings which has the highest order."""
+    """Return, of each engine that is named and has an environment, its setting with fixed steps that has the highest order.
+
+    Where all of its settings choose their own steps, or need none, it is the first of those.
+    """
     there = {environment.engine for environment in list_environments()}
     families = [registry.engine(name) for name in registry.list_engines() if name in there and named(name, engines)]
-    return [max(family.variants(), key=_order) for family in families]
-
-
-def _order(method: Method) -> float:
-    """Return its order; infinity where it chooses its steps, or needs none."""
-    return float("inf") if method.order is None else method.order
+    return [max(family.variants(), key=lambda method: method.order or 0) for family in families]
 
 
 def _beside(figure: Figure, method: Method) -> Beside:

@@ -63,15 +63,9 @@ def _solve(method: Method | None, scene: Scene, grid: Grid) -> Trajectory:
 Quantity = Callable[[Runs], Array]
 
 
-def world_rates(runs: Runs) -> Array:
-    """Return the angular velocity (3,) at the end, rad/s, world axes."""
-    found = runs.end()
-    return found.R_WB[-1] @ found.w_WB_B[-1]
-
-
 def spin(runs: Runs) -> Array:
     """Return the second world component of the angular velocity at the end, rad/s."""
-    return world_rates(runs)[1:2]
+    return _world_rates(runs.end())[1:2]
 
 
 def quaternion(runs: Runs) -> Array:
@@ -150,8 +144,7 @@ def element_error(runs: Runs) -> Array:
 
 def world_rate_error(runs: Runs) -> Array:
     """Return the largest error of a world component of the angular velocity at the end, rad/s."""
-    ends = [(each.R_WB[-1] @ each.w_WB_B[-1]) for each in (runs.end(), runs.true_end())]
-    return np.array([np.abs(ends[0] - ends[1]).max()])
+    return np.array([np.abs(_world_rates(runs.end()) - _world_rates(runs.true_end())).max()])
 
 
 def attitude_error(runs: Runs) -> Array:
@@ -193,6 +186,10 @@ def turn_of_a_step(runs: Runs) -> Array:
     return np.degrees([angle_between(found.R_WB[1], found.R_WB[0])]).ravel()
 
 
+def _world_rates(found: Trajectory) -> Array:
+    return np.asarray(found.R_WB[-1] @ found.w_WB_B[-1])
+
+
 def _drift(values: Array) -> Array:
     return np.array([np.abs(values / values[0] - 1).max()])
 
@@ -215,7 +212,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         function.__name__: function
         for function in (
-            *(world_rates, spin, quaternion, modified_rodrigues, displacement, turn_of_a_step),
+            *(spin, quaternion, modified_rodrigues, displacement, turn_of_a_step),
             *(energy, energy_ratio, largest_energy_ratio, energy_drift),
             *(momentum_length_drift, vertical_momentum_drift, momentum_change, relative_momentum_change, momentum_drift),
             *(element_error, world_rate_error, attitude_error),

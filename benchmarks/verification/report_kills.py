@@ -22,11 +22,12 @@ import psutil
 
 from conservative.references.environments import worker
 
+from .kills import REPORT as REPORT_LEFT_ALONE
 from .kills import SAME, rows, undisturbed
 from .processes import Started
 
 REPORT = ("report", "--quick", "--scenes", "brick_flip:t_end=1", "--methods")
-BESIDE = "moser_veselov:order=2"
+BESIDE = REPORT_LEFT_ALONE[-1]
 """A method of ours, whose rows have to be the same."""
 
 Row = tuple[str, ...]

@@ -1,7 +1,7 @@
-"""What an engine's own process costs: the same MuJoCo in this process and in an environment, timed in turn.
+"""What an engine's own process costs: the same version of it in this process and in an environment, timed in turn.
 
     conservative engines install mujoco==4.0.0
-    python -m conservative.benchmarks.verification.worker_cost --version 4.0.0
+    python -m conservative.benchmarks.verification.worker_cost --engine mujoco --version 4.0.0
 
 States have to agree bit for bit. An empty request's way there and back is in no time that a report shows.
 """
@@ -26,7 +26,6 @@ from conservative.trajectory import Trajectory
 from ..measures.timing import time_interleaved
 
 SCENES = ("brick_flip", "asymmetric_top")
-INTEGRATORS = ("Euler", "RK4", "implicit")
 
 
 def round_trips(method: EngineMethod, count: int = 1000) -> list[float]:
@@ -57,28 +56,37 @@ def compare(here: Method, there: Method, rounds: int) -> Iterator[tuple[str, boo
             yield f"{name}, {what}", same, second.minimum / first.minimum, second.median / first.median
 
 
-def _in_environment(version: str, integrator: str) -> EngineMethod:
-    method = registry.method(f"mujoco@{version}:{integrator}")
-    assert isinstance(method, EngineMethod)
-    return method
+def pairs(engine: str, version: str) -> Iterator[tuple[Method, EngineMethod]]:
+    """Yield each setting of an engine in this process and in an environment.
+
+    Raises
+    ------
+    BadInput
+        Both are not of the same version.
+    """
+    for here in type(registry.method(engine)).variants():
+        name, _, setting = here.name.partition(":")
+        there = registry.method(f"{name}@{version}:{setting}")
+        if here.label != there.label:
+            raise BadInput("version", version, f"that of this process, {here.label}")
+        assert isinstance(there, EngineMethod)
+        yield here, there
 
 
 @click.command()
-@click.option("--version", required=True, help="That of MuJoCo in this process, of which there is an environment.")
+@click.option("--engine", required=True, help="One that runs in this process, too.")
+@click.option("--version", required=True, help="Its version in this process, of which there is an environment.")
 @click.option("--rounds", default=40, help="Interleaved rounds.")
-def main(version: str, rounds: int) -> None:
+def main(engine: str, version: str, rounds: int) -> None:
     """Compare states and times; exit with 1 if a state differs."""
-    differs, ratios = 0, []
-    for integrator in INTEGRATORS:
-        here, there = registry.method(f"mujoco:{integrator}"), _in_environment(version, integrator)
-        if here.label != there.label:
-            raise BadInput("version", version, f"that of this process, {here.label}")
+    differs, ratios, trips = 0, [], []
+    for here, there in pairs(engine, version):
         for what, same, minimum, median in compare(here, there, rounds):
             bits = "same bits" if same else "OTHER BITS"
-            click.echo(f"{integrator}, {what}: {bits}; time {minimum:.3f} (minimum), {median:.3f} (median)")
+            click.echo(f"{here.label}, {what}: {bits}; time {minimum:.3f} (minimum), {median:.3f} (median)")
             differs += not same
             ratios.append(minimum)
-    trips = [trip * 1e6 for trip in round_trips(_in_environment(version, INTEGRATORS[0]))]
+        trips = [trip * 1e6 for trip in round_trips(there)]
     click.echo(f"a request and its answer: {min(trips):.0f} us at best, {statistics.median(trips):.0f} us at the median")
     click.echo(
         f"{len(ratios)} comparisons, {differs} with other bits, time {statistics.median(ratios):.3f} of that in this process"

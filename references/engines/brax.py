@@ -20,18 +20,15 @@ class Brax(EngineMethod):
     """Brax on a free joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
 
     Nothing had to be switched off: damping (`ang_damping`, `vel_damping`) and scaling of inertia (`spring_inertia_scale`) are 0
-    by default (https://github.com/google/brax/blob/main/brax/io/mjcf.py). "spring" and "positional" have no gyroscopic term for
-    a body in itself (`integrate_xdd` in https://github.com/google/brax/blob/main/brax/spring/integrator.py,
-    https://github.com/google/brax/blob/main/brax/positional/integrator.py): the body turns about the axis that it starts with.
-    Its joints have no ball joint at a fixed point.
+    by default. "spring" and "positional" have no gyroscopic term: a free body turns about the axis that it starts with.
+    "positional" takes 2 sin(turn / 2) / dt for the rate after a step, so that fast bodies lose energy.
 
     Parameters
     ----------
     pipeline
         "generalized", "positional" or "spring".
     precision
-        "f64" (JAX's `x64`) or "f32", which is JAX's default
-        (https://docs.jax.dev/en/latest/default_dtypes.html).
+        "f64" (JAX's `x64`) or "f32", which is JAX's default.
 
     Raises
     ------
@@ -39,6 +36,13 @@ class Brax(EngineMethod):
         The pipeline or the precision is unknown.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Defaults: https://github.com/google/brax/blob/main/brax/io/mjcf.py
+    Spring, how it integrates: https://github.com/google/brax/blob/main/brax/spring/integrator.py
+    Positional, `project_xd`: https://github.com/google/brax/blob/main/brax/positional/integrator.py
+    x64: https://docs.jax.dev/en/latest/notebooks/Common_Gotchas_in_JAX.html#double-64bit-precision
     """
 
     pipeline: str = "generalized"
@@ -46,6 +50,7 @@ class Brax(EngineMethod):
 
     family: ClassVar[str] = "brax"
     distribution: ClassVar[Distribution] = Distribution("brax", "brax", oldest="0.14")
+    free_only: ClassVar[str] = "Brax reads no ball joint"
 
     def __post_init__(self) -> None:
         choice("pipeline", self.pipeline, PIPELINES)

@@ -2,42 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from conservative.check import choice
+from conservative.errors import BadInput
 from conservative.method import Method
 
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
 
-ORDERS = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 1}
+ORDERS = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2}
 
 
 @dataclass(frozen=True)
 class Genesis(EngineMethod):
     """Genesis's rigid solver on the CPU, on the free joint of a body from an MJCF file, stepped from Python (`scene.step`).
 
-    Switched off: collisions and constraints (`RigidOptions(enable_collision=False, disable_constraint=True)`,
-    https://genesis-world.readthedocs.io/en/latest/api_reference/options/simulator_coupler_and_solver_options/rigid_options.html).
+    Its kernels are compiled when a run is prepared, once in the life of an environment: with importing it, that takes one to
+    four minutes. One of the packages that it needs, pygltflib, has no wheel: `conservative engines install genesis
+    --allow-build`; the environment takes 8 GB, nearly all of it PyTorch for GPUs. Switched off: collisions and constraints
+    (`enable_collision`, `disable_constraint`).
 
     Parameters
     ----------
     integrator
         "Euler", "implicitfast" or "approximate_implicitfast", which is Genesis's default.
     precision
-        "f64" or "f32", which is Genesis's default (`gs.init(precision=...)`).
+        "f64" or "f32", which is Genesis's default (`gs.init(precision="32")`).
+    as_installed
+        Whether collisions and constraints stay on.
 
     Raises
     ------
     BadInput
-        The integrator or the precision is unknown.
+        The integrator or the precision is unknown, or as_installed neither True nor False.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    RigidOptions: https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py
+    Precision, `gs.init`: https://genesis-world.readthedocs.io
     """
 
     integrator: str = "implicitfast"
     precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
+    as_installed: bool = False
 
     family: ClassVar[str] = "genesis"
     distribution: ClassVar[Distribution] = Distribution("genesis-world", "genesis", ("torch",), oldest="1.4")
@@ -45,12 +57,33 @@ class Genesis(EngineMethod):
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, tuple(ORDERS))
         choice("precision", self.precision, ("f64", "f32"))
+        if not isinstance(self.as_installed, bool):
+            raise BadInput("as_installed", repr(self.as_installed), "True or False")
         super().__post_init__()
 
     @property
+    def variables(self) -> Mapping[str, str]:
+        """Variables that no one reads: Genesis has one precision in a process, so that each precision has a process."""
+        return {"CONSERVATIVE_PRECISION": self.precision}
+
+    @property
     def setting(self) -> str:
-        return self.integrator
+        return self.integrator + ",as installed" * self.as_installed
 
     @property
     def order(self) -> int:
         return ORDERS[self.integrator]
+
+    @classmethod
+    def user_defaults(cls) -> Method:
+        return cls("approximate_implicitfast", "f32", as_installed=True)
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return (
+            cls("Euler"),
+            cls("implicitfast"),
+            cls("approximate_implicitfast"),
+            cls("implicitfast", "f32"),
+            cls.user_defaults(),
+        )

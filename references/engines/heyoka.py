@@ -91,17 +91,17 @@ class Heyoka(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         problem = getattr(formulations, self.frame)(scene)
         integrators, label = forms.compile_double(problem.form, self.tol, problem.fast_math), self.label
-        propagate = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid
+        propagate, t = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid, grid.t
 
         def run() -> Trajectory:
             with integrators.borrow() as integrator:
                 # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
                 integrator.pars[:] = problem.parameters[: len(integrator.pars)]
                 _reset(integrator, problem.start)
-                reason = pace_reason(scene, integrator, float(grid.t[-1]))
+                reason = pace_reason(scene, integrator, float(t[-1]))
                 _reset(integrator, problem.start)
-                states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, grid.t)
-            R_WF, w = problem.readout(grid.t[: len(states)], states)
+                states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, t)
+            R_WF, w = problem.readout(t[: len(states)], states)
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), reason)
 
         return run

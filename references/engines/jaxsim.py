@@ -19,18 +19,16 @@ ORDERS = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
 class JaxSim(EngineMethod):
     """JaxSim on a floating base, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
 
-    Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none
-    (https://jaxsim.readthedocs.io/en/latest/modules/api.html). `RungeKutta4Fast` needs points of contact, without which it
-    raises (https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py). One of the packages that it needs,
-    pptree, has no wheel: `conservative engines install jaxsim --allow-build`.
+    Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none.
+    `RungeKutta4Fast` raises where there are no points of contact. One of the packages that it needs, pptree, has no wheel:
+    `conservative engines install jaxsim --allow-build`.
 
     Parameters
     ----------
     integrator
         "SemiImplicitEuler", which is JaxSim's default, or "RungeKutta4".
     precision
-        "f64", which is JaxSim's default, or "f32", which it calls experimental
-        (https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py).
+        "f64", which is JaxSim's default, or "f32", which it calls experimental.
 
     Raises
     ------
@@ -38,6 +36,12 @@ class JaxSim(EngineMethod):
         The integrator or the precision is unknown.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    Integrators: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py
+    Precision: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py
+    Models and their joints: https://jaxsim.readthedocs.io/en/latest/modules/api.html
     """
 
     integrator: str = "RungeKutta4"
@@ -45,6 +49,7 @@ class JaxSim(EngineMethod):
 
     family: ClassVar[str] = "jaxsim"
     distribution: ClassVar[Distribution] = Distribution("jaxsim", "jaxsim", oldest="0.9")
+    free_only: ClassVar[str] = "JaxSim's joints are revolute, prismatic or fixed"
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, tuple(ORDERS))

@@ -1,7 +1,4 @@
-"""MuJoCo Warp: MuJoCo's integrators in Warp, in single precision. Source: MuJoCo's documentation, MuJoCo Warp.
-
-https://mujoco.readthedocs.io/en/stable/mjwarp/index.html
-"""
+"""MuJoCo Warp: MuJoCo's integrators in Warp, in single precision. Source: MuJoCo's documentation, MuJoCo Warp."""
 
 from __future__ import annotations
 
@@ -21,15 +18,14 @@ INTEGRATORS = ("Euler", "RK4", "implicitfast")
 class MJWarp(EngineMethod):
     """MuJoCo Warp on the CPU, in single precision, on a free joint or a ball joint at the fixed point.
 
-    Switched off: contacts and constraints (`option/flag`, https://mujoco.readthedocs.io/en/stable/XMLreference.html#option-flag).
-    It launches a few dozen kernels a step from Python, which takes nearly all of the time: on a GPU, with thousands of worlds
-    at once, it is another thing.
+    Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`). A step is recorded by Warp once
+    and then replayed; launched from Python, its kernels take a hundred times as long. They are compiled when a run is prepared,
+    once in the life of an environment, which takes a minute. It is made for thousands of worlds at once on a GPU.
 
     Parameters
     ----------
     integrator
-        "Euler", "RK4" or "implicitfast"
-        (https://mujoco.readthedocs.io/en/stable/computation/index.html#numerical-integration).
+        "Euler", "RK4" or "implicitfast".
 
     Raises
     ------
@@ -37,6 +33,12 @@ class MJWarp(EngineMethod):
         The integrator is unknown.
     MissingEngine
         It is not installed: no environment has it.
+
+    References
+    ----------
+    MuJoCo Warp, graph capture: https://mujoco.readthedocs.io/en/stable/mjwarp/index.html
+    Flags and integrators: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
+    Warp, `ScopedCapture`: https://nvidia.github.io/warp/
     """
 
     integrator: str = "RK4"

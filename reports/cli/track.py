@@ -108,11 +108,12 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
     from ..tables.track import Answer
     from ..terminal.progress import progress
 
+    made = _made()
     with interruptible(signal.SIGTERM):
         plan = _plan(engine, versions, scenes, settings, options)
         with progress() as step:
             history = track(plan, lambda done, total, what: step(done / total, what))
-    return Answer(history, gated=options["against"] is not None)
+    return Answer(history, options["against"] is not None, made)
 
 
 def _plan(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Plan:
@@ -126,8 +127,19 @@ def _plan(engine: str, versions: tuple[str, ...], scenes: list[str], settings: l
     newest = newest_releases(engine, last, source) if last else ()
     wanted = [*versions, *(version for version in newest if version not in versions)]
     require_several([*wanted, *([str(against)] if against is not None else [])])
-    build = [install_build(engine, against, source).environment] if against is not None else []
-    return make_plan((*install_releases(engine, wanted, source, _tell), *build), settings, scenes)
+    environments = install_releases(engine, wanted, source, _tell)
+    if against is not None:
+        _tell(f"installing {against}")
+        environments += (install_build(engine, against, source).environment,)
+    return make_plan(environments, settings, scenes)
+
+
+def _made() -> dict[str, str]:
+    """Return how and where this is measured; before any work, as files and the commit can change while that goes on."""
+    from ..run.provenance import provenance
+
+    source = provenance()
+    return {"command": source.command, "date": source.date, "commit": source.commit, **source.machine}
 
 
 def _tell(what: str) -> None:

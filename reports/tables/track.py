@@ -4,31 +4,42 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from conservative.benchmarks.measures.drift_class import DriftClass, classify
 from conservative.benchmarks.tracking.observation import Fit, Observation, Spread
 from conservative.benchmarks.tracking.track import History, Line, Transition
-from conservative.outcome import Outcome
+from conservative.outcome import Outcome, OutcomeKind
 
 from .cells import DASH, Cell, Grade, Row, Table, finite_or_none, markdown, number, outcome_cell, outcome_record
 from .changes import drift_text, order_text, sentence
 from .junit import TestCase, junit_xml
 
 NOTHING_CHANGED = "No conclusion changed."
-UNFINISHED = "What did not reach its end"
+UNFINISHED = "What did not reach its end, or shows no order"
 NO_END = "no setting reaches the end of a run"
 _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a history says; `gated` says whether something that the last version lost is a failure."""
+    """What a history says.
+
+    Attributes
+    ----------
+    history
+        What was found.
+    gated
+        Whether something that the last version lost is a failure.
+    made
+        How and where it was measured: command, date, machine, by what they are called.
+    """
 
     history: History
     gated: bool = False
+    made: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:
@@ -69,7 +80,7 @@ class Answer:
 
     @property
     def unfinished(self) -> tuple[str, ...]:
-        """The runs that did not reach their end: setting, scene and versions, and how the last of these ended."""
+        """The runs that did not reach their end or show no order: setting, scene, versions, and why that of the last one."""
         return tuple(text for line in self.history.lines for text in _unfinished(line))
 
     @property
@@ -82,6 +93,7 @@ class Answer:
         """Return all that was measured, and what changed, as JSON; what could not be measured is null."""
         plan = self.history.plan
         content = {
+            "made": dict(self.made),
             "engine": plan.engine,
             "passed": self.passed,
             "failures": list(self.failures),
@@ -99,10 +111,13 @@ class Answer:
         failures = [f"- {text}" for text in self.failures]
         verdict = ["", f"**{self.verdict}**", *(["", *failures] if failures else [])] if self.gated else []
         tables = [part for caption, table in self.tables for part in ("", f"### {caption}", "", markdown(table))]
+        made = (
+            ["", "### How this was made", "", *(f"- {name}: {value}" for name, value in self.made.items())] if self.made else []
+        )
         head = [f"## {self.title}", *verdict, "", "### What changed", "", changes]
         if self.unfinished:
             tables += ["", f"### {UNFINISHED}", "", *(f"- {text}" for text in self.unfinished)]
-        return "\n".join([*head, *tables, "", "### Versions", "", markdown(self.environments)]) + "\n"
+        return "\n".join([*head, *tables, "", "### Versions", "", markdown(self.environments), *made]) + "\n"
 
     def junit_text(self) -> str:
         """Return a case for each setting on each scene and two versions that follow each other, as JUnit has them."""
@@ -131,11 +146,19 @@ def _caption(scene: str, lines: list[Line]) -> str:
 
 
 def _unfinished(line: Line) -> Iterator[str]:
-    kinds = dict.fromkeys(each.outcome.kind for each in line.observations if not each.outcome.ok)
-    for kind in kinds:
-        found = [each for each in line.observations if each.outcome.kind is kind]
-        versions = ", ".join(each.version for each in found)
-        yield f"{line.setting or 'default'} on {line.scene} in {versions}: {found[-1].outcome}"
+    reasons = [(each.version, *_reason(each)) for each in line.observations]
+    for kind in dict.fromkeys(kind for _, kind, _ in reasons if kind):
+        found = [(version, reason) for version, this, reason in reasons if this == kind]
+        versions = ", ".join(version for version, _ in found)
+        yield f"{line.setting or 'default'} on {line.scene} in {versions}: {found[-1][1]}"
+
+
+def _reason(seen: Observation) -> tuple[str, str]:
+    """Return what is lacking, as the kind that versions have in common, and in full; both empty where nothing is."""
+    if not seen.outcome.ok:
+        return seen.outcome.kind.value, str(seen.outcome)
+    reason = seen.attitude_order.reason
+    return reason and OutcomeKind.NO_ORDER.value, reason and f"{OutcomeKind.NO_ORDER.value} ({reason})"
 
 
 def _table(lines: list[Line]) -> Table:

@@ -10,6 +10,7 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
 from conservative.references.environments.install import install
+from conservative.references.environments.lock import Source
 
 ENERGY_GROWS = (2.98, 0.22, 0.11, None)
 """Of semi-implicit Euler: attitude error, rad, relative changes of energy and momentum at dt = 0.01, and order."""
@@ -43,8 +44,33 @@ ROWS = {
     ("mjx", "RK4"): (1.6e-3, -2e-8, 2e-5, 2),
     ("mjx", "RK4,f32"): (None, None, None, None),
     ("rapier3d", ""): (3.8e-2, 4e-4, 6e-3, None),
+    ("mjwarp", "Euler"): ENERGY_GROWS,
+    ("mjwarp", "RK4"): (4.4e-4, None, None, None),
+    ("mjwarp", "implicitfast"): ENERGY_DECAYS,
+    ("newton", "SemiImplicit"): ENERGY_GROWS,
+    ("newton", "SemiImplicit,as_installed=true"): (0.35, -0.35, 0.19, None),
+    ("newton", "XPBD"): ENERGY_GROWS,
+    ("newton", "Featherstone"): ENERGY_GROWS,
+    ("newton", "VBD"): (2.8, -0.45, 0.26, None),
+    ("newton", "Kamino"): (3.3e-2, -1.2e-5, 1.1e-2, None),
+    ("newton", "MuJoCo_euler"): ENERGY_GROWS,
+    ("newton", "MuJoCo_implicitfast"): ENERGY_DECAYS,
+    ("newton", "MuJoCo_rk4"): (1.2e-2, 1.6e-4, 8.4e-5, None),
+    ("brax", "generalized"): ENERGY_GROWS,
+    ("brax", "generalized,f32"): ENERGY_GROWS,
+    ("brax", "positional"): (0.84, -0.6, 0.37, None),
+    ("brax", "spring"): (1.74, None, 5e-3, None),
+    ("jaxsim", "SemiImplicitEuler"): ENERGY_GROWS,
+    ("jaxsim", "RungeKutta4"): (3.5e-3, 2.7e-7, 6.6e-7, 5),
+    ("jaxsim", "RungeKutta4,f32"): (1.4e-3, None, None, None),
+    ("genesis", "Euler"): ENERGY_GROWS,
+    ("genesis", "implicitfast"): (3.3e-3, None, 5.4e-4, 2),
+    ("genesis", "approximate_implicitfast"): (3.3e-3, None, 5.4e-4, 2),
 }
+BUILT = Source(allow_build=True)
+"""JaxSim and Genesis need a package each that has no wheel."""
 END = from_quaternion(np.array([0.674588396035547, -0.00844525823572897, 0.02003759177423751, 0.7378737483224409]))
+HEAVY = ("mjwarp", "newton", "jaxsim", "genesis")
 SCENE = cv.Scene("brick", cv.RigidBody((13, 5, 10)), np.eye(3), (0, 0.05, 10), 6.0)
 
 
@@ -55,7 +81,7 @@ def rows():
 
 @pytest.mark.parametrize(("engine", "setting", "figures"), list(rows()))
 def test_an_adapter_finds_what_a_plain_script_finds(engine, setting, figures):
-    found = install(engine).environment
+    found = install(engine, BUILT).environment
     method = registry.method(f"{found.engine}@{found.version}:{setting}")
     coarse, fine = (cv.integrate(SCENE, dt, method=method) for dt in (0.01, 0.005))
     error, energy, momentum, order = figures
@@ -67,11 +93,11 @@ def test_an_adapter_finds_what_a_plain_script_finds(engine, setting, figures):
 
 
 @pytest.mark.parametrize(
-    "engine", [pytest.param(each, marks=pytest.mark.engine(each)) for each in ("exudyn", "bsk", "drake", "mjx")]
+    "engine", [pytest.param(each, marks=pytest.mark.engine(each)) for each in ("exudyn", "bsk", "drake", "mjx", *HEAVY)]
 )
 def test_samples_and_a_turned_start_are_those_of_the_grid(engine):
     scene = cv.scenes.turned_brick(t_end=0.5)
-    install(engine)
+    install(engine, BUILT)
     method = registry.method(engine)
     every, some = (cv.integrate(scene, 0.01, method=method, sample_every=count) for count in (1, 7))
     truth = cv.integrate(scene, 0.01, method=registry.method("exact"))

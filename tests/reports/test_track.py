@@ -137,7 +137,15 @@ def test_markdown_has_tables_changes_and_versions():
     assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
     assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text
     assert "| 1.0 | 3.11.7 | made==1.0 |" in text
+    assert "- processor: fast" in Answer(history(GOOD, GOOD), made={"processor": "fast"}).markdown_text()
     assert NOTHING_CHANGED in Answer(history(GOOD, GOOD)).markdown_text()
+
+
+def test_what_has_no_order_says_why_once_for_all_versions():
+    chaotic = replace(GOOD, attitude_order=Fit(reason="2 points between the coarsest steps and the floor"))
+    answer = Answer(history(chaotic, chaotic, GOOD))
+    assert answer.unfinished == ("midpoint on brick in 1.0, 2.0: no order (2 points between the coarsest steps and the floor)",)
+    assert answer.unfinished[0] in render(answer)
 
 
 def test_json_has_every_figure_and_change():

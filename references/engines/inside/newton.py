@@ -6,7 +6,9 @@ import numpy as np
 
 DAMPED = ("SemiImplicit", "Featherstone")
 WITH_MEMORY = ("VBD", "Kamino")
-"""Solvers that keep something from step to step beside the state, which `reset` clears and a record of a step loses."""
+"""Solvers that keep something from step to step beside the state, which `reset` clears."""
+NOT_RECORDED = "VBD"
+"""A record of its step takes the pose of each step for the one before it, so that nothing moves."""
 
 
 def prepare(given):
@@ -26,15 +28,20 @@ def prepare(given):
 
     def renew():
         for state in states:
-            state.assign(start)
+            _start(state, start)
         if given.solver in WITH_MEMORY:
             solver.reset(states[0], flags=0)  # which leaves the state
 
-    steps = [partial(step, *states), partial(step, *states[::-1])]
+    steps = [partial(step, *states), partial(step, *reversed(states))]
     for each in steps:
         each()
-    steps = steps if given.solver in WITH_MEMORY else [_record(warp, each) for each in steps]
+    steps = steps if given.solver == NOT_RECORDED else [_record(warp, each) for each in steps]
     return partial(_march, steps, [_views(state) for state in states], renew, given.steps)
+
+
+def _start(state, start):
+    for name in ("body_q", "body_qd", "joint_q", "joint_qd"):
+        getattr(state, name).assign(getattr(start, name))
 
 
 def _march(steps, views, renew, counts):
@@ -90,6 +97,9 @@ def _solver(newton, model, given):
         options["angular_damping"] = 0.0
     if not given.as_installed and name == "MuJoCo":
         options["disable_contacts"] = True
+    if not given.as_installed and name == "Kamino":
+        sparse = {"dynamics_solver": "dvi", "sparse_dynamics": True, "sparse_jacobian": True}
+        options["config"] = newton.solvers.SolverKamino.Config.from_model(model, **sparse)
     return getattr(newton.solvers, f"Solver{name}")(model, **options)
 
 

@@ -1,0 +1,65 @@
+"""Genesis in its environment. Source: its documentation, RigidOptions, RigidEntity; the free joint's rates are in the body."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+
+def prepare(given):
+    """Return a run of one body from an MJCF file; kernels are compiled here, once in the life of an environment."""
+    import genesis as gs
+
+    if not getattr(gs, "_initialized", False):  # once in a process, which has one precision
+        gs.init(backend=gs.cpu, precision=given.precision[1:], logging_level="error")
+    scene = _scene(gs, given)
+    body = scene.add_entity(gs.morphs.MJCF(file=str(_write_model(given))))
+    scene.build()
+    place, rates = np.array([0, 0, 0, *given.q0]), np.array([0, 0, 0, *given.w0])
+    step = partial(scene.step, update_visualizer=False)
+    step()
+
+    def run():
+        scene.reset()
+        body.set_qpos(place)
+        body.set_dofs_velocity(rates)
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                step()
+            q[sample], w[sample] = body.get_quat().numpy().ravel(), body.get_ang().numpy().ravel()
+        return {"q": q, "w_W": w}
+
+    return run
+
+
+def _scene(gs, given):
+    return gs.Scene(
+        sim_options=gs.options.SimOptions(dt=given.dt, gravity=(0, 0, 0)),
+        rigid_options=gs.options.RigidOptions(
+            integrator=getattr(gs.integrator, given.integrator),
+            enable_collision=given.as_installed,
+            disable_constraint=not given.as_installed,
+        ),
+        show_viewer=False,
+    )
+
+
+def _write_model(given):
+    """Return the path of a file of the body; Genesis wants a shape, which touches nothing."""
+    moments = " ".join(map(repr, given.moments.tolist()))
+    path = Path("body.xml").resolve()
+    path.write_text(
+        f"""
+        <mujoco>
+          <worldbody>
+            <body>
+              <freejoint/>
+              <inertial mass="{given.mass!r}" pos="0 0 0" diaginertia="{moments}"/>
+              <geom type="sphere" size="0.1" contype="0" conaffinity="0"/>
+            </body>
+          </worldbody>
+        </mujoco>""",
+        encoding="utf-8",
+    )
+    return path
