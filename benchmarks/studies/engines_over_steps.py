@@ -40,7 +40,7 @@ CALL = 0.002
 """Shortest sample of timed calls, s."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
     """A run that reached its end, and its largest attitude error, rad."""
 
@@ -118,10 +118,20 @@ def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -
 
 
 def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
-    """Yield the times of all points of a scene, taken in interleaved rounds."""
-    runs = {str(i): point.done.run for i, point in enumerate(found)}
+    """Yield the times of all points of a scene, in interleaved rounds; of a run longer than planned for, that of this run."""
+    quick = [point for point in found if point.done.cost.first_call <= study.longest_run]
+    runs = {str(i): point.done.run for i, point in enumerate(quick)}
     with time_limit(study.hang_limit):
         timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
-    for i, point in enumerate(found):
-        grid, timing = point.case.grid, timings[str(i)]
-        yield point.case.row(Value(Measure.TIME, timing.minimum / (grid.dt * grid.n_steps)), timing.outcome)
+    for i, point in enumerate(quick):
+        yield time_row(point, timings[str(i)].minimum, timings[str(i)].outcome, str(timings[str(i)]))
+    for point in found:
+        if point not in quick:
+            yield time_row(point, point.done.cost.first_call, OK, "a single run")
+
+
+def time_row(point: Point, spent: float, outcome: Outcome, detail: str) -> Measurement:
+    """Return the row of a run that took so long, s."""
+    grid = point.case.grid
+    value = Value(Measure.TIME, spent / (grid.dt * grid.n_steps))
+    return point.case.row(value, outcome, detail if outcome.ok else "")
