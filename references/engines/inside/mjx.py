@@ -1,6 +1,7 @@
 """MJX in its environment. Source: MuJoCo's documentation, MJX; JAX's, double precision (x64)."""
 
-from types import SimpleNamespace
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -8,38 +9,44 @@ import numpy as np
 def prepare(given):
     """Return a run on a free joint, or on a ball joint at the fixed point, compiled as a whole.
 
-    It is a `lax.scan` over samples, with a `fori_loop` over the steps between them. Whether JAX computes in double precision is
-    said by the variable JAX_ENABLE_X64 of the process.
+    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process. What is compiled is kept in
+    the home of the environment.
     """
     import jax
     import mujoco
     from mujoco import mjx
 
+    jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
     model = mjx.put_model(_model(mujoco, given))
     start = mjx.make_data(model)
     number = start.qpos.dtype
     place = [0, 0, 0] * given.free
     start = start.replace(qpos=jax.numpy.array([*place, *given.q0], number), qvel=jax.numpy.array([*place, *given.w0], number))
-    place = SimpleNamespace(jax=jax, model=model, step=mjx.step)
-    march = jax.jit(lambda data: _march(place, data, given))
-    jax.block_until_ready(march(start))
+    counts = np.diff(given.steps).astype(np.int32)
+    march = _march()
+    jax.block_until_ready(march(model, start, counts))
 
     def run():
-        q, w = march(start)
+        q, w = march(model, start, counts)
         return {"q": np.vstack([given.q0, np.asarray(q, float)]), "w": np.vstack([given.w0, np.asarray(w, float)])}
 
     return run
 
 
-def _march(place, data, given):
-    lax = place.jax.lax
+@lru_cache(maxsize=1)
+def _march():
+    """Return what computes all samples, compiled once for every number of them: step, counts and inertia are data."""
+    import jax
+    from mujoco import mjx
 
-    def advance(data, n_steps):
-        data = lax.fori_loop(0, n_steps, lambda _, data: place.step(place.model, data), data)
-        return data, (data.qpos[-4:], data.qvel[-3:])
+    def march(model, start, counts):
+        def advance(data, n_steps):
+            data = jax.lax.fori_loop(0, n_steps, lambda _, data: mjx.step(model, data), data)
+            return data, (data.qpos[-4:], data.qvel[-3:])
 
-    counts = place.jax.numpy.asarray(np.diff(given.steps).astype(np.int32))
-    return lax.scan(advance, data, counts)[1]
+        return jax.lax.scan(advance, start, counts)[1]
+
+    return jax.jit(march)
 
 
 def _model(mujoco, given):
