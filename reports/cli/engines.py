@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -11,12 +13,17 @@ from conservative.errors import require_extra
 
 from .options import allow_build_option, epilog, find_links_option
 
+if TYPE_CHECKING:
+    from conservative.references.environments.install import Installation
+
+Value = TypeVar("Value")
+
 
 def _require() -> None:
     require_extra("conservative engines", "environments")
 
 
-def _source(find_links: Path | None, allow_build: bool) -> object:
+def _source(find_links: Path | None, allow_build: bool) -> Any:
     from conservative.references.environments.lock import Source
 
     return Source(find_links, allow_build)
@@ -34,12 +41,16 @@ def engines() -> None:
     """Have engines, in any version, each in an environment of its own in the user's cache folder."""
 
 
+json_option = click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+
+
 @engines.command(short_help="Make environments.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @find_links_option
 @allow_build_option
+@json_option
 @click.pass_context
-def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool) -> None:
+def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool, as_json: bool) -> None:
     """Make the environment of each NAME, by default of its newest version, unless it is there.
 
     The exit code is 1 if an engine was installed but cannot be imported.
@@ -47,59 +58,71 @@ def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None,
     _require()
     from conservative.references.environments.install import check, install
 
+    from ..tables.engines import installation_line
+
     source = _source(find_links, allow_build)
     for name in names:
         check(name)  # all of them, before the first takes minutes
-    trouble = False
-    for name in names:
-        click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
-        done = install(name, source)  # type: ignore[arg-type]
-        found, trouble = done.environment, trouble or bool(done.trouble)
-        click.echo(
-            f"{found.engine}=={found.version}: {'installed' if done.new else 'was there'}, {len(found.packages)} packages, "
-            f"Python {found.python}" + (f"; cannot be imported: {done.trouble}" if done.trouble else "")
-        )
-    ctx.exit(int(trouble))
+
+    def install_each() -> Iterable[Installation]:
+        for name in names:
+            click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
+            yield install(name, source)
+
+    done = _show(install_each(), installation_line, as_json)
+    ctx.exit(int(any(each.trouble for each in done)))
 
 
 @engines.command("list", short_help="Show them.", epilog=epilog("conservative engines list --json"))
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout, with every package's version.")
+@json_option
 def list_engines(as_json: bool) -> None:
-    """Show the engines that can be had, and the environments that are there."""
+    """Show the engines that can be had, and the environments that are there, with every package's version."""
     _require()
     from ..tables.engines import json_text, lines
 
-    _print([json_text()] if as_json else lines())
+    for line in [json_text()] if as_json else lines():
+        click.echo(line)
 
 
 @engines.command(short_help="Remove environments.", epilog=epilog("conservative engines remove mujoco==3.6.0"))
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
-def remove(names: tuple[str, ...]) -> None:
+@json_option
+def remove(names: tuple[str, ...], as_json: bool) -> None:
     """Remove the environment of each NAME==VERSION, or all of NAME."""
     _require()
     from conservative.references.environments.install import remove
 
-    for name in names:
-        _print(f"{environment.engine}=={environment.version}: removed" for environment in remove(name))
+    from ..tables.engines import removal_line
+
+    _show((environment for name in names for environment in remove(name)), removal_line, as_json)
 
 
 @engines.command(short_help="Find and mend broken ones.", epilog=epilog("conservative engines doctor"))
 @click.option("--dry-run", is_flag=True, help="Only say what is wrong; exit code 1 if anything is.")
 @find_links_option
 @allow_build_option
+@json_option
 @click.pass_context
-def doctor(ctx: click.Context, dry_run: bool, find_links: Path | None, allow_build: bool) -> None:
+def doctor(ctx: click.Context, dry_run: bool, find_links: Path | None, allow_build: bool, as_json: bool) -> None:
     """Check each environment against what was recorded of it, and make those anew that differ."""
     _require()
     from conservative.references.environments.doctor import examine
 
-    ill = False
-    for finding in examine(not dry_run, _source(find_links, allow_build)):  # type: ignore[arg-type]
-        ill = ill or (bool(finding.trouble) and finding.remedy not in ("made anew", "removed"))
-        click.echo(f"{finding.name}: " + ("; ".join(filter(None, (finding.trouble, finding.remedy))) or "whole"))
-    ctx.exit(int(ill))
+    from ..tables.engines import finding_line
+
+    found = _show(examine(not dry_run, _source(find_links, allow_build)), finding_line, as_json)
+    ctx.exit(int(any(each.trouble and each.remedy not in ("made anew", "removed") for each in found)))
 
 
-def _print(lines: Iterable[str]) -> None:
-    for line in lines:
-        click.echo(line)
+def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:
+    """Return values after each is shown in a line as soon as it is there, or all as JSON."""
+    from ..tables.engines import as_plain
+
+    found = []
+    for value in values:
+        found.append(value)
+        if not as_json:
+            click.echo(line(value))
+    if as_json:
+        click.echo(json.dumps([as_plain(value) for value in found], indent=2))  # type: ignore[arg-type]
+    return found

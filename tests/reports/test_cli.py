@@ -193,9 +193,18 @@ def test_missing_engine_is_listed_with_its_install_line(monkeypatch):
     assert "pip install some-package" in done.stderr
 
 
-@pytest.mark.parametrize("command", list(main.commands))
-def test_every_command_speaks_json(command):
-    assert "--json" in {name for parameter in main.commands[command].params for name in parameter.opts}
+def commands(group):
+    """Return all commands of a group, those of its groups among them, by name."""
+    found = {}
+    for name, command in group.commands.items():
+        below = {f"{name} {each}": value for each, value in commands(command).items()} if hasattr(command, "commands") else {}
+        found |= below or {name: command}
+    return found
+
+
+@pytest.mark.parametrize(("name", "command"), list(commands(main).items()))
+def test_every_command_speaks_json(name, command):
+    assert "--json" in {name for parameter in command.params for name in parameter.opts}, name
 
 
 def test_new_as_json_tells_a_program_what_a_scene_file_has():
