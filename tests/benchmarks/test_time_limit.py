@@ -18,6 +18,7 @@ from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_he
 from conservative.method import Grid, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
+from conservative.references.environments.workers import close_workers
 
 from .foreign_engines import Fast, Harmful, Slow
 from .generic_study import SCENE, truth
@@ -65,6 +66,7 @@ def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
 @pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
 def test_what_an_engine_does_to_its_process_is_an_outcome(how, limit, kind, reason, attempt_so):
     worker.end_idle()
+    close_workers()
     before = threading.enumerate()
     done = attempt_so(limit, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
     assert (done.outcome.kind, done.outcome.reason) == (kind, reason)

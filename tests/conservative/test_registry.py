@@ -43,8 +43,10 @@ def test_an_unknown_setting_is_answered_with_the_nearest():
 
 def with_entry(monkeypatch, name, value):
     """Register one more method, as an installed package would."""
-    known = deferred_imports.list_entries(deferred_imports.METHODS) | {name: EntryPoint(name, value, deferred_imports.METHODS)}
-    monkeypatch.setattr(deferred_imports, "list_entries", lambda group: known)
+    group, list_entries = deferred_imports.METHODS, deferred_imports.list_entries
+    more = {group: list_entries(group) | {name: EntryPoint(name, value, group)}}
+    for module in (deferred_imports, registry):
+        monkeypatch.setattr(module, "list_entries", lambda group: more.get(group) or list_entries(group))
 
 
 @pytest.mark.parametrize("value", ["conservative.body:Phantom", "conservative.nowhere:Phantom"])

@@ -15,6 +15,7 @@ import pytest
 
 import conservative as cv
 from conservative.references import worker
+from conservative.references.environments.workers import close_workers
 from conservative.references.pickling import NotTransferable, dump, load
 from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
 
@@ -32,6 +33,7 @@ def hang():
 @pytest.fixture(autouse=True)
 def no_process_before():
     worker.end_idle()
+    close_workers()
 
 
 def children():
