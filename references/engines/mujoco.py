@@ -107,6 +107,11 @@ class MuJoCo(Method):
         return tuple(cls(integrator) for integrator in INTEGRATORS)
 
     @classmethod
+    def user_defaults(cls) -> Method:
+        """Return MuJoCo with nothing set but the step."""
+        return cls("Euler")
+
+    @classmethod
     def suite_settings(cls) -> tuple[Method, ...]:
         return cls("Euler"), cls("RK4")
 
