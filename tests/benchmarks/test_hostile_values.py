@@ -25,9 +25,9 @@ def search(found, turn=0.1):
     return Search(found, cv.Reduced(), Grid(0.01, 10), turn)
 
 
-def test_three_hundred_hostile_calls_leak_nothing(tmp_path):
+def test_a_hundred_hostile_calls_leak_nothing(tmp_path):
     warm_up()
-    leaks = hostile_values.find_leaks(hostile_values.draw_tries(300, 1, tmp_path, part="arguments"))
+    leaks = hostile_values.find_leaks(hostile_values.draw_tries(100, 1, tmp_path, part="arguments"))
     assert not leaks
 
 

@@ -12,7 +12,7 @@ from conservative.methods import automatic
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 
-SCENES = 200
+SCENES = 100
 KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
 
 

@@ -13,8 +13,8 @@ DONE = Ended(0, "", "", 1.0, False)
 
 
 def test_a_killed_report_is_resumed_to_the_same_rows():
-    found = list(kills.kills(2, seed=5))
-    assert sum(each.number is not None for each in found) == 2
+    found = list(kills.kills(1, seed=5))
+    assert sum(each.number is not None for each in found) == 1
     assert [str(each) for each in found if each.complaints] == []
 
 
