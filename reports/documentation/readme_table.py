@@ -1,5 +1,6 @@
-"""The README's table of costs, from a report: `python -m conservative.reports.documentation.readme_table report` prints it.
+"""The README's tables, from a report: `python -m conservative.reports.documentation.readme_table report` prints that of costs.
 
+With `--engines` it prints that of engines, from a report with this option.
 Each cell is the cheapest way of a group of methods to an attitude error, in µs per simulated second, with its setting. Exact
 steps are a group of their own: they exist for few scenes, and have no truncation error that a shorter step would lower.
 """
@@ -17,6 +18,7 @@ from conservative import registry
 from conservative.method import Role
 
 from ..labels import with_names
+from ..tables.engine_rows import ONE_STEP, EngineRow, engine_rows, points_of
 from ..tables.work_precision import cost, points
 
 ERRORS = (1e-3, 1e-6, 1e-9)
@@ -70,15 +72,34 @@ def cell(time: float, setting: str, bold: bool) -> str:
 
 def read(path: Path) -> pd.DataFrame:
     """Return the measurements of a report; an empty text is one, not a number that is missing."""
-    texts = ("family", "version", "setting", "series_setting")
+    texts = ("family", "version", "setting", "series_setting", "quantity", "reason", "detail")
     return pd.read_csv(path, dtype=dict.fromkeys(texts, "string")).fillna(dict.fromkeys(texts, ""))
 
 
+def engines(table: pd.DataFrame) -> Iterator[list[str]]:
+    """Yield the header, and a row for each engine on the first scene: as installed, and at its best."""
+    scene = str(table[table["study"] == ONE_STEP]["scene"].iloc[0])
+    found = engine_rows(table, scene, points_of(table))
+    yield ["engine", "bits", "as installed", "error, rad", "energy drift", "at its best", "error, rad", "energy drift", "order"]
+    for best in (row for row in found if row.best):
+        installed = next((row for row in found if row.engine == best.engine and row.as_installed), None)
+        order = "–" if math.isnan(best.order) else f"{best.order:.1f}"
+        yield [best.engine, f"{best.bits:.0f}", *(_run(installed) if installed else "–––"), *_run(best), order]
+
+
+def _run(row: EngineRow) -> list[str]:
+    """Return setting, error and energy drift of a row."""
+    return [row.label.partition("/")[2], f"{row.error:.2g}", f"{row.energy.size:.1g} {row.energy.direction}".strip()]
+
+
 def main() -> None:
-    """Print the table as Markdown."""
+    """Print a table as Markdown."""
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.readme_table", description=__doc__)
     parser.add_argument("report", nargs="?", type=Path, default=Path("report"), help="a report's folder [default: report]")
-    header, *body = rows(points(with_names(read(parser.parse_args().report / "measurements.csv"))))
+    parser.add_argument("--engines", action="store_true", help="the table of engines")
+    options = parser.parse_args()
+    found = with_names(read(options.report / "measurements.csv"))
+    header, *body = engines(found) if options.engines else rows(points(found))
     for row in (header, ["---"] * len(header), *body):
         print("|", " | ".join(row), "|")
 
