@@ -108,7 +108,7 @@ def main(method: str, count: int, seed: int) -> None:
     for number, (is_marked, complaints) in enumerate(attack(method, count, seed), start=1):
         marked, wrong = marked + is_marked, wrong + bool(complaints)
         click.echo(f"report {number}: {'; '.join(complaints) or ('a row marked' if is_marked else 'nothing lost')}")
-    click.echo(f"{count} reports, all that are not wrong whole; {marked} with a row marked, {wrong} wrong")
+    click.echo(f"{count} reports, {marked} with a row marked, {wrong} that lost more")
     sys.exit(bool(wrong))
 
 

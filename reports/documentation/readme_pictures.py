@@ -40,7 +40,7 @@ TIMED_SCENE, TIMED = (
         "reduced:order=6",
         "gauss",
         "projected",
-        "heyoka",
+        "heyoka:frame=base_vectors",
         "mujoco:Euler",
         "mujoco:RK4",
         "pinocchio:RK4",
