@@ -32,8 +32,13 @@ def lines(findings: Iterable[Finding]) -> Iterator[str]:
 def closing(findings: Sequence[Finding]) -> str:
     """Return how many figures came out how."""
     counts = Counter(finding.verdict for finding in findings)
-    parts = [f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]]
+    parts = [_count(verdict, counts[verdict]) for verdict in Verdict if counts[verdict]]
     return f"{len(findings)} figures: {'; '.join(parts)}"
+
+
+def _count(verdict: Verdict, count: int) -> str:
+    words = f"{count} {verdict}"
+    return words if count == 1 else words.replace("differs", "differ")
 
 
 def _heading(source: Source) -> Iterator[str]:

@@ -40,6 +40,7 @@ def run(tmp_path, monkeypatch):
         ((RIGHT, BOUND, CANNOT), 0, "3 figures: 2 reproduced; 1 cannot be done"),
         ((RIGHT, EXPLAINED), 0, "2 figures: 1 reproduced; 1 differs, explained"),
         ((RIGHT, WRONG), 1, "2 figures: 1 reproduced; 1 differs, not explained"),
+        ((WRONG, WRONG), 1, "2 figures: 2 differ, not explained"),
         ((RIGHT, NEEDLESS), 1, "2 figures: 1 reproduced; 1 explained, but reproduced"),
     ],
 )
