@@ -9,6 +9,8 @@ With f a power of two, both are computed with the same digits.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..check import positive_number
 from ..errors import BadInput
 from ..potentials.uniform_gravity import UniformGravity
@@ -46,100 +48,23 @@ def slow_motion(scene: Scene, factor: float = DEFAULT_FACTOR) -> Scene:
     return scene.rename(f"slow_{scene.name}", **times, **changes)
 
 
-def slow_cusped_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `cusped_top`, slower by a dimensionless factor.
+def _slow(fast: Callable[[], Scene]) -> Callable[..., Scene]:
+    """Return the function that makes the slow motion of a scene."""
 
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(cusped_top(), factor)
+    def slow(factor: float = DEFAULT_FACTOR) -> Scene:
+        return slow_motion(fast(), factor)
 
-
-def slow_falling_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `falling_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(falling_top(), factor)
+    slow.__name__ = slow.__qualname__ = f"slow_{fast.__name__}"
+    slow.__doc__ = f"Return `{fast.__name__}`, slower by a dimensionless factor; see `slow_motion`."
+    return slow
 
 
-def slow_lagrange_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `lagrange_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(lagrange_top(), factor)
-
-
-def slow_lie_group_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `lie_group_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(lie_group_top(), factor)
-
-
-def slow_looping_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `looping_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(looping_top(), factor)
-
-
-def slow_needle(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `needle`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(needle(), factor)
-
-
-def slow_nutating_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `nutating_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(nutating_top(), factor)
-
-
-def slow_sleeping_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `sleeping_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(sleeping_top(), factor)
-
-
-def slow_unduloid_top(factor: float = DEFAULT_FACTOR) -> Scene:
-    """Return `unduloid_top`, slower by a dimensionless factor.
-
-    Raises
-    ------
-    BadInput
-        The factor is not a finite number above 0.
-    """
-    return slow_motion(unduloid_top(), factor)
+slow_cusped_top = _slow(cusped_top)
+slow_falling_top = _slow(falling_top)
+slow_lagrange_top = _slow(lagrange_top)
+slow_lie_group_top = _slow(lie_group_top)
+slow_looping_top = _slow(looping_top)
+slow_needle = _slow(needle)
+slow_nutating_top = _slow(nutating_top)
+slow_sleeping_top = _slow(sleeping_top)
+slow_unduloid_top = _slow(unduloid_top)

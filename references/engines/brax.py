@@ -10,7 +10,7 @@ from conservative.check import choice
 from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, jax_variables
 
 PIPELINES = ("generalized", "positional", "spring")
 
@@ -59,11 +59,7 @@ class Brax(EngineMethod):
 
     @property
     def variables(self) -> Mapping[str, str]:
-        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
-
-    @property
-    def setting(self) -> str:
-        return self.pipeline
+        return jax_variables(self.precision)
 
     @property
     def order(self) -> int:

@@ -11,7 +11,7 @@ from conservative.errors import BadInput
 from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, jax_variables
 
 ORDERS = {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8}
 
@@ -55,7 +55,7 @@ class Diffrax(EngineMethod):
 
     @property
     def variables(self) -> Mapping[str, str]:
-        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": "1"}
+        return jax_variables(self.precision)
 
     @property
     def setting(self) -> str:

@@ -59,10 +59,6 @@ class Exudyn(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator
-
-    @property
     def order(self) -> int:
         return ORDERS[self.integrator]
 

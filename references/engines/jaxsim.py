@@ -10,7 +10,7 @@ from conservative.check import choice
 from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, jax_variables
 
 ORDERS = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
 
@@ -58,11 +58,7 @@ class JaxSim(EngineMethod):
 
     @property
     def variables(self) -> Mapping[str, str]:
-        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
-
-    @property
-    def setting(self) -> str:
-        return self.integrator
+        return jax_variables(self.precision)
 
     @property
     def order(self) -> int:

@@ -53,10 +53,6 @@ class MJWarp(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator
-
-    @property
     def order(self) -> int:
         return 4 if self.integrator == "RK4" else 1
 

@@ -10,7 +10,7 @@ from conservative.check import choice
 from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, jax_variables
 
 INTEGRATORS = ("Euler", "RK4", "implicitfast")
 
@@ -56,11 +56,7 @@ class MJX(EngineMethod):
 
     @property
     def variables(self) -> Mapping[str, str]:
-        return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(self.precision == "f64"))}
-
-    @property
-    def setting(self) -> str:
-        return self.integrator
+        return jax_variables(self.precision)
 
     @property
     def order(self) -> int:

@@ -153,10 +153,6 @@ class MuJoCoVersion(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator
-
-    @property
     def order(self) -> int:
         return 4 if self.integrator == "RK4" else 1
 

@@ -23,7 +23,7 @@ class Distribution:
     requirements
         What it needs beside NumPy, such as `numpy<2`.
     oldest
-        Oldest version that its adapter was tried with; where no version is asked for, none below it is taken.
+        Oldest version that its adapter is meant for; where no version is asked for, none below it is taken.
     """
 
     package: str

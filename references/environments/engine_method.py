@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import weakref
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache, partial
@@ -85,9 +84,10 @@ class EngineMethod(Method):
         return {}
 
     @property
-    @abstractmethod
     def setting(self) -> str:
-        """The settings as the label has them."""
+        """The settings as the label has them; by default the first."""
+        value: Any = self
+        return str(getattr(value, fields(value)[0].name))
 
     def unsupported(self, scene: Scene) -> str | None:
         if self.takes_gravity:
@@ -134,6 +134,11 @@ def _class_at(cls: type[EngineMethod], version: str) -> type[EngineMethod]:
 @lru_cache(maxsize=64)
 def _inside(cls: type[EngineMethod]) -> Path:
     return Path(inspect.getfile(cls)).resolve().parent / "inside" / f"{cls.family.partition('@')[0]}.py"
+
+
+def jax_variables(precision: str) -> dict[str, str]:
+    """Return the variables of a process in which JAX computes on the CPU, with numbers of a precision, "f64" or "f32"."""
+    return {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64"))}
 
 
 def rate_limit_reason(scene: Scene, limit: float) -> str | None:

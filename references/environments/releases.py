@@ -15,7 +15,7 @@ from .versions import version_key
 
 
 def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
-    """Return the newest versions of an engine that there are wheels for and that its adapter was tried with, oldest first.
+    """Return the newest versions of an engine that there are wheels for and that its adapter is meant for, oldest first.
 
     Raises
     ------
@@ -27,8 +27,8 @@ def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
     if not known:
         got = f"no list of versions of {distribution.package} from where packages come from"
         raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
-    tried = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
-    return tuple(sorted(tried, key=version_key)[-count:])
+    meant = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
+    return tuple(sorted(meant, key=version_key)[-count:])
 
 
 def install_releases(
