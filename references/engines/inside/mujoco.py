@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 # All that MuJoCo computes in a step and one body without contacts, actuators, springs or sensors has no use for. Bits that a
-# version does not have are skipped. Autoreset would silently start a diverged run afresh.
+# version does not have are skipped. Autoreset would start a diverged run afresh; its warning, which is read, would tell.
 SWITCHED_OFF = (
     *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
     *(
