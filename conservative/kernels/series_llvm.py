@@ -1,0 +1,175 @@
+"""The orders of a series step in uniform gravity, unrolled as LLVM's vector code (`taylor`).
+
+With c' the coefficients of powers of t/h, so that a step is their sum, and n = 0, 1, ...
+
+    (n+1) g'[n+1] = h sum of g'[i] x w'[n-i]       (n+1) a'[n+1] = h sum of a'[i] x w'[n-i]
+    (n+1) w'[n+1] = h (K sum of w2'[i] w3'[n-i] and its kin + J^-1 (g'[n] x m))
+
+A vector x is kept as r = (x2, x3, x1, x2) and s = (x3, x1, x2, x3), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run
+from the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
+constants that hold the factor h/(n+1).
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+from .simd_llvm import FOUR, LANES
+
+HIGHEST = 20
+"""Highest order that code is made for: beyond it, the code leaves the processor's cache of instructions."""
+LOWEST = 4
+FOLD = 1
+RECENT = 1
+"""How many of the newest coefficients are used from registers."""
+
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_INDEX = ir.IntType(32)
+_TURNED, _TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
+
+
+class _VolatileLoad(ir.instructions.LoadInstr):
+    """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
+
+    def descr(self, buf):
+        (pointer,) = self.operands
+        kind = pointer.type
+        buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align 32\n")
+
+
+class Emitter:
+    """Vector instructions by name, and the memory of the coefficients: six vectors for each order."""
+
+    def __init__(self, builder):
+        self.builder = builder
+        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        self._fma = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fma.v{LANES}f64")
+        with builder.goto_entry_block():
+            self._memory = builder.alloca(_VECTOR, 6 * HIGHEST)
+            self._memory.align = 32
+
+    def add(self, c, a, b):
+        """c + a b; c is None for 0."""
+        return self.builder.fmul(a, b) if c is None else self.builder.call(self._fma, [a, b, c])
+
+    def subtract(self, c, a, b):
+        """c - a b"""
+        return self.builder.call(self._fma, [self.builder.fneg(a), b, c])
+
+    def shuffle(self, v, mask):
+        return self.builder.shuffle_vector(v, v, ir.Constant(ir.VectorType(_INDEX, LANES), mask))
+
+    def splat(self, x):
+        first = self.builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), x, ir.Constant(_INDEX, 0))
+        return self.shuffle(first, (0, 0, 0, 0))
+
+    def scale(self, f, values):
+        return [self.builder.fmul(f, v) for v in values]
+
+    def _at(self, index):
+        return self.builder.gep(self._memory, [ir.Constant(_INDEX, index)])
+
+    def store(self, index, v):
+        self.builder.store(v, self._at(index), align=32)
+
+    def load(self, index):
+        found = _VolatileLoad(self.builder.block, self._at(index), "")
+        self.builder._insert(found)
+        return found
+
+
+class Series:
+    """Coefficients so far: of each, (r, s) of g, a and w."""
+
+    def __init__(self, emit):
+        self._emit, self._newest = emit, []
+
+    def push(self, vectors):
+        emit, n = self._emit, len(self._newest)
+        self._newest.append([emit.shuffle(v, mask) for v in vectors for mask in (_TURNED, _TWICE)])
+        for k, v in enumerate(self._newest[n]):
+            emit.store(6 * n + k, v)
+
+    def __getitem__(self, key):
+        n, k = key
+        if 0 < n <= len(self._newest) - 1 - RECENT:
+            return self._emit.load(6 * n + k)
+        return self._newest[n][k]
+
+
+def _sum_inner(emit, c, n, indices):
+    """Sums over i of products of i with n - i: both halves of g x w, both of a x w, and w2 w3 and its kin."""
+    sums = [None] * 5
+    for i in sorted(indices, key=lambda i: (abs(2 * i - n), -i)):
+        r, s = c[n - i, 4], c[n - i, 5]
+        for k, other in enumerate((s, r, s, r, s)):
+            sums[k] = emit.add(sums[k], c[i, k], other)
+    return sums
+
+
+def _next_coefficients(emit, c, n, f, K, M):
+    """The coefficients n + 1; f is h/(n+1), M holds both halves of J^-1 m."""
+    b = emit.builder
+    gp, gm, ap, am, ww = _sum_inner(emit, c, n, range(1, n))
+    f1, f2, fK = *emit.scale(f, (c[0, 4], c[0, 5])), b.fmul(f, K)
+    new = []
+    for k, plus, minus in ((0, gp, gm), (2, ap, am)):
+        r, s = c[n, k], c[n, k + 1]
+        two = emit.subtract(emit.add(None, r, f2), s, f1)
+        if plus is not None:
+            two = emit.add(two, f, b.fsub(plus, minus))
+        if n:
+            r0, s0 = emit.scale(f, (c[0, k], c[0, k + 1]))
+            two = b.fadd(two, emit.subtract(emit.add(None, r0, c[n, 5]), s0, c[n, 4]))
+        new.append(two)
+    one = emit.subtract(emit.add(None, b.fmul(f, M[1]), c[n, 0]), b.fmul(f, M[0]), c[n, 1])
+    two = emit.add(None if ww is None else b.fmul(fK, ww), b.fmul(f1, K), c[n, 5])
+    if n:
+        two = emit.add(two, b.fmul(f2, K), c[n, 4])
+    return [*new, b.fadd(one, two)]
+
+
+def build_orders(builder, p, h, start, K, M):
+    """Return what a step adds to g, a and w."""
+    emit = Emitter(builder)
+    c, h4 = Series(emit), emit.splat(h)
+    c.push(start)
+    end = builder.function.append_basic_block("series_end")
+    exits, total = [], None
+    for n in range(HIGHEST):
+        f = builder.fmul(h4, ir.Constant(_VECTOR, [1.0 / (n + 1)] * LANES))
+        new = _next_coefficients(emit, c, n, f, K, M)
+        total = new if n == 0 else [builder.fadd(s, x) for s, x in zip(total, new)]
+        if n + 1 >= LOWEST:
+            exits.append((builder.block, total))
+            if n + 1 == HIGHEST:
+                builder.branch(end)
+                break
+            proceed = builder.function.append_basic_block(f"order_{n + 2}")
+            builder.cbranch(builder.icmp_signed("<=", p, ir.Constant(p.type, n + 1)), end, proceed)
+            builder.position_at_end(proceed)
+        c.push(new)
+    builder.position_at_end(end)
+    out = [builder.phi(_VECTOR) for _ in range(3)]
+    for block, values in exits:
+        for phi, value in zip(out, values):
+            phi.add_incoming(value, block)
+    return out
+
+
+@intrinsic
+def orders(typing, p, h, g, a, w, K, M1, M2):
+    """What a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, each (x, y, z, anything).
+
+    K is (J2 - J3)/J1 and its kin; M1 and M2 are J^-1 times the moment m, rotated as r and s are: J^-1 (m2, m3, m1) and
+    J^-1 (m3, m1, m2).
+    """
+    three = types.UniTuple(FOUR, 3)
+
+    def build(context, builder, sig, args):
+        p, h, g, a, w, K, M1, M2 = args
+        return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, (M1, M2)))
+
+    return three(types.intp, types.float64, FOUR, FOUR, FOUR, FOUR, FOUR, FOUR), build
