@@ -26,8 +26,8 @@ FAILURE = "the step ends too far from the invariants to be projected onto them"
 PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
-ROUND_OFF = 2.0**-51
-"""Largest relative defect that counts as none."""
+ENOUGH = 2.0**-26
+"""Relative defect whose square, which a correction leaves, is round-off."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect a step may have before projection, and after it."""
 DEPENDENT, TINY = 1e-8, 1e-300
@@ -70,14 +70,6 @@ def split(v):
 
 
 @small
-def orthonormal(g, a):
-    """g and a, all but orthonormal, made so: g keeps its direction. Two terms of the root's series are enough (`near_unit`)."""
-    g = scale(1.5 - 0.5 * dot(g, g), g)
-    a = subtract(a, scale(dot(a, g), g))
-    return g, scale(1.5 - 0.5 * dot(a, a), a)
-
-
-@small
 def shortest_move(w, L, moment, size, e, m, g):
     """Return (dL, turn of the body) that changes energy by e and vertical momentum by m, to first order, and moves least.
 
@@ -100,20 +92,30 @@ def values(J, moment, g, w):
 
 
 @small
+def correct(J, J_inverse, moment, kept, scales, g, a, w):
+    """Return (g, a, w, relative defect before) of a state brought closer to orthonormality and to what is `kept`.
+
+    The inverse length of g is two terms of its series (`projected.near_unit`), and energy and momentum are taken with g that
+    long, so that no product waits for another. What is left is of the size of the defect's square.
+    """
+    L, n = times(J, w), 1.5 - 0.5 * dot(g, g)
+    e = kept[0] - (0.5 * dot(L, w) + n * dot(moment, g))
+    m = kept[1] - n * dot(L, g)
+    dL, turn = shortest_move(w, L, moment, scales[1], e, m, g)
+    upright = subtract(scale(1.5 - 0.5 * dot(a, a), a), scale(dot(a, g), g))
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, add(w, times(J_inverse, dL)), max(abs(e) * scales[2], abs(m) * scales[3])
+
+
+@small
 def project(J, J_inverse, moment, kept, scales, g, a, w):
-    """Return (g, a, w, corrections, relative defect left) of a state brought back to the energy and momentum `kept`."""
-    g, a = orthonormal(g, a)
+    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
     corrections = 0
     while True:
-        now = values(J, moment, g, w)
-        e, m = kept[0] - now[0], kept[1] - now[1]
-        defect = max(abs(e) * scales[2], abs(m) * scales[3])
-        if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
-            return g, a, w, corrections, defect
+        g, a, w, defect = correct(J, J_inverse, moment, kept, scales, g, a, w)
         corrections += 1
-        dL, turn = shortest_move(w, times(J, w), moment, scales[1], e, m, g)
-        w = add(w, times(J_inverse, dL))
-        g, a = orthonormal(add(g, cross(g, turn)), add(a, cross(a, turn)))
+        if corrections == MOST_CORRECTIONS or not ENOUGH < defect < FAR:
+            return g, a, w, corrections, defect * defect
 
 
 @small
