@@ -132,6 +132,13 @@ def quaternion(g, a):
     return (b[0] - a[1], a[2] + g[0], b[2] + g[1], 1.0 - a[0] - b[1] + g[2])
 
 
+@small
+def record(q_out, L_out, row, q, L):
+    """Store a sample. Number by number: a tuple assigned to a slice takes seconds to compile."""
+    q_out[row, 0], q_out[row, 1], q_out[row, 2], q_out[row, 3] = q[0], q[1], q[2], q[3]
+    L_out[row, 0], L_out[row, 1], L_out[row, 2] = L[0], L[1], L[2]
+
+
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
@@ -140,7 +147,7 @@ def march(model, coefficients, workspace):
     n_steps, every, pause, q_out, L_out = workspace
     K, M1, M2 = constants(J, J_inverse, moment)
     scales = (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
-    q_out[0, :], L_out[0, :] = q, L
+    record(q_out, L_out, 0, q, L)
     g, a, w = in_body(q, (0.0, 0.0, 1.0)), in_body(q, (1.0, 0.0, 0.0)), times(J_inverse, L)
     kept = values(J, moment, g, w)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
@@ -160,7 +167,7 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                q_out[row, :], L_out[row, :] = quaternion(g, a), times(J, w)
+                record(q_out, L_out, row, quaternion(g, a), times(J, w))
         done = last
         if done < n_steps:
             call_handlers()
