@@ -109,7 +109,45 @@ def _sum_inner(emit, c, n, indices):
     return sums
 
 
-def _next_coefficients(emit, c, n, f, K, M):
+class Linear:
+    """What the moment is multiplied by in a uniform field: g itself."""
+
+    def next(self, emit, c, n):
+        """Coefficients n of what M is multiplied by, as (r, s)."""
+        return c[n, 0], c[n, 1]
+
+
+class Pull:
+    """y g with y = c0 + c1 s^alpha, where s = s0 - S.g is the squared distance.
+
+    With s[k], y[k] the coefficients of s and s^alpha, n s[0] y[n] = sum over k = 1 ... n of (alpha k - (n - k)) s[k] y[n-k].
+    """
+
+    def __init__(self, alpha, S, y0, over, c0, c1):
+        self._alpha, self._S, self._over, self._c0, self._c1 = alpha, S, over, c0, c1
+        self._s, self._y, self._factor = [None], [y0], []
+
+    def next(self, emit, c, n):
+        """Coefficients n of what M is multiplied by, as (r, s)."""
+        b, s, y = emit.builder, self._s, self._y
+        if n == 0:
+            self._factor.append(emit.add(self._c0, self._c1, y[0]))
+        else:
+            t = b.fmul(self._S, c[n, 0])
+            s.append(b.fadd(b.fadd(t, emit.shuffle(t, _TURNED)), emit.shuffle(t, _TWICE)))
+            total = None
+            for k in sorted(range(1, n + 1), key=lambda k: abs(2 * k - n)):
+                weight = -(self._alpha * k - (n - k)) / n
+                total = emit.add(total, b.fmul(ir.Constant(_VECTOR, [weight] * LANES), s[k]), y[n - k])
+            y.append(b.fmul(total, self._over))
+            self._factor.append(b.fmul(self._c1, y[n]))
+        P = [None, None]
+        for i in sorted(range(n + 1), key=lambda i: abs(2 * i - n)):
+            P = [emit.add(P[k], self._factor[i], c[n - i, k]) for k in range(2)]
+        return P
+
+
+def _next_coefficients(emit, c, n, f, K, M, field):
     """The coefficients n + 1; f is h/(n+1), M holds both halves of J^-1 m."""
     b = emit.builder
     gp, gm, ap, am, ww = _sum_inner(emit, c, n, range(1, n))
@@ -124,23 +162,24 @@ def _next_coefficients(emit, c, n, f, K, M):
             r0, s0 = emit.scale(f, (c[0, k], c[0, k + 1]))
             two = b.fadd(two, emit.subtract(emit.add(None, r0, c[n, 5]), s0, c[n, 4]))
         new.append(two)
-    one = emit.subtract(emit.add(None, b.fmul(f, M[1]), c[n, 0]), b.fmul(f, M[0]), c[n, 1])
+    P = field.next(emit, c, n)
+    one = emit.subtract(emit.add(None, b.fmul(f, M[1]), P[0]), b.fmul(f, M[0]), P[1])
     two = emit.add(None if ww is None else b.fmul(fK, ww), b.fmul(f1, K), c[n, 5])
     if n:
         two = emit.add(two, b.fmul(f2, K), c[n, 4])
     return [*new, b.fadd(one, two)]
 
 
-def build_orders(builder, p, h, start, K, M):
+def build_orders(builder, p, h, start, K, M, field_of=lambda emit: Linear()):
     """Return what a step adds to g, a and w."""
     emit = Emitter(builder)
-    c, h4 = Series(emit), emit.splat(h)
+    c, h4, field = Series(emit), emit.splat(h), field_of(emit)
     c.push(start)
     end = builder.function.append_basic_block("series_end")
     exits, total = [], None
     for n in range(HIGHEST):
         f = builder.fmul(h4, ir.Constant(_VECTOR, [1.0 / (n + 1)] * LANES))
-        new = _next_coefficients(emit, c, n, f, K, M)
+        new = _next_coefficients(emit, c, n, f, K, M, field)
         total = new if n == 0 else [builder.fadd(s, x) for s, x in zip(total, new)]
         if n + 1 >= LOWEST:
             exits.append((builder.block, total))
@@ -173,3 +212,26 @@ def orders(typing, p, h, g, a, w, K, M1, M2):
         return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, (M1, M2)))
 
     return three(types.intp, types.float64, FOUR, FOUR, FOUR, FOUR, FOUR, FOUR), build
+
+
+def _pull_orders(alpha):
+    @intrinsic
+    def orders(typing, p, h, g, a, w, K, M1, M2, S, y0, over, c0, c1):
+        """As `orders`, for a moment times c0 + c1 s^alpha (`Pull`); S is (S2, S3, S1, S2), y0 = s^alpha, over = 1/s."""
+        three = types.UniTuple(FOUR, 3)
+
+        def build(context, builder, sig, args):
+            p, h, g, a, w, K, M1, M2, S, *numbers = args
+
+            def field_of(emit):
+                return Pull(alpha, S, *(emit.splat(x) for x in numbers))
+
+            return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, (M1, M2), field_of))
+
+        f = types.float64
+        return three(types.intp, f, *[FOUR] * 7, f, f, f, f), build
+
+    return orders
+
+
+spring_orders, attraction_orders = _pull_orders(-0.5), _pull_orders(-1.5)
