@@ -18,10 +18,8 @@ from numba.extending import intrinsic
 
 from .simd_llvm import FOUR, LANES
 
-HIGHEST = 20
-"""Highest order that code is made for: beyond it, the code leaves the processor's cache of instructions."""
-LOWEST = 4
-FOLD = 1
+LOWEST, HIGHEST = 4, 20
+"""Orders that code is made for: beyond the highest, it does not fit into the processor's cache of instructions."""
 RECENT = 1
 """How many of the newest coefficients are used from registers."""
 
@@ -155,9 +153,8 @@ def _next_coefficients(emit, c, n, f, K, M, field):
     new = []
     for k, plus, minus in ((0, gp, gm), (2, ap, am)):
         r, s = c[n, k], c[n, k + 1]
-        two = emit.subtract(emit.add(None, r, f2), s, f1)
-        if plus is not None:
-            two = emit.add(two, f, b.fsub(plus, minus))
+        old = None if plus is None else b.fmul(f, b.fsub(plus, minus))
+        two = emit.subtract(emit.add(old, r, f2), s, f1)
         if n:
             r0, s0 = emit.scale(f, (c[0, k], c[0, k + 1]))
             two = b.fadd(two, emit.subtract(emit.add(None, r0, c[n, 5]), s0, c[n, 4]))
