@@ -5,9 +5,9 @@ With c' the coefficients of powers of t/h, so that a step is their sum, and n = 
     (n+1) g'[n+1] = h sum of g'[i] x w'[n-i]       (n+1) a'[n+1] = h sum of a'[i] x w'[n-i]
     (n+1) w'[n+1] = h (K sum of w2'[i] w3'[n-i] and its kin + J^-1 (g'[n] x m))
 
-A vector x is kept as r = (x2, x3, x1, x2) and s = (x3, x1, x2, x3), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run
-from the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
-constants that hold the factor h/(n+1).
+A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run from
+the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
+constants that hold the factor h/(n+1). For a pull towards a point, g in the torque is replaced by P of `Pull`.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ def build_orders(builder, p, h, start, K, M, field_of=lambda emit: Linear()):
     for n in range(HIGHEST):
         f = builder.fmul(h4, ir.Constant(_VECTOR, [1.0 / (n + 1)] * LANES))
         new = _next_coefficients(emit, c, n, f, K, M, field)
-        total = new if n == 0 else [builder.fadd(s, x) for s, x in zip(total, new)]
+        total = new if n == 0 else [builder.fadd(s, x) for s, x in zip(total, new, strict=True)]
         if n + 1 >= LOWEST:
             exits.append((builder.block, total))
             if n + 1 == HIGHEST:
@@ -190,7 +190,7 @@ def build_orders(builder, p, h, start, K, M, field_of=lambda emit: Linear()):
     builder.position_at_end(end)
     out = [builder.phi(_VECTOR) for _ in range(3)]
     for block, values in exits:
-        for phi, value in zip(out, values):
+        for phi, value in zip(out, values, strict=True):
             phi.add_incoming(value, block)
     return out
 
