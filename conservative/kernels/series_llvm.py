@@ -108,25 +108,49 @@ def _sum_inner(emit, c, n, indices):
 
 
 class Linear:
-    """What the moment is multiplied by in a uniform field: g itself."""
+    """A uniform field: J^-1 (P x m) with P = g, where M holds both halves of J^-1 m."""
 
-    def next(self, emit, c, n):
-        """Coefficients n of what M is multiplied by, as (r, s)."""
+    def __init__(self, M):
+        self._M = M
+
+    def accelerate(self, emit, c, n, f):
+        """f times coefficient n of what the field adds to w'."""
+        (r, s), (M1, M2) = self._follow(emit, c, n), self._M
+        b = emit.builder
+        return emit.subtract(emit.add(None, b.fmul(f, M2), r), b.fmul(f, M1), s)
+
+    def _follow(self, emit, c, n):
+        """Coefficient n of P, as (r, s)."""
         return c[n, 0], c[n, 1]
 
 
-class Pull:
-    """y g with y = c0 + c1 s^alpha, where s = s0 - S.g is the squared distance.
+class Gradient:
+    """The gradient of gravity where its inertia is diagonal: G (g2 g3, g3 g1, g1 g2), G = rate^2 J^-1 (J3 - J2) and its kin."""
+
+    def __init__(self, G):
+        self._G = G
+
+    def accelerate(self, emit, c, n, f):
+        """f times coefficient n of what the field adds to w'."""
+        total = None
+        for i in sorted(range(n + 1), key=lambda i: abs(2 * i - n)):
+            total = emit.add(total, c[i, 0], c[n - i, 1])
+        return emit.builder.fmul(emit.builder.fmul(f, self._G), total)
+
+
+class Pull(Linear):
+    """P = y g with y = c0 + c1 s^alpha, where s = s0 - S.g is the squared distance.
 
     With s[k], y[k] the coefficients of s and s^alpha, n s[0] y[n] = sum over k = 1 ... n of (alpha k - (n - k)) s[k] y[n-k].
     """
 
-    def __init__(self, alpha, S, y0, over, c0, c1):
+    def __init__(self, M, alpha, S, y0, over, c0, c1):
+        super().__init__(M)
         self._alpha, self._S, self._over, self._c0, self._c1 = alpha, S, over, c0, c1
         self._s, self._y, self._factor = [None], [y0], []
 
-    def next(self, emit, c, n):
-        """Coefficients n of what M is multiplied by, as (r, s)."""
+    def _follow(self, emit, c, n):
+        """Coefficient n of P, as (r, s)."""
         b, s, y = emit.builder, self._s, self._y
         if n == 0:
             self._factor.append(emit.add(self._c0, self._c1, y[0]))
@@ -145,8 +169,8 @@ class Pull:
         return P
 
 
-def _next_coefficients(emit, c, n, f, K, M, field):
-    """The coefficients n + 1; f is h/(n+1), M holds both halves of J^-1 m."""
+def _next_coefficients(emit, c, n, f, K, field):
+    """The coefficients n + 1; f is h/(n+1)."""
     b = emit.builder
     gp, gm, ap, am, ww = _sum_inner(emit, c, n, range(1, n))
     f1, f2, fK = *emit.scale(f, (c[0, 4], c[0, 5])), b.fmul(f, K)
@@ -159,15 +183,14 @@ def _next_coefficients(emit, c, n, f, K, M, field):
             r0, s0 = emit.scale(f, (c[0, k], c[0, k + 1]))
             two = b.fadd(two, emit.subtract(emit.add(None, r0, c[n, 5]), s0, c[n, 4]))
         new.append(two)
-    P = field.next(emit, c, n)
-    one = emit.subtract(emit.add(None, b.fmul(f, M[1]), P[0]), b.fmul(f, M[0]), P[1])
+    one = field.accelerate(emit, c, n, f)
     two = emit.add(None if ww is None else b.fmul(fK, ww), b.fmul(f1, K), c[n, 5])
     if n:
         two = emit.add(two, b.fmul(f2, K), c[n, 4])
     return [*new, b.fadd(one, two)]
 
 
-def build_orders(builder, p, h, start, K, M, field_of=lambda emit: Linear()):
+def build_orders(builder, p, h, start, K, field_of):
     """Return what a step adds to g, a and w."""
     emit = Emitter(builder)
     c, h4, field = Series(emit), emit.splat(h), field_of(emit)
@@ -176,7 +199,7 @@ def build_orders(builder, p, h, start, K, M, field_of=lambda emit: Linear()):
     exits, total = [], None
     for n in range(HIGHEST):
         f = builder.fmul(h4, ir.Constant(_VECTOR, [1.0 / (n + 1)] * LANES))
-        new = _next_coefficients(emit, c, n, f, K, M, field)
+        new = _next_coefficients(emit, c, n, f, K, field)
         total = new if n == 0 else [builder.fadd(s, x) for s, x in zip(total, new, strict=True)]
         if n + 1 >= LOWEST:
             exits.append((builder.block, total))
@@ -206,7 +229,7 @@ def orders(typing, p, h, g, a, w, K, M1, M2):
 
     def build(context, builder, sig, args):
         p, h, g, a, w, K, M1, M2 = args
-        return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, (M1, M2)))
+        return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, lambda _: Linear((M1, M2))))
 
     return three(types.intp, types.float64, FOUR, FOUR, FOUR, FOUR, FOUR, FOUR), build
 
@@ -221,9 +244,9 @@ def _pull_orders(alpha):
             p, h, g, a, w, K, M1, M2, S, *numbers = args
 
             def field_of(emit):
-                return Pull(alpha, S, *(emit.splat(x) for x in numbers))
+                return Pull((M1, M2), alpha, S, *(emit.splat(x) for x in numbers))
 
-            return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, (M1, M2), field_of))
+            return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, field_of))
 
         f = types.float64
         return three(types.intp, f, *[FOUR] * 7, f, f, f, f), build
@@ -232,3 +255,15 @@ def _pull_orders(alpha):
 
 
 spring_orders, attraction_orders = _pull_orders(-0.5), _pull_orders(-1.5)
+
+
+@intrinsic
+def gradient_orders(typing, p, h, g, a, w, K, G):
+    """As `orders`, in the gradient of gravity with a diagonal inertia (`Gradient`)."""
+    three = types.UniTuple(FOUR, 3)
+
+    def build(context, builder, sig, args):
+        p, h, g, a, w, K, G = args
+        return context.make_tuple(builder, three, build_orders(builder, p, h, (g, a, w), K, lambda _: Gradient(G)))
+
+    return three(types.intp, types.float64, *[FOUR] * 5), build
