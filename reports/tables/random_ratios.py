@@ -1,0 +1,204 @@
+"""Engines' time over ours on random bodies, at each decade: over all bodies of a field, the mean, the worst and the best.
+
+What a side needs on a body to reach an error is the least that any of its lines needs (see `cost_at_error`). The ratio is above
+1 where ours is faster. A body on which a side does not reach the error has no ratio there and is counted.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import pandas as pd
+
+from conservative.benchmarks.measures.cost_at_error import cost
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.random import DECADES
+from conservative.benchmarks.studies.studies import RANDOM
+from conservative.method import Role
+
+from .cells import DASH, Cell, Grade, Table, number
+
+ANY = "cheapest engine"
+"""Stands for all engines: on each body, the cheapest of them."""
+_FIELD = re.compile(r"field=(\w+)")
+
+
+class Cheapest(NamedTuple):
+    """The cheapest line of a side at an error, and its time, s per simulated second."""
+
+    time: float
+    line: str
+
+
+class Pair(NamedTuple):
+    """What both sides need on a body; None where a side does not get there."""
+
+    scene: str
+    ours: Cheapest | None
+    engine: Cheapest | None
+
+    @property
+    def ratio(self) -> float:
+        """The engine's time over ours; nan where a side does not get there."""
+        return self.engine.time / self.ours.time if self.ours and self.engine else math.nan
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A field, an engine, an error, and what both sides need on each body."""
+
+    field: str
+    engine: str
+    error: float
+    pairs: tuple[Pair, ...]
+
+    @property
+    def both(self) -> list[Pair]:
+        """Bodies on which both sides reach the error, those on which ours does worst first."""
+        return sorted((pair for pair in self.pairs if pair.ours and pair.engine), key=lambda pair: pair.ratio)
+
+    @property
+    def mean(self) -> float:
+        """Geometric mean of the ratios; nan without any."""
+        logs = [math.log(pair.ratio) for pair in self.both]
+        return math.exp(math.fsum(logs) / len(logs)) if logs else math.nan
+
+    @property
+    def worst(self) -> float:
+        """Least ratio; nan without any."""
+        return self.both[0].ratio if self.both else math.nan
+
+    @property
+    def best(self) -> float:
+        """Largest ratio; nan without any."""
+        return self.both[-1].ratio if self.both else math.nan
+
+    @property
+    def only_ours(self) -> int:
+        """Bodies on which only ours reaches the error."""
+        return sum(1 for pair in self.pairs if pair.ours and not pair.engine)
+
+    @property
+    def only_engine(self) -> int:
+        """Bodies on which only the engine reaches the error."""
+        return sum(1 for pair in self.pairs if pair.engine and not pair.ours)
+
+
+Line = tuple[str, str, str]
+"""Scene, side and series."""
+Costs = Mapping[tuple[str, str], Mapping[str, tuple[list[float], list[float]]]]
+"""Errors and times of the settings of each line, coarse to fine, by scene and side, and by series."""
+
+
+def contests(table: pd.DataFrame) -> tuple[Contest, ...]:
+    """Return all contests in the rows of the study: first against the cheapest engine, then against each one."""
+    lines = _lines(table)
+    scenes = list(dict.fromkeys(scene for scene, _ in lines))
+    engines = list(dict.fromkeys(side for _, side in lines if side != Role.OURS))
+    fields: dict[str, list[str]] = {}
+    for scene in scenes:
+        fields.setdefault(_field(scene), []).append(scene)
+    rivals = {ANY: engines, **{engine: [engine] for engine in engines}} if engines else {}
+    return tuple(
+        Contest(field, rival, error, tuple(_pair(lines, scene, members, error) for scene in bodies))
+        for rival, members in rivals.items()
+        for field, bodies in fields.items()
+        for error in DECADES
+    )
+
+
+def _field(scene: str) -> str:
+    found = _FIELD.search(scene)
+    return found[1] if found else scene
+
+
+def _lines(table: pd.DataFrame) -> Costs:
+    """Return errors and times as `Costs`; a setting that was not timed has a time of nan."""
+    found: dict[tuple[str, str], dict[str, dict[tuple[str, float], dict[str, float]]]] = {}
+    for row in table[table["study"] == RANDOM].to_dict("records"):
+        side = str(row["role"]) if row["role"] == Role.OURS else str(row["family"])
+        line = found.setdefault((row["scene"], side), {}).setdefault(row["series"], {})
+        line.setdefault((row["method"], row["dt"]), {})[row["measure"]] = float(row["value"])
+    return {key: {name: _columns(line.values()) for name, line in lines.items()} for key, lines in found.items()}
+
+
+def _columns(points: Iterable[Mapping[str, float]]) -> tuple[list[float], list[float]]:
+    """Return the errors and the times of a line's settings that reach their end."""
+    good = [point for point in points if math.isfinite(point.get(Measure.ATTITUDE_MAX.text, math.nan))]
+    return [point[Measure.ATTITUDE_MAX.text] for point in good], [point.get(Measure.TIME.text, math.nan) for point in good]
+
+
+def _pair(lines: Costs, scene: str, engines: Iterable[str], error: float) -> Pair:
+    return Pair(scene, _cheapest(lines, scene, [Role.OURS], error), _cheapest(lines, scene, engines, error))
+
+
+def _cheapest(lines: Costs, scene: str, sides: Iterable[str], error: float) -> Cheapest | None:
+    every = [entry for side in sides for entry in lines.get((scene, str(side)), {}).items()]
+    costs = [Cheapest(cost(errors, times, error), name) for name, (errors, times) in every]
+    return min((found for found in costs if not math.isnan(found.time)), default=None)
+
+
+def as_table(found: Iterable[Contest], engine: str = ANY) -> Table:
+    """Return the contests against an engine, a row for each field and error."""
+    header = ["field", "error, rad", "bodies", "mean", "worst", "best", "ours", "engine", "worst body"]
+    return header, [_row(contest) for contest in found if contest.engine == engine]
+
+
+def _row(contest: Contest) -> list[str | Cell]:
+    ratios = [_grade(value) for value in (contest.mean, contest.worst, contest.best)]
+    winners = [_most_often(found) for found in ([p.ours for p in contest.both], [p.engine for p in contest.both])]
+    worst = contest.both[0].scene if contest.both else DASH
+    return [contest.field, f"{contest.error:.0e}", count_text(contest), *ratios, *winners, worst]
+
+
+def _grade(ratio: float) -> Cell:
+    """Return a ratio with a symbol that is not its colour alone."""
+    if math.isnan(ratio):
+        return Cell(DASH, Grade.NONE)
+    return Cell(f"{'✓' if ratio >= 1 else '✗'} {number(ratio, 3)}", Grade.GOOD if ratio >= 1 else Grade.BAD)
+
+
+def count_text(contest: Contest) -> str:
+    """Return on how many bodies both sides reach the error, of how many, and which side misses it on the others."""
+    neither = len(contest.pairs) - len(contest.both) - contest.only_ours - contest.only_engine
+    missing = {"only ours": contest.only_ours, "only engine": contest.only_engine, "neither": neither}
+    reasons = ", ".join(f"{name} {count}" for name, count in missing.items() if count)
+    return f"{len(contest.both)} of {len(contest.pairs)}" + (f" ({reasons})" if reasons else "")
+
+
+def _most_often(found: Iterable[Cheapest | None]) -> str:
+    """Return the line that is the cheapest on most bodies, and on how many where that is not all."""
+    counts = Counter(each.line for each in found if each)
+    if not counts:
+        return DASH
+    (name, count), total = counts.most_common(1)[0], counts.total()
+    return name if count == total else f"{name} ({count} of {total})"
+
+
+def statements(found: Iterable[Contest]) -> tuple[str, ...]:
+    """Return what is found against the cheapest engine, a sentence or two for each field."""
+    fields: dict[str, list[Contest]] = {}
+    for contest in found:
+        if contest.engine == ANY:
+            fields.setdefault(contest.field, []).append(contest)
+    return tuple(f"{field}: {' '.join(_sentences(members))}" for field, members in fields.items())
+
+
+def _sentences(members: list[Contest]) -> Iterator[str]:
+    compared = [contest for contest in members if contest.both]
+    if not compared:
+        yield "on no body do ours and an engine reach the same error."
+        return
+    low, high = min(compared, key=lambda c: c.mean), max(compared, key=lambda c: c.mean)
+    worst = min(compared, key=lambda c: c.worst)
+    yield f"the cheapest engine takes {low.mean:.2f} (at {low.error:.0e} rad) to {high.mean:.2f} (at {high.error:.0e} rad) times"
+    yield f"as long as ours, in the geometric mean over {len(members[0].pairs)} bodies; on the worst body {worst.worst:.2f} times"
+    yield f"(at {worst.error:.0e} rad, {worst.both[0].scene})."
+    missing = sum(contest.only_engine for contest in members)
+    if missing:
+        yield f"Only an engine reaches the error in {missing} of {sum(len(c.pairs) for c in members)} cases."
