@@ -25,9 +25,10 @@ from dataclasses import dataclass, replace
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
-from conservative.errors import BadInput
-from conservative.method import Grid, Method, Role
+from conservative.errors import BadInput, IntegrationFailed
+from conservative.method import Grid, Method, Role, Run
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.client import time_limit
 from conservative.references.precise import Precise
 from conservative.references.truth import Truth
 from conservative.scene import Scene
@@ -62,15 +63,15 @@ DURATIONS = 50
 """How many times longer the motion is that is timed."""
 LONG = 0.002
 """Time, s, of a run over the motion itself that is timed as it is."""
-CALL = 0.002
-"""Least duration of a timed sample, s."""
+CALL = 1e-4
+"""Least duration of a timed sample, s: mostly one call, since a short sample is seldom interrupted."""
 MARGIN = 3.0
 """How many times dearer than the cheapest of its side a setting may look before it is timed."""
 BITS = 96
-SLOW = 0.01
-"""Time, s, of a run from which on a line gets every second setting."""
-ROUNDS, BUDGET = 7, 0.05
-"""Rounds of timing, and the time, s, of all rounds of one setting: slow ones get three."""
+SLOW, EVERY = 0.01, 3
+"""Time, s, of a run from which on a line gets one setting of so many."""
+ROUNDS, QUICK_ROUNDS, BUDGET = 25, 7, 0.05
+"""Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get three."""
 TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
 
@@ -164,10 +165,9 @@ def at_tolerances(method: Method, setting: str, tolerances: Iterable[float]) -> 
 def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, Line]:
     """Yield the errors of a line, coarse to fine, until there is no decade left; return its points."""
     line: Line = []
-    skip = False
-    for case in settings:
-        skip = not skip and bool(line) and line[-1].spent * case.scene.t_end > SLOW
-        if skip or [point.error < FLOOR for point in line[-2:]] == [True, True]:
+    for i, case in enumerate(settings):
+        slow = bool(line) and line[-1].spent * case.scene.t_end > SLOW
+        if (slow and i % EVERY) or [point.error < FLOOR for point in line[-2:]] == [True, True]:
             continue
         outcome = attempt_here(study.hang_limit, case, study.skip_missing)
         if isinstance(outcome, Failure):
@@ -207,20 +207,37 @@ def _deciding(lines: list[Line], error: float) -> Iterator[Point]:
 
 def time_rows(study: Study, points: list[Point]) -> Iterator[Measurement]:
     """Yield the times of the points of a body, s per simulated second, in interleaved rounds."""
-    runs: dict[str, tuple[Point, Case, Success]] = {}
-    for point in points:
-        case = longer(point)
-        outcome = attempt_here(study.hang_limit, case)
-        if isinstance(outcome, Success):
-            runs[str(len(runs))] = point, case, outcome
-        else:
-            yield point.case.row(TIME, outcome.outcome)
-    calls = {key: done.run for key, (_, _, done) in runs.items()}
-    timings = time_interleaved(calls, min(study.rounds, ROUNDS), min_time=CALL, budget=BUDGET)
-    for key, (point, case, _) in runs.items():
-        timing, simulated = timings[key], case.grid.dt * case.grid.n_steps
-        detail = f"{timing} of {simulated:.4g} s" if timing.outcome.ok else ""
+    runs: dict[str, Run] = {}
+    timed = {str(i): (point, longer(point)) for i, point in enumerate(points)}
+    with time_limit(study.hang_limit):
+        for key, (point, case) in timed.items():
+            run = prepare_unchecked(case)
+            if isinstance(run, Outcome):
+                yield point.case.row(TIME, run)
+            else:
+                runs[key] = run
+        timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=BUDGET)
+    for key, timing in timings.items():
+        (point, case), detail = timed[key], str(timing) if timing.outcome.ok else ""
+        simulated = case.grid.dt * case.grid.n_steps
         yield point.case.row(Value(Measure.TIME, timing.minimum / simulated), timing.outcome, detail)
+
+
+def prepare_unchecked(case: Case) -> Run | Outcome:
+    """Return the run, or how it ends before its time; it may drift, since its errors are those of the motion itself.
+
+    Were it to be conserved as well, loose tolerances would be lost to engines that reach a loose error with them.
+    """
+    try:
+        run = case.method.prepare(case.scene, case.grid)
+        outcome = run().outcome
+    except IntegrationFailed as failure:
+        return failure.outcome
+    except Exception as error:  # an engine may raise anything
+        if case.method.role != Role.ENGINE:
+            raise
+        return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+    return run if outcome.ok else outcome
 
 
 def longer(point: Point) -> Case:
