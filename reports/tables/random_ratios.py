@@ -20,12 +20,23 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
 from conservative.benchmarks.studies.studies import RANDOM
 from conservative.method import Role
+from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Cell, Grade, Table, number
 
 ANY = "cheapest engine"
 """Stands for all engines: on each body, the cheapest of them."""
-_FIELD = re.compile(r"field=(\w+)")
+MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
+"""Errors, rad, of the short table."""
+TERMS = (
+    "Each body is drawn from a seed: an asymmetric body of condition 1.1 to 100 in a turned frame, no point and no rate on an "
+    "axis, in uniform gravity, on a spring, attracted to a point, or in gravity's gradient, with a field about as strong as the "
+    "motion. The ratio is the cheapest engine's time over ours, each in the cheapest of all forms and settings, for whole calls; "
+    "above 1 ours is faster. The error is the largest of twelve instants, and that of a setting the largest of it and all finer "
+    "ones, so that no lucky one counts. A body on which a side does not reach the error is counted and has no ratio."
+)
+"""What the tables mean."""
+_FIELD, _INDEX = re.compile(r"field=(\w+)"), re.compile(r"index=(\d+)")
 
 
 class Cheapest(NamedTuple):
@@ -89,8 +100,28 @@ class Contest:
         return sum(1 for pair in self.pairs if pair.engine and not pair.ours)
 
 
-Line = tuple[str, str, str]
-"""Scene, side and series."""
+@dataclass(frozen=True, eq=False)
+class RandomView:
+    """What a report shows of random bodies: how many there are in each field, from which seed, and what was found.
+
+    `points` has columns field, error, mean, worst, best of the contests against the cheapest engine, where both sides get
+    there.
+    """
+
+    bodies: int
+    seed: int
+    statements: tuple[str, ...]
+    ratios: Table
+    engines: Table
+    points: pd.DataFrame
+
+
+def view(table: pd.DataFrame, bodies: int, seed: int) -> RandomView:
+    """Return the view of the rows of the study."""
+    found = contests(table)
+    return RandomView(bodies, seed, statements(found), as_table(found), by_engine(found), chart_points(found))
+
+
 Costs = Mapping[tuple[str, str], Mapping[str, tuple[list[float], list[float]]]]
 """Errors and times of the settings of each line, coarse to fine, by scene and side, and by series."""
 
@@ -108,6 +139,7 @@ def contests(table: pd.DataFrame) -> tuple[Contest, ...]:
         Contest(field, rival, error, tuple(_pair(lines, scene, members, error) for scene in bodies))
         for rival, members in rivals.items()
         for field, bodies in fields.items()
+        if any(lines.get((scene, member)) for scene in bodies for member in members)
         for error in DECADES
     )
 
@@ -117,10 +149,16 @@ def _field(scene: str) -> str:
     return found[1] if found else scene
 
 
+def _index(scene: str) -> str:
+    found = _INDEX.search(scene)
+    return found[1] if found else scene
+
+
 def _lines(table: pd.DataFrame) -> Costs:
     """Return errors and times as `Costs`; a setting that was not timed has a time of nan."""
     found: dict[tuple[str, str], dict[str, dict[tuple[str, float], dict[str, float]]]] = {}
-    for row in table[table["study"] == RANDOM].to_dict("records"):
+    rows = table[(table["study"] == RANDOM) & (table["outcome"] != OutcomeKind.UNSUPPORTED)]
+    for row in rows.to_dict("records"):
         side = str(row["role"]) if row["role"] == Role.OURS else str(row["family"])
         line = found.setdefault((row["scene"], side), {}).setdefault(row["series"], {})
         line.setdefault((row["method"], row["dt"]), {})[row["measure"]] = float(row["value"])
@@ -145,15 +183,39 @@ def _cheapest(lines: Costs, scene: str, sides: Iterable[str], error: float) -> C
 
 def as_table(found: Iterable[Contest], engine: str = ANY) -> Table:
     """Return the contests against an engine, a row for each field and error."""
-    header = ["field", "error, rad", "bodies", "mean", "worst", "best", "ours", "engine", "worst body"]
+    header = ["field", "error, rad", "bodies", "mean", "worst", "best", "worst body", "ours, most often", "engine, most often"]
     return header, [_row(contest) for contest in found if contest.engine == engine]
 
 
 def _row(contest: Contest) -> list[str | Cell]:
     ratios = [_grade(value) for value in (contest.mean, contest.worst, contest.best)]
     winners = [_most_often(found) for found in ([p.ours for p in contest.both], [p.engine for p in contest.both])]
-    worst = contest.both[0].scene if contest.both else DASH
-    return [contest.field, f"{contest.error:.0e}", count_text(contest), *ratios, *winners, worst]
+    worst = _index(contest.both[0].scene) if contest.both else DASH
+    return [contest.field, f"{contest.error:.0e}", count_text(contest), *ratios, worst, *winners]
+
+
+def by_engine(found: Iterable[Contest]) -> Table:
+    """Return mean, worst and best ratio to each engine at `MILESTONES`, a row for each field and error."""
+    chosen = [contest for contest in found if contest.engine != ANY and contest.error in MILESTONES]
+    engines = list(dict.fromkeys(contest.engine for contest in chosen))
+    places = dict.fromkeys((contest.field, contest.error) for contest in chosen)
+    cells = {(contest.field, contest.error, contest.engine): _spread(contest) for contest in chosen}
+    rows = [[field, f"{error:.0e}", *(cells.get((field, error, engine), DASH) for engine in engines)] for field, error in places]
+    return ["field", "error, rad", *engines], rows
+
+
+def _spread(contest: Contest) -> str:
+    """Return the mean with the worst and the best, and on how many bodies where that is not all."""
+    if not contest.both:
+        return f"{DASH} ({count_text(contest)})"
+    counts = "" if len(contest.both) == len(contest.pairs) else f"; {count_text(contest)}"
+    return f"{number(contest.mean, 3)} ({number(contest.worst, 3)} to {number(contest.best, 3)}{counts})"
+
+
+def chart_points(found: Iterable[Contest]) -> pd.DataFrame:
+    """Return field, error, mean, worst and best of the contests against the cheapest engine in which both sides get there."""
+    rows = [(c.field, c.error, c.mean, c.worst, c.best) for c in found if c.engine == ANY and c.both]
+    return pd.DataFrame(rows, columns=["field", "error", "mean", "worst", "best"])
 
 
 def _grade(ratio: float) -> Cell:
