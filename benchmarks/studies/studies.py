@@ -93,9 +93,7 @@ def list_hard_studies(
     )
 
 
-def random_study(
-    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False
-) -> Study:
+def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False) -> Study:
     """Return the study of that many random bodies in each field.
 
     Raises

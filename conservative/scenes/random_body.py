@@ -8,8 +8,8 @@ round-off on every machine, whatever else is drawn. u below is uniform in [0, 1)
 * Body axes turned from the principal ones by a rotation uniform on the group, so that the inertia is a full matrix. The start
   attitude is another such rotation.
 * Start rates of 0.3 to 3 rad/s, log-uniform, and the body's point, 0.1 to 1 m from the pivot, log-uniform, each in a direction
-  that is uniform but for having at least a tenth of its length along every principal axis. Gravity is along the world's -z; the direction
-  of its gradient, and of an anchor, is uniform in the world.
+  that is uniform but for having at least a tenth of its length along every principal axis. Gravity is along the world's -z;
+  the direction of its gradient, and of an anchor, is uniform in the world.
 * The anchor of a spring or an attraction is (1 + g) times as far from the pivot as the body's point, g = 0.2 to 3,
   log-uniform: they come no closer than g times the point's distance from the pivot, so that there is no collision, and an
   attraction can be up to 121 times as strong in a passage as at its weakest. The spring's rest length is u times the anchor's

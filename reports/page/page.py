@@ -49,7 +49,11 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         conserved=f"{CONSERVED:.0e}",
         small=f"{SMALL:.0e}",
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(_charts([*([random_figure] if random_figure else []), *chain.from_iterable(figures.values()), *engine_figures.values()])),
+        charts=_in_script(
+            _charts(
+                [*([random_figure] if random_figure else []), *chain.from_iterable(figures.values()), *engine_figures.values()]
+            )
+        ),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,

@@ -20,8 +20,6 @@ def chart(view: RandomView | None) -> Any:
 def figure(view: RandomView, picture: Any) -> PageFigure:
     """Return the figure of the page, made of the same picture."""
     title = "Random bodies: the cheapest engine's time over ours"
-    summary = (
-        f"{view.bodies} bodies in each field. Line: geometric mean; band: from the worst body to the best; above the dashed line "
-        "ours is faster."
-    )
+    band = "Line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster."
+    summary = f"{view.bodies} bodies in each field. {band}"
     return PageFigure(NAME, title, summary, tuple(vega_embed.embed(picture, (), 220)), ())

@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -22,18 +22,18 @@ from conservative.benchmarks.studies.studies import RANDOM
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from .cells import DASH, Cell, Grade, Table, number
+from .cells import DASH, Cell, Grade, Table, finite_or_none
 
 ANY = "cheapest engine"
 """Stands for all engines: on each body, the cheapest of them."""
 MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Errors, rad, of the short table."""
 TERMS = (
-    "Each body is drawn from a seed: an asymmetric body of condition 1.1 to 100 in a turned frame, no point and no rate on an "
-    "axis, in uniform gravity, on a spring, attracted to a point, or in gravity's gradient, with a field about as strong as the "
-    "motion. The ratio is the cheapest engine's time over ours, each in the cheapest of all forms and settings, for whole calls; "
-    "above 1 ours is faster. The error is the largest of twelve instants, and that of a setting the largest of it and all finer "
-    "ones, so that no lucky one counts. A body on which a side does not reach the error is counted and has no ratio."
+    "Each body is drawn from a seed: asymmetric, of condition 1.1 to 100, in a turned frame, no point and no rate on an axis, "
+    "in uniform gravity, on a spring, attracted to a point, or in gravity's gradient, with a field about as strong as the "
+    "motion. The ratio is the cheapest engine's time over ours, each in the cheapest of all forms and settings, for whole "
+    "calls; above 1 ours is faster. The error is the largest of twelve instants, and that of a setting the largest of it and "
+    "all finer ones, so that no lucky one counts. A body on which a side does not reach the error is counted and has no ratio."
 )
 """What the tables mean."""
 _FIELD, _INDEX = re.compile(r"field=(\w+)"), re.compile(r"index=(\d+)")
@@ -194,22 +194,43 @@ def _row(contest: Contest) -> list[str | Cell]:
     return [contest.field, f"{contest.error:.0e}", count_text(contest), *ratios, worst, *winners]
 
 
+def records(found: Iterable[Contest]) -> list[dict[str, Any]]:
+    """Return the contests as JSON has them; a ratio that nothing was found of is null."""
+    return [
+        {
+            "field": contest.field,
+            "engine": contest.engine,
+            "error": contest.error,
+            "bodies": len(contest.pairs),
+            "both": len(contest.both),
+            "only_ours": contest.only_ours,
+            "only_engine": contest.only_engine,
+            **{name: finite_or_none(getattr(contest, name)) for name in ("mean", "worst", "best")},
+            "worst_scene": contest.both[0].scene if contest.both else None,
+        }
+        for contest in found
+    ]
+
+
 def by_engine(found: Iterable[Contest]) -> Table:
     """Return mean, worst and best ratio to each engine at `MILESTONES`, a row for each field and error."""
     chosen = [contest for contest in found if contest.engine != ANY and contest.error in MILESTONES]
     engines = list(dict.fromkeys(contest.engine for contest in chosen))
     places = dict.fromkeys((contest.field, contest.error) for contest in chosen)
     cells = {(contest.field, contest.error, contest.engine): _spread(contest) for contest in chosen}
-    rows = [[field, f"{error:.0e}", *(cells.get((field, error, engine), DASH) for engine in engines)] for field, error in places]
+    rows = [
+        [field, f"{error:.0e}", *(cells.get((field, error, engine), DASH) for engine in engines)] for field, error in places
+    ]
     return ["field", "error, rad", *engines], rows
 
 
 def _spread(contest: Contest) -> str:
     """Return the mean with the worst and the best, and on how many bodies where that is not all."""
+    bodies = f"{len(contest.both)} of {len(contest.pairs)}"
     if not contest.both:
-        return f"{DASH} ({count_text(contest)})"
-    counts = "" if len(contest.both) == len(contest.pairs) else f"; {count_text(contest)}"
-    return f"{number(contest.mean, 3)} ({number(contest.worst, 3)} to {number(contest.best, 3)}{counts})"
+        return f"{DASH} ({bodies})"
+    counts = "" if len(contest.both) == len(contest.pairs) else f"; {bodies}"
+    return f"{ratio_text(contest.mean)} ({ratio_text(contest.worst)} to {ratio_text(contest.best)}{counts})"
 
 
 def chart_points(found: Iterable[Contest]) -> pd.DataFrame:
@@ -222,7 +243,12 @@ def _grade(ratio: float) -> Cell:
     """Return a ratio with a symbol that is not its colour alone."""
     if math.isnan(ratio):
         return Cell(DASH, Grade.NONE)
-    return Cell(f"{'✓' if ratio >= 1 else '✗'} {number(ratio, 3)}", Grade.GOOD if ratio >= 1 else Grade.BAD)
+    return Cell(f"{'✓' if ratio >= 1 else '✗'} {ratio_text(ratio)}", Grade.GOOD if ratio >= 1 else Grade.BAD)
+
+
+def ratio_text(ratio: float) -> str:
+    """Return a ratio to two decimals, or to three digits where it is large."""
+    return f"{ratio:.2f}" if ratio < 10 else f"{float(f'{ratio:.3g}'):,g}"
 
 
 def count_text(contest: Contest) -> str:
@@ -257,10 +283,10 @@ def _sentences(members: list[Contest]) -> Iterator[str]:
         yield "on no body do ours and an engine reach the same error."
         return
     low, high = min(compared, key=lambda c: c.mean), max(compared, key=lambda c: c.mean)
-    worst = min(compared, key=lambda c: c.worst)
-    yield f"the cheapest engine takes {low.mean:.2f} (at {low.error:.0e} rad) to {high.mean:.2f} (at {high.error:.0e} rad) times"
-    yield f"as long as ours, in the geometric mean over {len(members[0].pairs)} bodies; on the worst body {worst.worst:.2f} times"
-    yield f"(at {worst.error:.0e} rad, {worst.both[0].scene})."
+    worst, total = min(compared, key=lambda c: c.worst), sum(len(contest.pairs) for contest in members)
+    yield f"over {len(members[0].pairs)} bodies the cheapest engine takes, in the geometric mean, {low.mean:.2f}"
+    yield f"(at {low.error:.0e} rad) to {high.mean:.2f} (at {high.error:.0e} rad) times as long as ours; on the worst body"
+    yield f"{worst.worst:.2f} times (at {worst.error:.0e} rad, {worst.both[0].scene})."
     missing = sum(contest.only_engine for contest in members)
     if missing:
-        yield f"Only an engine reaches the error in {missing} of {sum(len(c.pairs) for c in members)} cases."
+        yield f"Only an engine reaches the error in {missing} of {total} cases."
