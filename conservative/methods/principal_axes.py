@@ -7,6 +7,7 @@ definitions.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,3 +82,14 @@ def quadruple(R: Array) -> Quadruple:
     """Return the quaternion of a rotation (3, 3) as the tuple of floats that kernels take."""
     w, x, y, z = to_quaternion(R).tolist()
     return w, x, y, z
+
+
+def field_axis(scene: Scene) -> Triple | None:
+    """Return the axis about which the field is symmetric, three floats in world axes, or None."""
+    axis = None if scene.potential is None else scene.potential.axis_W
+    return None if axis is None else triple(axis / np.linalg.norm(axis))
+
+
+def invariant_scales(scene: Scene) -> tuple[float, float]:
+    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
+    return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from ..attitude import Triple, triple
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
@@ -16,7 +12,7 @@ from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
-from .principal_axes import PrincipalStart, principal_start
+from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
@@ -73,14 +69,3 @@ def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
         start.J_inverse, start.field, field_axis(scene), invariant_scales(scene), start.q, start.L
     )
     return method.label, start, model
-
-
-def field_axis(scene: Scene) -> Triple | None:
-    """Return the axis about which the field is symmetric, three floats in world axes, or None."""
-    axis = None if scene.potential is None else scene.potential.axis_W
-    return None if axis is None else triple(axis / np.linalg.norm(axis))
-
-
-def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
-    return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
