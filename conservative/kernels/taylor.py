@@ -112,9 +112,10 @@ def significant(x, scale):
 
 
 @small
-def upright(g, a):
-    """The vector a, nearly of length one and at right angles to g, as near to both as a single correction gets."""
-    return subtract(scale(1.5 - 0.5 * dot(a, a), a), scale(dot(a, g), g))
+def straighten(g, a):
+    """Return 1/|g|, the vector a of length one and at right angles to g, both to first order, and by how much they were not."""
+    n, m, c = 0.5 - 0.5 * dot(g, g), 0.5 - 0.5 * dot(a, a), dot(a, g)
+    return 1.0 + n, subtract(scale(1.0 + m, a), scale(c, g)), abs(n) + abs(m) + abs(c)
 
 
 @small
@@ -148,25 +149,25 @@ def correct_in_field(field, constants, body, kept, scales, g, a, w):
     long to first order, so that no product waits for another. What is left is of the size of the defect's square.
     """
     J, J_inverse, loose = body
-    L, n = times(J, w), 1.5 - 0.5 * dot(g, g)
+    L, (n, upright, off) = times(J, w), straighten(g, a)
     V, slope = axial_energy(field, constants, g)
     e = kept[0] - (0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g))
     m = kept[1] - n * dot(L, g)
     wanted = significant(e, scales[0]), significant(m, scales[1])
     dL, turn = shortest_move(loose, scales, w, L, cross(g, slope), wanted[0], wanted[1], g)
-    g, a = add(scale(n, g), cross(g, turn)), add(upright(g, a), cross(a, turn))
-    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3]
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3] + off
 
 
 @small
 def correct_free(field, constants, body, kept, scales, g, a, w):
     """The same of a free body: the momentum is along g, so that w follows from g, and energy is brought back by turning g."""
-    n, J_inverse = 1.5 - 0.5 * dot(g, g), body[1]
+    J_inverse, (n, upright, off) = body[1], straighten(g, a)
     L = scale(n * field.momentum, g)
     e, slope = kept[0] - 0.5 * dot(L, times(J_inverse, L)), cross(times(J_inverse, L), L)
     turn = scale(significant(e, scales[0]) / (dot(slope, slope) + FLAT * (scales[0] * scales[0]) + TINY), slope)
-    g, a = add(scale(n, g), cross(g, turn)), add(upright(g, a), cross(a, turn))
-    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + abs(1.0 - n)
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off
 
 
 def correct(field, constants, body, kept, scales, g, a, w):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -115,7 +115,9 @@ def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:
         return principal_start(scene), (1.0, 1.0, 1.0)
     J = np.roll(scene.body.moments, 2 - int(np.argmax(np.abs(axis_B @ scene.body.R_BP))))
     J1, J3 = float(J[0] + J[1]) / 2, float(J[2])
-    return start_along(scene, axes_about(axis_B), np.array((J1, J1, J3))), (1.0, 1.0, 0.0)
+    start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
+    along = start.field and start.field._replace(x=0.0, y=0.0)  # a uniform one, along the axis but for round-off
+    return replace(start, field=along), (1.0, 1.0, 0.0)
 
 
 def third_axis(scene: Scene) -> Array:
