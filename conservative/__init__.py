@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from .potentials.point_to_point import PointAttraction as PointAttraction
     from .potentials.potential import Potential as Potential
     from .potentials.python_function import FunctionPotential as FunctionPotential
+    from .potentials.turning import Orbit as Orbit
+    from .potentials.turning import Turning as Turning
     from .potentials.uniform_gravity import UniformGravity as UniformGravity
     from .scene import Scene as Scene
     from .trajectory import Bounds as Bounds
@@ -81,6 +83,7 @@ _PLACES = {
     "NotConserved": "errors",
     "NotConverged": "errors",
     "NotWritten": "errors",
+    "Orbit": "potentials.turning",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
     "PointAttraction": "potentials.point_to_point",
@@ -93,6 +96,7 @@ _PLACES = {
     "Scene": "scene",
     "Substepped": "methods.substepped",
     "Trajectory": "trajectory",
+    "Turning": "potentials.turning",
     "UniformGravity": "potentials.uniform_gravity",
     "Unsupported": "errors",
     "WrongBranch": "errors",
@@ -123,6 +127,7 @@ __all__ = [
     "NotConserved",
     "NotConverged",
     "NotWritten",
+    "Orbit",
     "Outcome",
     "OutcomeKind",
     "PointAttraction",
@@ -135,6 +140,7 @@ __all__ = [
     "Scene",
     "Substepped",
     "Trajectory",
+    "Turning",
     "UniformGravity",
     "Unsupported",
     "WrongBranch",

@@ -11,11 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import build_unchecked, finite_array, positive_number, power_of_two, read_only
-from ..errors import BadInput
-
-_UNIT = 4 * np.finfo(float).eps
-"""A direction whose length is 1 to this stays as it is, so that dividing by the length once more changes nothing."""
+from ..check import build_unchecked, positive_number, power_of_two
+from .direction import unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +46,10 @@ class GravityGradient(_Fields):
     """
 
     def __init__(self, rate: float, inertia: ArrayLike, direction_W: ArrayLike = (0, 0, 1)) -> None:
-        allowed = "three finite numbers (3,), not all 0"
-        direction = finite_array("direction_W", direction_W, ((3,),), allowed)
-        size = np.linalg.norm(direction)
-        if size == 0:
-            raise BadInput("direction_W", direction.tolist(), allowed)
-        if abs(size - 1) > _UNIT:
-            direction = read_only(direction / size)
         super().__init__(
             positive_number("rate", rate, "a finite rate above 0, rad/s"),
             RigidBody(inertia).inertia,
-            direction,
+            unit_vector("direction_W", direction_W),
         )
 
     @property
