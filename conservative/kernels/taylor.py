@@ -178,8 +178,8 @@ def correct(field, constants, body, kept, scales, g, a, w):
 
 overload(correct, jit_options=SMALL)(
     lambda field, constants, body, kept, scales, g, a, w: (
-        correct_free if getattr(field, "instance_class", None) is Free else correct_in_field
-    ).py_func
+        (correct_free if getattr(field, "instance_class", None) is Free else correct_in_field).py_func
+    )
 )
 
 
