@@ -94,7 +94,7 @@ def _start_series_free(field, constants, g):
 
 @trace
 def begin(model):
-    """Return the field's constants, (J2 - J3)/J1 and its kin, rates, energy and momentum about the axis, scales and their inverses."""
+    """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)

@@ -70,7 +70,7 @@ class Value:
         return self._call("llvm.sqrt")
 
     def where_above(self, limit, x):
-        """This value where x is above the limit, else 0; not a number in x gives 0."""
+        """The value where x is above the limit, else 0; not a number in x gives 0."""
         above = self.builder.fcmp_ordered(">", x.ir, limit.ir if isinstance(limit, Value) else x.ir.type(limit))
         return self.make(self.builder.select(above, self.ir, self.ir.type(0.0)))
 
