@@ -1,4 +1,4 @@
-"""The recurrences of a series step, order by order, written once for both ways of running kernels (`series_llvm`, `series_numpy`).
+"""The recurrences of a series step, order by order, for both ways of running kernels (`series_llvm`, `series_numpy`).
 
 With g and a two rows of the attitude's matrix, w the rates, and c' the coefficients of powers of t/h, so that a step is their
 sum, for n = 0, 1, ...

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, axes_about
+from ..attitude import Array, axes_about, triple
 from ..check import describe
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
@@ -88,24 +88,18 @@ def has_recurrence(scene: Scene) -> bool:
     """Return whether a scene has no field or one with a recurrence."""
     if scene.potential is None:
         return True
-    return type(scene.potential.kernel_field(scene.body.R_BP)) in kernels("axial").axial_orders.registry
+    return type(scene.potential.kernel_field(scene.body.R_BP)) in kernels("axial").start_series.registry
 
 
 def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start, loose = start_about_symmetry(scene)
-    kernel = kernels("taylor")
-    model = kernel.Model(
-        start.J,
-        start.J_inverse,
-        start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L)),
-        loose,
-        invariant_scales(scene),
-        quadruple(axes_about(third_axis(scene))),
-        start.q,
-        start.L,
-    )
-    return method.label, start, model
+    kernel, R_WD = kernels("taylor"), axes_about(third_axis(scene))
+    R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
+    field = start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L))
+    rows = triple(R_DP[2]), triple(R_DP[0])
+    body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
+    return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L)
 
 
 def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:
