@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from . import SMALL
 from .fields import at_time, body_torque, energy, implements
 from .function_field import BODY_TORQUE, STATE, evaluate, fill
