@@ -1,6 +1,6 @@
 """The gradient of a far centre's gravity: V = 3/2 rate^2 u' I u with u = R' e, quadratic in the base vectors.
 
-V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque is 3 rate^2 e x (Rbar I ubar).
+V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque 3 rate^2 e x (Rbar I ubar).
 """
 
 from __future__ import annotations
