@@ -36,10 +36,18 @@ class Cost:
         Cost of a step besides its corrections.
     correction
         Cost of a correction of the nonlinear solver.
+    corrections
+        Corrections that a step takes at the least: what is too dear even so is not tried.
     """
 
     step: float
     correction: float = 0.0
+    corrections: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """Least cost of a step with its corrections, ns."""
+        return self.step + self.correction * self.corrections
 
 
 @dataclass(frozen=True)
