@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
@@ -19,11 +20,14 @@ class Candidacy:
         Of the families of a group only the first that supports the scene is probed; "" for a family outside all groups.
     exact
         Whether there is no truncation error: the first such family that supports the scene is taken, and no other is probed.
+    longest
+        Longest step that is probed, rad turned at most: at longer ones it does not win, and takes its time.
     """
 
     rank: int = 10
     group: str = ""
     exact: bool = False
+    longest: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain
 
 from .. import registry
@@ -52,10 +51,14 @@ Attempts = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Goal:
-    """What candidates are tried for: an error, rad, over a duration, s, and the fastest turning there can be, rad/s."""
+    """What candidates are tried for: an error, rad, over a duration, s, which is the first part of a run of t_end, s.
+
+    `rate` is the fastest turning that the energy allows, rad/s.
+    """
 
     error: float
     duration: float
+    t_end: float
     rate: float
 
     @property
@@ -142,27 +145,31 @@ class Candidate:
 
 def find_cheapest(trials: Trials, error: float, t_end: float) -> tuple[Method, float]:
     """Return the candidate with the least work for an error, rad, up to t_end, s, and the step, s, that it needs."""
-    found = [begin(method, goal_for(trials.scene, error, t_end)) for method in candidates(trials.scene)]
-    spent = 0.0
+    scene, spent = trials.scene, 0.0
+    goal = goal_for(scene, error, t_end)
+    found = [begin(method, scene, goal) for method in candidates(scene)]
     while True:
-        best = min(range(len(found)), key=partial(_expected, found, prior_scale(found)))
-        chosen = found[best]
-        if chosen.settled or chosen.hopeless or (len(found) == 1 and chosen.method.order is None):
-            return chosen.method, chosen.dt
-        found[best] = chosen.advance(trials)
-        spent += 1.5 * found[best].work
+        i = most_promising(found)
+        if found[i].settled or found[i].hopeless or (len(found) == 1 and found[i].method.order is None):
+            return found[i].method, found[i].dt
+        found[i] = found[i].advance(trials)
+        spent += 1.5 * found[i].work
         done = [each for each in found if each.reached]
         if done and spent > MOST_RUNS * min(each.work for each in done):
             cheapest = min(done, key=lambda each: each.work)
             return cheapest.method, cheapest.dt
 
 
-def _expected(found: Sequence[Candidate], scale: float, i: int) -> float:
-    return found[i].expected_work(scale)
+def most_promising(found: Sequence[Candidate]) -> int:
+    """Return which candidate may reach the goal with the least work; at the very first that of the first rank."""
+    if not any(each.attempts for each in found):
+        return 0
+    scale = prior_scale(found)
+    return min(range(len(found)), key=lambda i: found[i].expected_work(scale))
 
 
 def prior_scale(found: Sequence[Candidate]) -> float:
-    """Return what to multiply guesses by that are made before a trial run, so that they are no more than needed, most likely.
+    """Return what to multiply guesses by that are made before a trial run, so that they are no more than needed: no unit.
 
     The fastest turning that the energy allows may be far above what there is: the candidates that have got there tell.
     """
@@ -174,12 +181,18 @@ def goal_for(scene: Scene, error: float, t_end: float) -> Goal:
     """Return what candidates are tried for where an error, rad, is asked for up to t_end, s."""
     rate = bound_rate(scene)
     duration = min(t_end, PROBE_RADIANS / rate)
-    return Goal(error * min(1.0, 4 * duration / t_end), duration, rate)
+    return Goal(error * min(1.0, 4 * duration / t_end), duration, t_end, rate)
 
 
-def begin(method: Method, goal: Goal) -> Candidate:
-    """Return a candidate before its first trial run, which is of two steps where its accuracy depends on them."""
-    return Candidate(method, goal, goal.duration / 2)
+def begin(method: Method, scene: Scene, goal: Goal) -> Candidate:
+    """Return a candidate before its first trial run, of two steps, or of steps as long as are worth a trial.
+
+    Where accuracy does not depend on the step, it is half of the longest, and at most a 16th of the duration.
+    """
+    if method.order is None:
+        return Candidate(method, goal, min(method.longest_step(scene) / 2, goal.t_end / 16))
+    longest = math.inf if method.candidacy is None else method.candidacy.longest
+    return Candidate(method, goal, min(goal.duration / 2, longest / goal.rate))
 
 
 def candidates(scene: Scene) -> tuple[Method, ...]:

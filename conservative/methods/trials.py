@@ -158,5 +158,5 @@ def rounding_error(trajectory: Trajectory) -> float:
 
 
 def count_work(method: Method, trajectory: Trajectory) -> float:
-    """Return a count of work, ns: corrections and steps, weighted by what they cost beside those of other methods."""
+    """Return a count of work: corrections and steps, weighted by what they cost, ns, beside those of other methods."""
     return method.cost.correction * (trajectory.counters.iterations or 0) + method.cost.step * trajectory.counters.steps
