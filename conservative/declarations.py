@@ -50,7 +50,7 @@ class Cost:
 
     @property
     def least(self) -> float:
-        """Least cost of a step with its corrections, ns."""
+        """Least cost of a step with the number of corrections that it takes at least, ns."""
         return self.step + self.correction * self.corrections
 
 

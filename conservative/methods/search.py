@@ -169,7 +169,7 @@ def most_promising(found: Sequence[Candidate]) -> int:
 
 
 def prior_scale(found: Sequence[Candidate]) -> float:
-    """Return what to multiply guesses by that are made before a trial run, so that they are no more than needed: no unit.
+    """Return the factor of guesses that are made before a trial run, with which they are no more than is needed.
 
     The fastest turning that the energy allows may be far above what there is: the candidates that have got there tell.
     """

@@ -158,5 +158,5 @@ def rounding_error(trajectory: Trajectory) -> float:
 
 
 def count_work(method: Method, trajectory: Trajectory) -> float:
-    """Return a count of work: corrections and steps, weighted by what they cost, ns, beside those of other methods."""
+    """Return the work of a run, in ns: the number of steps and of corrections, each times its cost beside those of others."""
     return method.cost.correction * (trajectory.counters.iterations or 0) + method.cost.step * trajectory.counters.steps
