@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from enum import StrEnum
+from functools import lru_cache, wraps
 from typing import Any
+
+
+class Role(StrEnum):
+    """Which side a method is on."""
+
+    OURS = "ours"
+    """Compared with the engines in verdicts; its time is gated."""
+    ENGINE = "engine"
+    """Somebody else's code."""
+    TRUTH = "truth"
+    """Measured against, never a competitor."""
 
 
 @dataclass(frozen=True)
@@ -125,3 +138,15 @@ def settings_text(value: Any) -> str:
     """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
     settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
     return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)
+
+
+def refuse_time(unsupported: Callable[[Any, Any], str | None]) -> Callable[[Any, Any], str | None]:
+    """Return a `Method.unsupported` that refuses potentials which depend on the time, unless the method takes them."""
+
+    @wraps(unsupported)
+    def reason(method: Any, scene: Any) -> str | None:
+        if getattr(scene.potential, "time_dependent", False) and not method.time_dependent:
+            return "it is for fields that do not depend on the time"
+        return unsupported(method, scene)
+
+    return reason

@@ -11,13 +11,16 @@ like that of gravity, with A for the vertical.
 from __future__ import annotations
 
 import math
-from functools import singledispatch
+from functools import partial, singledispatch
 from typing import NamedTuple
 
 import numpy as np
 
-from . import kernel
-from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body
+from . import SMALL, kernel, small
+from .axial import axial_constants, axial_energy, axial_orders, make_orders
+from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body, turned_moment
+from .series import TURNED, TWICE, History, outwards
+from .simd import join, lane
 from .vector import cross, dot, scale, subtract
 
 Triple = tuple[float, float, float]
@@ -123,3 +126,108 @@ def _finite_derivative_point(field, q0, q1):
         for k in range(3):
             dV_star[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] = b[j] * b[k] * by_point
     return V_star, dV_star
+
+
+class PointSeries:
+    """J^-1 T of T = (base + y) g x m, where y is a multiple of s^alpha and s, the squared distance, is linear in g.
+
+    S holds S2, S3, S1, S2 of s/s[0] = 1 + S.(g - g[0]). From s y' = alpha s' y follows, with s[k] in units of s[0],
+
+        y[n] = (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n
+    """
+
+    def __init__(self, emit, M1, M2, S, y0, alpha, base):
+        self._emit, self._M1, self._M2, self._S, self._y0, self._alpha, self._base = emit, M1, M2, S, y0, alpha, base
+        self._s, self._ks, self._y, self._Q = (History(emit) for _ in range(4))
+
+    def accelerate(self, c, n):
+        """Coefficient n of J^-1 T."""
+        emit, y, Q = self._emit, self._y, self._Q
+        Q.push(emit.subtract(emit.add(None, self._M2, c[n, 0]), self._M1, c[n, 1]))
+        self._push_distance(c, n)
+        y.push(self._next_power(n) if n else self._y0)
+        total = Q[n] if self._base else None
+        for i in outwards(n):
+            total = emit.add(total, y[i], Q[n - i])
+        return total
+
+    def _push_distance(self, c, n):
+        emit = self._emit
+        t = emit.times(self._S, c[n, 0])
+        s = emit.plus(emit.plus(t, emit.shuffle(t, TURNED)), emit.shuffle(t, TWICE))
+        self._s.push(s)
+        self._ks.push(emit.times(emit.constant(float(n)), s))
+
+    def _next_power(self, n):
+        emit, plain, weighted = self._emit, None, None
+        for k in outwards(n):
+            if k:
+                plain = emit.add(plain, self._s[k], self._y[n - k])
+                weighted = emit.add(weighted, self._ks[k], self._y[n - k])
+        return emit.minus(emit.times(emit.constant((self._alpha + 1) / n), weighted), plain)
+
+
+_spring_orders = make_orders(partial(PointSeries, alpha=-0.5, base=1))
+_attraction_orders = make_orders(partial(PointSeries, alpha=-1.5, base=0))
+
+
+@implements(axial_constants, Spring, **SMALL)
+def _axial_constants_spring(field, J_inverse):
+    A = math.sqrt(_square(field.A))
+    return A, turned_moment(J_inverse, scale(-field.stiffness * A, field.b))
+
+
+@implements(axial_constants, Attraction, **SMALL)
+def _axial_constants_attraction(field, J_inverse):
+    A = math.sqrt(_square(field.A))
+    return A, turned_moment(J_inverse, scale(-field.strength * A, field.b))
+
+
+@small
+def _over_distance(field, A, g):
+    """A g - b, m, and one over its length."""
+    x = subtract(scale(A, g), field.b)
+    return x, 1.0 / math.sqrt(dot(x, x))
+
+
+@small
+def _over_spring(field, A, g):
+    """The same, but 0 where nothing depends on it, as the distance may then be 0."""
+    x = subtract(scale(A, g), field.b)
+    return x, 0.0 if field.rest == 0.0 else 1.0 / math.sqrt(dot(x, x))
+
+
+@implements(axial_energy, Spring, **SMALL)
+def _axial_energy_spring(field, constants, g):
+    x, over = _over_spring(field, constants[0], g)
+    slack = 1.0 - field.rest * over
+    stiffness, square = field.stiffness * slack, dot(x, x)
+    return 0.5 * stiffness * slack * square, scale(stiffness * constants[0], x)
+
+
+@implements(axial_energy, Attraction, **SMALL)
+def _axial_energy_attraction(field, constants, g):
+    x, over = _over_distance(field, constants[0], g)
+    V = -field.strength * over
+    return V, scale(-V * over * over * constants[0], x)
+
+
+@small
+def _slopes(field, A, over):
+    """S of `PointSeries`."""
+    s, b = -2.0 * A * over * over, field.b
+    return join(s * b[1], s * b[2], s * b[0], s * b[1])
+
+
+@implements(axial_orders, Spring, **SMALL)
+def _axial_orders_spring(field, constants, order, h, g, a, w, K):
+    A, (M1, M2) = constants
+    over = _over_spring(field, A, (lane(g, 0), lane(g, 1), lane(g, 2)))[1]
+    return _spring_orders(order, h, g, a, w, K, (M1, M2, _slopes(field, A, over), -field.rest * over))
+
+
+@implements(axial_orders, Attraction, **SMALL)
+def _axial_orders_attraction(field, constants, order, h, g, a, w, K):
+    A, (M1, M2) = constants
+    over = _over_distance(field, A, (lane(g, 0), lane(g, 1), lane(g, 2)))[1]
+    return _attraction_orders(order, h, g, a, w, K, (M1, M2, _slopes(field, A, over), over * over * over))

@@ -6,7 +6,7 @@ the constant moment m, A the anchor's distance from the fixed point, and d the d
     uniform gravity     J w' = J w x w + g x m                          m = weight com
     spring              J w' = J w x w + (1 - rest / d) g x m           m = -stiffness A b      d^2 = b.b + A^2 - 2 A b.g
     attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
-    gravity gradient    J w' = J w x w + g x (rate^2 I g)
+    gravity gradient    J w' = J w x w + g x (3 rate^2 I g)
 
 The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
 three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
@@ -131,7 +131,7 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
 
 
 def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
-    inertia = potential.rate**2 * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
+    inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]

@@ -45,7 +45,7 @@ def attraction(q: Expressions, parameters: Expressions) -> list[Expression]:
 
 
 def gradient(q: Expressions, parameters: Expressions) -> list[Expression]:
-    """Return u x (rate^2 J u) for V = rate^2/2 u'J u, parameters rate^2 (1), J (9), direction (3)."""
+    """Return u x (3 rate^2 J u) for V = 3/2 rate^2 u'J u, parameters 3 rate^2 (1), J (9), direction (3)."""
     u = to_body(q, parameters[10:])
     return [parameters[0] * x for x in cross(u, product(parameters[1:10], u))]
 
@@ -67,6 +67,6 @@ FIELDS: dict[type[Potential], Field] = {
     UniformGravity: Field(lambda p: p.moment_B.tolist(), uniform),
     LinearSpring: Field(lambda p: [*_points(p), p.stiffness, p.rest_length], spring),
     PointAttraction: Field(lambda p: [*_points(p), p.strength], attraction),
-    GravityGradient: Field(lambda p: [p.rate**2, *p.inertia.ravel().tolist(), *p.direction_W.tolist()], gradient),
+    GravityGradient: Field(lambda p: [p.factor, *p.inertia.ravel().tolist(), *p.direction_W.tolist()], gradient),
 }
 """Potentials that multi-precision truth knows."""
