@@ -40,7 +40,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
 from .case import Case, Failure, Success
-from .selection import at_tolerance, series, tolerance_setting
+from .selection import Missing, at_tolerance, series, tolerance_setting
 from .speed import keep_end
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -90,16 +90,19 @@ def bodies(number: int, seed: int) -> tuple[Scene, ...]:
 
 
 def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings that a family's name stands for: of ours those that the automatic choice probes, of engines all."""
-    if method.role != Role.OURS:
-        return method.variants()
+    """Return the settings that a family's name stands for, of order `ORDER` at least.
+
+    Of ours they are those that the automatic choice probes, of engines all.
+    """
     approximate = method.candidacy is not None and not method.candidacy.exact
-    return method.candidate_settings() if approximate else ()
+    ours = method.candidate_settings() if approximate else ()
+    found = ours if method.role == Role.OURS else method.variants()
+    return tuple(each for each in found if (each.order or ORDER) >= ORDER)
 
 
 def select(methods: Iterable[Method]) -> tuple[Method, ...]:
     """Return those of some methods that the study takes where nobody has named them; see `settings`."""
-    return tuple(method for method in methods if method.role == Role.ENGINE or method in settings(method))
+    return tuple(method for method in methods if isinstance(method, Missing) or method in settings(method))
 
 
 def precise(scene: Scene, grid: Grid) -> Truth:
@@ -129,7 +132,7 @@ Line = list[Point]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    methods = list({series(method): method for method in study.competitors if (method.order or ORDER) >= ORDER}.values())
+    methods = list({series(method): method for method in study.competitors}.values())
     pieces = len(methods) + 2
     for i, scene in enumerate(study.scenes):
         progress(i * pieces, len(study.scenes) * pieces, f"{scene.name}: truth")
