@@ -183,8 +183,9 @@ def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Gener
 
 
 def estimate(done: Success) -> float:
-    """Return about what a run costs, s: the least of a few calls, of one call where that is slow."""
-    return done.cost.first_call if done.cost.first_call > SLOW else min(wall_time(done.run) for _ in range(3))
+    """Return about what a run costs, s: the least of a few calls, of two where it is slow; the very first may have compiled."""
+    spent = min(wall_time(done.run), wall_time(done.run))
+    return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
 
 
 def worth_timing(lines: Iterable[Line]) -> list[Point]:
