@@ -70,7 +70,7 @@ MARGIN = 3.0
 BITS = 96
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run from which on a line gets one setting of so many."""
-ROUNDS, QUICK_ROUNDS, BUDGET = 25, 7, 0.05
+ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.03
 """Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get three."""
 TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
