@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from .methods.projected import Projected as Projected
     from .methods.reduced import Reduced as Reduced
     from .methods.substepped import Substepped as Substepped
+    from .methods.taylor import Taylor as Taylor
     from .outcome import Outcome as Outcome
     from .outcome import OutcomeKind as OutcomeKind
     from .potentials.gravity_gradient import GravityGradient as GravityGradient
@@ -95,6 +96,7 @@ _PLACES = {
     "Role": "method",
     "Scene": "scene",
     "Substepped": "methods.substepped",
+    "Taylor": "methods.taylor",
     "Trajectory": "trajectory",
     "Turning": "potentials.turning",
     "UniformGravity": "potentials.uniform_gravity",
@@ -139,6 +141,7 @@ __all__ = [
     "Role",
     "Scene",
     "Substepped",
+    "Taylor",
     "Trajectory",
     "Turning",
     "UniformGravity",

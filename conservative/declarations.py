@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -32,11 +33,14 @@ class Candidacy:
         Of the families of a group only the first that supports the scene is probed; "" for a family outside all groups.
     exact
         Whether there is no truncation error: the first such family that supports the scene is taken, and no other is probed.
+    longest
+        Longest step that is probed, rad turned at most: at longer ones it does not win, and takes its time.
     """
 
     rank: int = 10
     group: str = ""
     exact: bool = False
+    longest: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -49,10 +53,18 @@ class Cost:
         Cost of a step besides its corrections.
     correction
         Cost of a correction of the nonlinear solver.
+    corrections
+        Corrections that a step takes at the least: what is too dear even so is not tried.
     """
 
     step: float
     correction: float = 0.0
+    corrections: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """Least cost of a step with the number of corrections that it takes at least, ns."""
+        return self.step + self.correction * self.corrections
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,15 @@ def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) 
         return _cut_at_drift(_cut_to_finite(found), kept, bounds)
 
 
+def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
+    """Return samples at any times of a run that may be called ok if they may be, too, else those that are good, with the failure.
+
+    `kept` are the names of the invariants that are asked for.
+    """
+    with np.errstate(all="ignore"):
+        return _cut_at_drift(_cut_to_finite(found), kept, bounds)
+
+
 def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
     """Return what is wrong with the form of a result, None if nothing is."""
     if not isinstance(found, Trajectory):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,15 +10,14 @@ import numpy as np
 from ..attitude import Triple, triple
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
-from ..invariants import JACOBI_INTEGRAL, jacobi_scale
+from ..invariants import JACOBI_INTEGRAL
 from ..method import Grid, Method, Role, Run
-from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
-from .principal_axes import PrincipalStart, principal_start
+from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
@@ -43,7 +41,7 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(2)
+    candidacy: ClassVar[Candidacy] = Candidacy(2, "explicit")
     colour: ClassVar[str] = "teal"
     kernel: ClassVar[str] = "projected"
     time_dependent: ClassVar[bool] = True
@@ -81,25 +79,7 @@ def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
     return method.label, start, model
 
 
-def field_axis(scene: Scene) -> Triple | None:
-    """Return the axis about which the field is symmetric, three floats in world axes, or None."""
-    axis = None if scene.potential is None else scene.potential.axis_W
-    return None if axis is None else triple(axis / np.linalg.norm(axis))
-
-
 def field_turn(scene: Scene) -> Triple | None:
     """Return the angular velocity of the axes that the field is fixed in, three floats in rad/s, world axes, or None."""
     potential = scene.potential
     return triple(potential.orbit.rate * potential.orbit.normal_W) if isinstance(potential, Turning) else None
-
-
-def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes.
-
-    The first is inf where neither energy nor Jacobi integral is conserved.
-    """
-    energy, potential = scene.energy_scale, scene.potential
-    momentum = math.sqrt(2 * energy * float(scene.body.moments.max()))
-    if isinstance(potential, Turning):
-        return jacobi_scale(scene.body, potential, energy), momentum
-    return math.inf if depends_on_time(potential) else energy, momentum
