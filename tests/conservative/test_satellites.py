@@ -83,7 +83,9 @@ def test_small_disturbances_do_what_the_linearised_equations_say(case):
     if stable:
         assert away.max() < 1e-8
     else:
-        assert np.log(later / late) / window == pytest.approx(growth, rel=0.1)  # measured up to 5 %: what oscillates has no smooth envelope
+        assert np.log(later / late) / window == pytest.approx(
+            growth, rel=0.1
+        )  # measured up to 5 %: what oscillates has no smooth envelope
 
 
 def test_the_registered_satellites_are_what_their_names_say():

@@ -34,7 +34,9 @@ def test_every_formulation_gives_the_same_motion(field):
         (SciPy(rtol=2.3e-14), 1e-12),
         (cv.Projected(), 1e-13),
     ):
-        found = cv.integrate(scene, 0.1 if method.order is None else 0.01, method, sample_every=1 if method.order is None else 10)
+        found = cv.integrate(
+            scene, 0.1 if method.order is None else 0.01, method, sample_every=1 if method.order is None else 10
+        )
         assert angle_between(truth.R_WB, found.R_WB).max() < allowed, method.name
         assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 10 * allowed, method.name
 
