@@ -277,7 +277,7 @@ def values(J_inverse, c, L, g):
 
 @small
 def remove_round_off(J_inverse, c, kept, size, L, L_carry, g, g_carry):
-    """Bring energy and momentum back to what is `kept`, and the length of gamma to 1, where they are off by more than ROUND_OFF."""
+    """Bring energy and momentum back to `kept` and the length of gamma to 1, where they are off by more than ROUND_OFF."""
     now = values(J_inverse, c, L, g)
     e, m, longer = kept[0] - now[0], kept[1] - now[1], 0.5 - 0.5 * dot(g, g)
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
