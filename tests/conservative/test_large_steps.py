@@ -102,7 +102,7 @@ def test_gauss_says_that_a_step_is_too_long() -> None:
     assert type(run.failure) is cv.NotConverged
     assert str(run.outcome).startswith("not converged in step 1 at t = 0 s (the step is too long for the iteration; residual ")
     assert run.counters.iterations < 10  # measured 5
-    assert cv.Gauss(2).run(scene, 0.5, 12.0).ok
+    assert cv.Gauss(2).run(scene, 0.1, 12.0).ok
 
 
 @pytest.mark.parametrize("turn", [0.5, 2.0, 4.0, 8.0])
