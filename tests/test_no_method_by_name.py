@@ -13,7 +13,7 @@ from .environments import ROOT
 from .test_house import sources
 
 ALLOWED = {
-    "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped", "the public names"),
+    "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped taylor", "the public names"),
     "conservative/deferred_imports.py": ("reduced", "the default of every option that names a method"),
     "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
     "conservative/integration.py": ("reduced", "the default of `integrate`"),

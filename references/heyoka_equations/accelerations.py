@@ -6,7 +6,7 @@ the constant moment m, A the anchor's distance from the fixed point, and d the d
     uniform gravity     J w' = J w x w + g x m                          m = weight com
     spring              J w' = J w x w + (1 - rest / d) g x m           m = -stiffness A b      d^2 = b.b + A^2 - 2 A b.g
     attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
-    gravity gradient    J w' = J w x w + g x (rate^2 I g)
+    gravity gradient    J w' = J w x w + g x (3 rate^2 I g)
 
 The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
 three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
@@ -17,7 +17,7 @@ potentials' own torques.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from conservative.attitude import Array, axes_about, hat
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
+from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
@@ -52,21 +53,38 @@ class FieldInAxes:
         Rotation (3, 3) whose third column is the field's axis, world axes.
     acceleration, parameters
         Its expressions, and the values of their parameters.
+    turn_D
+        Rates (3,) at which the axes D turn, with which the field is fixed, rad/s, in D; the first is 0.
     """
 
     axes: Axes
     R_WD: Array
     acceleration: Acceleration
     parameters: list[float]
+    turn_D: Array = field(default_factory=lambda: np.zeros(3))
 
 
 def express_field(scene: Scene) -> FieldInAxes:
-    """Return the field of a scene, whose potential is one of `READERS` or None."""
-    axes, potential = principal_axes(scene), scene.potential
+    """Return the field of a scene, whose potential, or what turns of it, is one of `READERS` or None."""
+    axes, potential = principal_axes(scene), static_part(scene.potential)
     line = None if potential is None else potential.axis_W
-    if potential is None or line is None:
+    if line is None:
         return FieldInAxes(axes, np.eye(3), uniform, [0.0] * 9)
-    return READERS[type(potential)](axes, axes_about(line), potential)
+    if not isinstance(scene.potential, Turning):
+        return READERS[type(potential)](axes, axes_about(line), potential)
+    orbit = scene.potential.orbit
+    R_WD = _axes_beside(line, orbit.normal_W)
+    found = READERS[type(potential)](axes, R_WD, potential)
+    return replace(found, turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
+
+
+def _axes_beside(third: Array, normal: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is `third` (3,) and whose first is at right angles to `normal` (3,) too."""
+    first = np.cross(normal, third)
+    size = np.linalg.norm(first)
+    if size <= _ROUND_OFF:
+        return axes_about(third)
+    return np.stack([first / size, np.cross(third, first / size), third], axis=1)
 
 
 def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
@@ -131,7 +149,7 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
 
 
 def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
-    inertia = potential.rate**2 * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
+    inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]
