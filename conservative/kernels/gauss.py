@@ -31,6 +31,7 @@ from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers
 from .simd import LANES, four, fuse, lane, put, splat, spread
 from .taylor import shortest_move
+from .traced import trace
 from .vector import accumulate, add, cross, dot, product, scale, subtract, times, vertical
 
 FAILURE = "the step is too long for the iteration"
@@ -51,13 +52,15 @@ LONGEST = 2.0**64
 class Model(NamedTuple):
     """The closed system, principal axes, with momenta in units of `unit` kg m^2/s.
 
-    1/J and the moment c of the field in these units, L and gamma at the start, the attitude q there against axes whose third
-    is along gamma, and `left`, which takes those axes to the world's.
+    1/J and the moment c of the field in these units; `loose` is 1 for each component of L from which round-off may be removed,
+    else 0; L and gamma at the start, the attitude q there against axes whose third is along gamma, and `left`, which takes
+    those axes to the world's.
     """
 
     unit: float
     J_inverse: Any
     moment: Any
+    loose: Any
     L: Any
     gamma: Any
     q: Any
@@ -275,14 +278,19 @@ def values(J_inverse, c, L, g):
     return 0.5 * dot(L, times(J_inverse, L)) + dot(c, g), dot(L, g)
 
 
+move = trace(shortest_move)
+"""`taylor.shortest_move` as kernels call it."""
+
+
 @small
-def remove_round_off(J_inverse, c, kept, size, L, L_carry, g, g_carry):
+def remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, g, g_carry):
     """Bring energy and momentum back to `kept` and the length of gamma to 1, where they are off by more than ROUND_OFF."""
     now = values(J_inverse, c, L, g)
     e, m, longer = kept[0] - now[0], kept[1] - now[1], 0.5 - 0.5 * dot(g, g)
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
         return L, L_carry, g, g_carry
-    dL, turn = shortest_move(times(J_inverse, L), L, c, 1.0, e - longer * dot(c, g), m - longer * now[1], g)
+    w, T = times(J_inverse, L), cross(g, c)
+    dL, turn = move(loose, (size, 1.0), w, L, T, e - longer * dot(c, g), m - longer * now[1], g)
     L, L_carry = add_carried(L, L_carry, dL)
     g, g_carry = add_carried(g, g_carry, add(scale(longer, g), cross(g, turn)))
     return L, L_carry, g, g_carry
@@ -291,7 +299,7 @@ def remove_round_off(J_inverse, c, kept, size, L, L_carry, g, g_carry):
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where its sweeps do not converge; the size is the change of the last."""
-    unit, J_inverse, c, L, gamma, q, left = model
+    unit, J_inverse, c, loose, L, gamma, q, left = model
     s, A, E, b, b_low, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     width = b.shape[0]
@@ -317,7 +325,7 @@ def march(model, coefficients, workspace):
         dL, dg = weigh(b, b_low, F, at)
         L, L_carry = add_carried(L, L_carry, scale(h, dL))
         gamma, g_carry = add_carried(gamma, g_carry, scale(h, dg))
-        L, L_carry, gamma, g_carry = remove_round_off(J_inverse, c, kept, size, L, L_carry, gamma, g_carry)
+        L, L_carry, gamma, g_carry = remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, gamma, g_carry)
         q, q_carry = carry_attitude(q, q_carry, a, length, before, gamma)
         if step % every == 0 or step == n_steps:
             row += 1
