@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,6 +137,11 @@ def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: flo
         yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), evaluate)
     elif not depends_on_time(potential):
         yield Invariant("energy", "J", energy_scale, evaluate)
+
+
+def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
+    """Return the energy among invariants, in a field that turns the Jacobi integral, None where neither is conserved."""
+    return next((each for each in invariants if each.name in ("energy", JACOBI_INTEGRAL)), None)
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:

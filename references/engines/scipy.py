@@ -99,7 +99,7 @@ class SciPy(Method):
 
         def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
             R_WF = R_WD @ from_quaternion(y[:, :4])
-            if isinstance(scene.potential, Turning):
+            if turn_D is not None and isinstance(scene.potential, Turning):
                 R_WF = scene.potential.orbit.R_WO(grid.t[: len(y)]) @ R_WF
             return axes.trajectory(grid, self.label, R_WF, y[:, 4:], work, *reason)
 

@@ -66,16 +66,22 @@ class FieldInAxes:
 
 def express_field(scene: Scene) -> FieldInAxes:
     """Return the field of a scene, whose potential, or what turns of it, is one of `READERS` or None."""
-    axes, potential = principal_axes(scene), static_part(scene.potential)
+    potential = static_part(scene.potential)
     line = None if potential is None else potential.axis_W
-    if line is None:
-        return FieldInAxes(axes, np.eye(3), uniform, [0.0] * 9)
     if not isinstance(scene.potential, Turning):
-        return READERS[type(potential)](axes, axes_about(line), potential)
+        return _express(scene, potential, np.eye(3) if line is None else axes_about(line))
     orbit = scene.potential.orbit
-    R_WD = _axes_beside(line, orbit.normal_W)
-    found = READERS[type(potential)](axes, R_WD, potential)
+    R_WD = _axes_beside(orbit.normal_W if line is None else line, orbit.normal_W)
+    found = _express(scene, potential, R_WD)
     return replace(found, turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
+
+
+def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInAxes:
+    """Return a potential of the scene, or None, in axes D (3, 3); what has no axis does nothing."""
+    axes = principal_axes(scene)
+    if potential is None or potential.axis_W is None:
+        return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
+    return READERS[type(potential)](axes, R_WD, potential)
 
 
 def _axes_beside(third: Array, normal: Array) -> Array:
@@ -121,8 +127,8 @@ def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], E
     return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
 
 
-def _read_uniform(axes: Axes, R_WD: Array, _: Potential) -> FieldInAxes:
-    return FieldInAxes(axes, R_WD, uniform, _turning(axes, axes.moment))
+def _read_uniform(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+    return FieldInAxes(axes, R_WD, uniform, _turning(axes, potential.moment_B @ axes.R_BF))
 
 
 def _read_spring(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
