@@ -86,7 +86,7 @@ class Gauss(Method):
 
     @property
     def cost(self) -> Cost:
-        return Cost(step=50.0, correction=12.0 * self.stages, corrections=12.0)
+        return Cost(step=90.0, correction=6.5 * self.stages, corrections=12.0)
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
