@@ -24,6 +24,8 @@ from .units import in_own_units
 
 LOWEST, HIGHEST = 4, 18
 """Orders that the kernel has code for."""
+PARTS = 100
+"""Parts of a step that bounds allow for where a tolerance divides it."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,8 @@ class Taylor(Method):
         return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"})
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        return bounds_of(scene, grid)
+        parts = 1 if self.tolerance is None else PARTS
+        return bounds_of(scene, Grid(grid.dt, parts * grid.n_steps, parts * grid.n_steps))
 
     @property
     def cost(self) -> Cost:
