@@ -68,7 +68,7 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Order of the series, length of the step, s, and the largest size of the last two terms of a part of it, 0 for no parts."""
+    """Order of the series, length of the step, s, and the largest size of the last two terms of its parts, 0 for no parts."""
 
     order: int
     h: float

@@ -115,7 +115,7 @@ def test_bodies_at_rest_stay(field: str) -> None:
 
 
 def test_slow_swings_are_not_lost_in_projection() -> None:
-    """Gradients of energy are 1e-5 of what they are elsewhere; a step that follows round-off of energy would be off by 1e-11 and more."""
+    """Gradients of energy are 1e-5 of what they are elsewhere: steps that followed its round-off would be off by 1e-11."""
     slow = cv.Scene("slow", BODY, np.eye(3), (1e-5, 2e-5, 0), 3.0, cv.UniformGravity(4.0, (0, 0, -0.3)))
     exact = Precise(256).prepare(slow, cv.Grid(3.0, 1))()
     found = cv.integrate(slow, 0.05, cv.Taylor())
