@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from .potentials.point_to_point import PointAttraction as PointAttraction
     from .potentials.potential import Potential as Potential
     from .potentials.python_function import FunctionPotential as FunctionPotential
+    from .potentials.turning import Orbit as Orbit
+    from .potentials.turning import Turning as Turning
     from .potentials.uniform_gravity import UniformGravity as UniformGravity
     from .scene import Scene as Scene
     from .trajectory import Bounds as Bounds
@@ -82,6 +84,7 @@ _PLACES = {
     "NotConserved": "errors",
     "NotConverged": "errors",
     "NotWritten": "errors",
+    "Orbit": "potentials.turning",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
     "PointAttraction": "potentials.point_to_point",
@@ -95,6 +98,7 @@ _PLACES = {
     "Substepped": "methods.substepped",
     "Taylor": "methods.taylor",
     "Trajectory": "trajectory",
+    "Turning": "potentials.turning",
     "UniformGravity": "potentials.uniform_gravity",
     "Unsupported": "errors",
     "WrongBranch": "errors",
@@ -125,6 +129,7 @@ __all__ = [
     "NotConserved",
     "NotConverged",
     "NotWritten",
+    "Orbit",
     "Outcome",
     "OutcomeKind",
     "PointAttraction",
@@ -138,6 +143,7 @@ __all__ = [
     "Substepped",
     "Taylor",
     "Trajectory",
+    "Turning",
     "UniformGravity",
     "Unsupported",
     "WrongBranch",

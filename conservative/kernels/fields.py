@@ -51,6 +51,21 @@ def body_torque(field, q):
 
 
 @singledispatch
+def at_time(field, t):
+    """Return the field as it is at a time t, s: itself, unless it is one of those of `field_in_time`."""
+    return field
+
+
+def _stay(field, t):
+    return field
+
+
+@overload(at_time, jit_options=SMALL)
+def _choose_to_stay(field, t):
+    return None if getattr(field, "instance_class", None) in at_time.registry else _stay
+
+
+@singledispatch
 def finite_derivative(field, q0, q1):
     """Return V* (9,) in J between base vectors q0 and q1 (9,), and its derivative by q1 (9, 9)."""
     raise TypeError(f"not a field: {field!r}")

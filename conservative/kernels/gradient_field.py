@@ -1,6 +1,6 @@
-"""The gradient of a far centre's gravity: V = rate^2/2 u' I u with u = R' e, quadratic in the base vectors.
+"""The gradient of a far centre's gravity: V = 3/2 rate^2 u' I u with u = R' e, quadratic in the base vectors.
 
-V* is therefore the gradient at their mean, with the columns rate^2 (I ubar)_j e, and the torque is rate^2 e x (Rbar I ubar).
+V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque 3 rate^2 e x (Rbar I ubar).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Triple = tuple[float, float, float]
 
 
 class Gradient(NamedTuple):
-    """Rows of rate^2 I, J, in the axes of the kernel; e, the direction of the centre, in world axes."""
+    """Rows of 3 rate^2 I, J, in the axes of the kernel; e, the direction of the centre, in world axes."""
 
     first: Triple
     second: Triple

@@ -16,6 +16,9 @@ import numpy as np
 from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
 from ..errors import BadInput
+from ..invariants import jacobi_scale
+from ..potentials.potential import depends_on_time
+from ..potentials.turning import Turning
 from ..scene import Scene
 from .non_spinning import Resolved
 
@@ -91,5 +94,12 @@ def field_axis(scene: Scene) -> Triple | None:
 
 
 def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
-    return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
+    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes.
+
+    The first is inf where neither energy nor Jacobi integral is conserved.
+    """
+    energy, potential = scene.energy_scale, scene.potential
+    momentum = math.sqrt(2 * energy * float(scene.body.moments.max()))
+    if isinstance(potential, Turning):
+        return jacobi_scale(scene.body, potential, energy), momentum
+    return math.inf if depends_on_time(potential) else energy, momentum
