@@ -146,7 +146,7 @@ def refuse_time(unsupported: Callable[[Any, Any], str | None]) -> Callable[[Any,
     @wraps(unsupported)
     def reason(method: Any, scene: Any) -> str | None:
         if getattr(scene.potential, "time_dependent", False) and not method.time_dependent:
-            return "it is for fields that do not depend on the time"
+            return "it is for fields that do not depend on the time; integrate(scene, error=1e-9) chooses a method for others"
         return unsupported(method, scene)
 
     return reason

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,8 +28,8 @@ class Invariant:
     """A conserved quantity.
 
     `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
-    which has the unit `unit` and is above 0. In a field that turns, the attitudes it is given are R_OB, those in the axes O that
-    turn with the field (`Scene.in_field_axes`): what is conserved there does not depend on the time.
+    which has the unit `unit` and is above 0. In a field that turns, the attitudes it is given are R_OB, those in the axes O
+    that turn with the field (`Scene.in_field_axes`): what is conserved does not depend on the time there.
 
     Raises
     ------
@@ -100,8 +100,9 @@ def invariants_of(
 ) -> tuple[Invariant, ...]:
     """Return what follows from the body and the potential alone; drifts are relative to sizes at the start.
 
-    Energy, unless the field depends on the time; the Jacobi integral where it turns. World momentum (a vector) for a free body, its component along the axis of a field that has one (the vertical
-    in uniform gravity). The axial momentum where body and field are symmetric about one axis.
+    Energy, unless the field depends on the time; the Jacobi integral where it turns. World momentum (a vector) for a free body,
+    its component along the axis of a field that has one (the vertical in uniform gravity). The axial momentum where body and
+    field are symmetric about one axis.
 
     Parameters
     ----------
@@ -136,6 +137,11 @@ def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: flo
         yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), evaluate)
     elif not depends_on_time(potential):
         yield Invariant("energy", "J", energy_scale, evaluate)
+
+
+def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
+    """Return the energy among invariants, in a field that turns the Jacobi integral, None where neither is conserved."""
+    return next((each for each in invariants if each.name in ("energy", JACOBI_INTEGRAL)), None)
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:

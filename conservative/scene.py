@@ -133,7 +133,7 @@ class Scene(_Fields):
         return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
-        """Return attitudes (n, 3, 3) at times (n,), s, in axes that the field is fixed in: the world's, or those of its orbit."""
+        """Return attitudes (n, 3, 3) at times (n,), s, in axes that the field is fixed in: the world's, or those that turn."""
         return self.potential.in_orbit(R_WB, t) if isinstance(self.potential, Turning) else R_WB
 
     @cached_property

@@ -102,7 +102,7 @@ def test_the_automatic_choice_considers_it(installed):
     assert "borrowed" not in before
     installed(SOURCE)
     found = [method.family for method in search.candidates(top)]
-    assert found == ["borrowed"] * 3 + ["projected"]  # of its group the first, and still what is in no group
+    assert found == ["borrowed"] * 3 + ["taylor"] * 3  # of its group the first, and still what is in no group
     assert search.candidates(cv.scenes.brick_flip()) == (cv.MoserVeselov(),)  # an exact family stays alone
     assert cv.integrate(top, error=1e-3).choice.method.family == "borrowed"
 

@@ -1,22 +1,13 @@
 """Fields with an axis as functions of g, the direction of that axis in principal axes: V(g), dV/dg and the recurrence of T.
 
 The torque is T = g x dV/dg, so that one gradient serves the projection of a state and, order by order, the series of its
-motion. A field that `taylor` can move a body in implements the three functions below, next to its torque. The recurrence is a
-class such as `series.FreeSeries`, of which `make_orders` makes code.
+motion. A field that `taylor` can move a body in registers the three functions below, next to its torque: without branches, of
+floats or what stands for them, with the vectors of `traced`. The recurrence is a class such as `series.FreeSeries`.
 """
 
 from __future__ import annotations
 
 from functools import singledispatch
-
-from . import COMPILED
-
-if COMPILED:
-    from .series_llvm import make_orders
-else:
-    from .series_numpy import make_orders
-
-__all__ = ["axial_constants", "axial_energy", "axial_orders", "make_orders"]
 
 
 @singledispatch
@@ -32,6 +23,6 @@ def axial_energy(field, constants, g):
 
 
 @singledispatch
-def axial_orders(field, constants, order, h, g, a, w, K):
-    """Return what a step adds to g, a and w, fours: `orders` of `make_orders` with the numbers of this field at g."""
+def start_series(field, constants, g):
+    """Return the class of the recurrence and what it is made of, floats and fours in a tuple, for a step that starts at g."""
     raise TypeError(f"no recurrence: {field!r}")

@@ -15,8 +15,8 @@ import numpy as np
 from numba.extending import overload
 
 from . import SMALL, small
-from .axial import axial_constants, axial_energy, axial_orders, make_orders
-from .simd import join
+from .axial import axial_constants, axial_energy, start_series
+from .traced import join
 from .vector import cross, dot, scale, vertical
 
 
@@ -153,27 +153,22 @@ class UniformSeries:
         return self._emit.subtract(self._emit.add(None, self._M2, c[n, 0]), self._M1, c[n, 1])
 
 
-_uniform_orders = make_orders(UniformSeries)
-
-
-@small
 def turned_moment(J_inverse, m):
     """J^-1 (m2, m3, m1) and J^-1 (m3, m1, m2), with which J^-1 (g x m) is a difference of two products."""
     i = J_inverse
     return join(i[0] * m[1], i[1] * m[2], i[2] * m[0], 0.0), join(i[0] * m[2], i[1] * m[0], i[2] * m[1], 0.0)
 
 
-@implements(axial_constants, Uniform, **SMALL)
+@axial_constants.register(Uniform)
 def _axial_constants_uniform(field, J_inverse):
-    return turned_moment(J_inverse, (field.x, field.y, field.z))
+    return turned_moment(J_inverse, field)
 
 
-@implements(axial_energy, Uniform, **SMALL)
+@axial_energy.register(Uniform)
 def _axial_energy_uniform(field, constants, g):
-    m = (field.x, field.y, field.z)
-    return dot(m, g), m
+    return field.x * g[0] + field.y * g[1] + field.z * g[2], field
 
 
-@implements(axial_orders, Uniform, **SMALL)
-def _axial_orders_uniform(field, constants, order, h, g, a, w, K):
-    return _uniform_orders(order, h, g, a, w, K, constants)
+@start_series.register(Uniform)
+def _start_series_uniform(field, constants, g):
+    return UniformSeries, constants

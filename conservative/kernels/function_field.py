@@ -1,7 +1,7 @@
 """A field given by Python functions, called from the compiled loop.
 
 For each evaluation the loop writes the inputs into a new buffer, and what it calls writes the outputs behind them. All of the
-arithmetic is Python's, in `conservative.potentials.python_function`: nothing but these few lines is compiled.
+arithmetic is Python's, in `conservative.potentials.callback`: nothing but these few lines is compiled.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The gradient of a far centre's gravity: V = 3/2 rate^2 u' I u with u = R' e, quadratic in the base vectors.
 
-V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque is 3 rate^2 e x (Rbar I ubar).
+V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque 3 rate^2 e x (Rbar I ubar).
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import SMALL, kernel
-from .axial import axial_constants, axial_energy, axial_orders, make_orders
+from . import kernel, traced
+from .axial import axial_constants, axial_energy, start_series
 from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body
 from .series import History, outwards
-from .simd import join
+from .traced import join
 from .vector import add, cross, dot, scale
 
 Triple = tuple[float, float, float]
@@ -97,10 +97,7 @@ class GradientSeries:
         return emit.minus(plus, minus)
 
 
-_gradient_orders = make_orders(GradientSeries)
-
-
-@implements(axial_constants, Gradient, **SMALL)
+@axial_constants.register(Gradient)
 def _axial_constants_gradient(field, J_inverse):
     x, y, z = field.first, field.second, field.third
     i, j, k = J_inverse
@@ -114,12 +111,12 @@ def _axial_constants_gradient(field, J_inverse):
     )
 
 
-@implements(axial_energy, Gradient, **SMALL)
+@axial_energy.register(Gradient)
 def _axial_energy_gradient(field, constants, g):
-    u = _times(field, g)
-    return 0.5 * dot(g, u), u
+    u = (traced.dot(field.first, g), traced.dot(field.second, g), traced.dot(field.third, g))
+    return 0.5 * traced.dot(g, u), u
 
 
-@implements(axial_orders, Gradient, **SMALL)
-def _axial_orders_gradient(field, constants, order, h, g, a, w, K):
-    return _gradient_orders(order, h, g, a, w, K, constants)
+@start_series.register(Gradient)
+def _start_series_gradient(field, constants, g):
+    return GradientSeries, constants

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import SMALL, kernel, small
-from .axial import axial_constants, axial_energy, axial_orders, make_orders
+from . import kernel, traced
+from .axial import axial_constants, axial_energy, start_series
 from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body, turned_moment
 from .series import TURNED, TWICE, History, outwards
-from .simd import join, lane
+from .traced import join, over_root, root, where_above
 from .vector import cross, dot, scale, subtract
 
 Triple = tuple[float, float, float]
@@ -167,67 +167,66 @@ class PointSeries:
         return emit.minus(emit.times(emit.constant((self._alpha + 1) / n), weighted), plain)
 
 
-_spring_orders = make_orders(partial(PointSeries, alpha=-0.5, base=1))
-_attraction_orders = make_orders(partial(PointSeries, alpha=-1.5, base=0))
+_SpringSeries = partial(PointSeries, alpha=-0.5, base=1)
+_AttractionSeries = partial(PointSeries, alpha=-1.5, base=0)
 
 
-@implements(axial_constants, Spring, **SMALL)
+def _axial_constants(field, factor, J_inverse):
+    """Distance A of the anchor, and its product with b and a factor of the torque as `turned_moment`."""
+    A = root(traced.dot(field.A, field.A))
+    return A, *turned_moment(J_inverse, traced.scale(-factor * A, field.b))
+
+
+@axial_constants.register(Spring)
 def _axial_constants_spring(field, J_inverse):
-    A = math.sqrt(_square(field.A))
-    return A, turned_moment(J_inverse, scale(-field.stiffness * A, field.b))
+    return _axial_constants(field, field.stiffness, J_inverse)
 
 
-@implements(axial_constants, Attraction, **SMALL)
+@axial_constants.register(Attraction)
 def _axial_constants_attraction(field, J_inverse):
-    A = math.sqrt(_square(field.A))
-    return A, turned_moment(J_inverse, scale(-field.strength * A, field.b))
+    return _axial_constants(field, field.strength, J_inverse)
 
 
-@small
-def _over_distance(field, A, g):
-    """A g - b, m, and one over its length."""
-    x = subtract(scale(A, g), field.b)
-    return x, 1.0 / math.sqrt(dot(x, x))
+def _from_point(field, constants, g):
+    """A g - b, m, and its square."""
+    x = traced.subtract(traced.scale(constants[0], g), field.b)
+    return x, traced.dot(x, x)
 
 
-@small
-def _over_spring(field, A, g):
-    """The same, but 0 where nothing depends on it, as the distance may then be 0."""
-    x = subtract(scale(A, g), field.b)
-    return x, 0.0 if field.rest == 0.0 else 1.0 / math.sqrt(dot(x, x))
+def _over_spring(field, square):
+    """One over the distance, but 0 where nothing depends on it: without a length at rest the distance may be 0."""
+    return where_above(over_root(square), 0.0, field.rest)
 
 
-@implements(axial_energy, Spring, **SMALL)
+@axial_energy.register(Spring)
 def _axial_energy_spring(field, constants, g):
-    x, over = _over_spring(field, constants[0], g)
-    slack = 1.0 - field.rest * over
-    stiffness, square = field.stiffness * slack, dot(x, x)
-    return 0.5 * stiffness * slack * square, scale(stiffness * constants[0], x)
+    x, square = _from_point(field, constants, g)
+    slack = 1.0 - field.rest * _over_spring(field, square)
+    stiffness = field.stiffness * slack
+    return 0.5 * stiffness * slack * square, traced.scale(stiffness * constants[0], x)
 
 
-@implements(axial_energy, Attraction, **SMALL)
+@axial_energy.register(Attraction)
 def _axial_energy_attraction(field, constants, g):
-    x, over = _over_distance(field, constants[0], g)
+    x, square = _from_point(field, constants, g)
+    over = over_root(square)
     V = -field.strength * over
-    return V, scale(-V * over * over * constants[0], x)
+    return V, traced.scale(-V * over * over * constants[0], x)
 
 
-@small
 def _slopes(field, A, over):
     """S of `PointSeries`."""
     s, b = -2.0 * A * over * over, field.b
     return join(s * b[1], s * b[2], s * b[0], s * b[1])
 
 
-@implements(axial_orders, Spring, **SMALL)
-def _axial_orders_spring(field, constants, order, h, g, a, w, K):
-    A, (M1, M2) = constants
-    over = _over_spring(field, A, (lane(g, 0), lane(g, 1), lane(g, 2)))[1]
-    return _spring_orders(order, h, g, a, w, K, (M1, M2, _slopes(field, A, over), -field.rest * over))
+@start_series.register(Spring)
+def _start_series_spring(field, constants, g):
+    over = _over_spring(field, _from_point(field, constants, g)[1])
+    return _SpringSeries, (*constants[1:], _slopes(field, constants[0], over), -field.rest * over)
 
 
-@implements(axial_orders, Attraction, **SMALL)
-def _axial_orders_attraction(field, constants, order, h, g, a, w, K):
-    A, (M1, M2) = constants
-    over = _over_distance(field, A, (lane(g, 0), lane(g, 1), lane(g, 2)))[1]
-    return _attraction_orders(order, h, g, a, w, K, (M1, M2, _slopes(field, A, over), over * over * over))
+@start_series.register(Attraction)
+def _start_series_attraction(field, constants, g):
+    over = over_root(_from_point(field, constants, g)[1])
+    return _AttractionSeries, (*constants[1:], _slopes(field, constants[0], over), over * over * over)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.core import cgutils
 
 from .series import HIGHEST, LOWEST, sum_orders
-from .simd_llvm import FOUR, LANES
+from .simd_llvm import LANES
 
 MOST_STORED = 12 * HIGHEST
 """Vectors that a step may keep in memory."""
@@ -83,50 +82,32 @@ class Emitter:
         return found
 
 
-def _build_orders(builder, p, h, start, K, field_of):
-    """What a step of order p adds to g, a and w."""
-    emit = Emitter(builder)
+def sum_to_order(series, numbers, p, h, start, K):
+    """What a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, its last term and the one before.
+
+    Each of them is three fours (x, y, z, anything). `series` forms the coefficients of J^-1 T, of `numbers`, floats and fours. All are of `traced`.
+    """
+    builder, emit = p.builder, Emitter(p.builder)
+    field = series(emit, *(each.ir if each.ir.type == _VECTOR else emit.splat(each.ir) for each in numbers))
     end = builder.function.append_basic_block("series_end")
     exits = []
-    for order, (total, _) in enumerate(sum_orders(emit, emit.splat(h), start, K, field_of(emit)), 1):
+    for order, found in enumerate(sum_orders(emit, emit.splat(h.ir), tuple(each.ir for each in start), K.ir, field), 1):
         if order < LOWEST:
             continue
-        exits.append((builder.block, total))
+        exits.append((builder.block, found))
         if order == HIGHEST:
             builder.branch(end)
             break
         proceed = builder.function.append_basic_block(f"order_{order + 1}")
-        builder.cbranch(builder.icmp_signed("<=", p, ir.Constant(p.type, order)), end, proceed)
+        builder.cbranch(builder.icmp_signed("<=", p.ir, p.ir.type(order)), end, proceed)
         builder.position_at_end(proceed)
     builder.position_at_end(end)
-    out = [builder.phi(_VECTOR) for _ in range(3)]
-    for block, values in exits:
-        for phi, value in zip(out, values, strict=True):
-            phi.add_incoming(value, block)
-    return out
+    return tuple(tuple(_join_exits(p, exits, k, i) for i in range(3)) for k in range(3))
 
 
-def make_orders(field_series):
-    """Return the compiled `orders(p, h, g, a, w, K, numbers)` of a field whose coefficients `field_series` forms.
-
-    It returns what a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, each (x, y, z, anything). `numbers`
-    are floats and fours in a tuple, with which, as fours, `field_series(emit, *numbers)` is called.
-    """
-
-    @intrinsic
-    def orders(typing, p, h, g, a, w, K, numbers):
-        three = types.UniTuple(FOUR, 3)
-
-        def build(context, builder, sig, args):
-            p, h, g, a, w, K, packed = args
-
-            def field_of(emit):
-                values = cgutils.unpack_tuple(builder, packed, len(sig.args[-1]))
-                kinds = zip(values, sig.args[-1], strict=True)
-                return field_series(emit, *(value if kind is FOUR else emit.splat(value) for value, kind in kinds))
-
-            return context.make_tuple(builder, three, _build_orders(builder, p, h, (g, a, w), K, field_of))
-
-        return three(types.intp, types.float64, FOUR, FOUR, FOUR, FOUR, numbers), build
-
-    return orders
+def _join_exits(p, exits, k, i):
+    """Value i of part k of what the exits found."""
+    phi = p.builder.phi(_VECTOR)
+    for block, found in exits:
+        phi.add_incoming(found[k][i], block)
+    return p.make(phi)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 
 from .series import sum_orders
@@ -50,15 +52,9 @@ class Emitter:
         return at
 
 
-def make_orders(field_series):
-    """Return `orders(p, h, g, a, w, K, numbers)` of a field whose coefficients `field_series` forms (`series_llvm`)."""
-
-    def orders(p, h, g, a, w, K, numbers):
-        emit = Emitter()
-        field = field_series(emit, *(np.broadcast_to(x, LANES) for x in numbers))
-        for order, (total, _) in enumerate(sum_orders(emit, emit.splat(h), (g, a, w), K, field), 1):
-            if order == p:
-                break
-        return total
-
-    return orders
+def sum_to_order(series, numbers, p, h, start, K):
+    """What a step of order p and length h adds to g, a and w, and its last two terms (`series_llvm`)."""
+    emit = Emitter()
+    field = series(emit, *(np.broadcast_to(x, LANES) for x in numbers))
+    totals = sum_orders(emit, emit.splat(h), start, K, field)
+    return next(islice(totals, p - 1, None))

@@ -114,7 +114,11 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     row = np.searchsorted(found.t, t + SAME * grid.dt, side="right") - 1
     gaps = t - found.t[row]
     gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
-    n = len(t) if found.ok else int(np.count_nonzero(gaps[row == len(found) - 1] == 0.0) + np.count_nonzero(row < len(found) - 1))
+    n = (
+        len(t)
+        if found.ok
+        else int(np.count_nonzero(gaps[row == len(found) - 1] == 0.0) + np.count_nonzero(row < len(found) - 1))
+    )
     row, gaps = row[:n], gaps[:n]
     R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")

@@ -141,6 +141,7 @@ def closed_system(start: PrincipalStart) -> Any:
         unit,
         triple(unit * np.array(start.J_inverse)),
         triple(moment / unit),
+        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # momentum about the axis of symmetry is kept as it is
         triple(L / unit),
         triple(R_WP[2] if falls else L / size),
         quadruple(R_WV.T @ R_WP),

@@ -41,7 +41,7 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(2)
+    candidacy: ClassVar[Candidacy] = Candidacy(2, "explicit")
     colour: ClassVar[str] = "teal"
     kernel: ClassVar[str] = "projected"
     time_dependent: ClassVar[bool] = True

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, axes_about
-from ..check import describe
+from ..attitude import Array, axes_about, triple
+from ..check import describe, positive_number
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -37,14 +37,19 @@ class Taylor(Method):
     ----------
     order
         Of the series, 4 to 18.
+    tolerance
+        None for steps as long as the grid's. Else each of these is divided into parts so short that the last two terms of the
+        series are no larger than this: of the rows of the attitude's matrix, dimensionless, and of rates in units of what all
+        energy makes of the largest moment.
 
     Raises
     ------
     BadInput
-        order is not an integer in that range.
+        order is not an integer in that range, or tolerance not a finite number above 0.
     """
 
     order: int = 14  # type: ignore[assignment]
+    tolerance: float | None = None
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
@@ -55,6 +60,8 @@ class Taylor(Method):
     def __post_init__(self) -> None:
         if isinstance(self.order, bool) or not isinstance(self.order, int) or not LOWEST <= self.order <= HIGHEST:
             raise BadInput("order", describe(self.order), f"an integer from {LOWEST} to {HIGHEST}")
+        if self.tolerance is not None:
+            positive_number("tolerance", self.tolerance, "a finite number above 0, or None")
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -81,31 +88,27 @@ class Taylor(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
-        return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.order, grid.dt))
+        return prepare_run(
+            scene, grid, label, start, kernel, model, kernel.Coefficients(self.order, grid.dt, self.tolerance or 0.0)
+        )
 
 
 def has_recurrence(scene: Scene) -> bool:
     """Return whether a scene has no field or one with a recurrence."""
     if scene.potential is None:
         return True
-    return type(scene.potential.kernel_field(scene.body.R_BP)) in kernels("axial").axial_orders.registry
+    return type(scene.potential.kernel_field(scene.body.R_BP)) in kernels("axial").start_series.registry
 
 
 def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start, loose = start_about_symmetry(scene)
-    kernel = kernels("taylor")
-    model = kernel.Model(
-        start.J,
-        start.J_inverse,
-        start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L)),
-        loose,
-        invariant_scales(scene),
-        quadruple(axes_about(third_axis(scene))),
-        start.q,
-        start.L,
-    )
-    return method.label, start, model
+    kernel, R_WD = kernels("taylor"), axes_about(third_axis(scene))
+    R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
+    field = start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L))
+    rows = triple(R_DP[2]), triple(R_DP[0])
+    body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
+    return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L)
 
 
 def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:

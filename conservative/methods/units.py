@@ -21,7 +21,7 @@ from ..body import RigidBody
 from ..check import build_unchecked, read_only
 from ..method import Grid, Method, Run
 from ..potentials.potential import depends_on_time
-from ..potentials.turning import Turning
+from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -85,8 +85,7 @@ def find_units(scene: Scene, dt: float) -> Units:
 
 def _has_units(potential: Any) -> bool:
     """Return whether a potential or None, and the one that turns with it, can be converted to other units."""
-    within = potential.potential if isinstance(potential, Turning) else potential
-    return potential is None or (hasattr(potential, "in_units") and hasattr(within, "in_units"))
+    return potential is None or (hasattr(potential, "in_units") and hasattr(static_part(potential), "in_units"))
 
 
 def find_exponents(scene: Scene) -> tuple[int, int | None]:

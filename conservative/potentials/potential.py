@@ -6,7 +6,7 @@ shape: column j of `gradient(R)` is dV/dq_j. The torque is sum_j q_j x (-dV/dq_j
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -61,7 +61,9 @@ class PotentialInTime(Protocol):
     those of `Potential`. It may have `in_units(energy, time)`, with a unit of time, s, a power of two as well.
     """
 
-    time_dependent: ClassVar[bool] | bool
+    @property
+    def time_dependent(self) -> bool:
+        """Return True."""
 
     def energy_at(self, R_WB: Array, t: Array) -> Array:
         """Return V, (...), in J at attitudes (..., 3, 3) and times (...), s."""
@@ -94,7 +96,11 @@ def energy_at(potential: AnyPotential, R_WB: Array, t: Array) -> Array:
     return of_any_kind.energy_at(R_WB, t) if depends_on_time(potential) else of_any_kind.energy(R_WB)
 
 
-def torque_W(potential: Potential, R_WB: Array) -> Array:
-    """Return the torque (..., 3) about the fixed point, N m, world axes, at attitudes (..., 3, 3), body to world."""
-    gradient = potential.gradient(R_WB)
+def torque_W(potential: AnyPotential, R_WB: Array, t: Array | None = None) -> Array:
+    """Return the torque (..., 3) about the fixed point, N m, world axes.
+
+    Attitudes (..., 3, 3) are body to world, times (...) in s, of a potential that depends on the time.
+    """
+    of_any_kind: Any = potential
+    gradient = of_any_kind.gradient_at(R_WB, t) if depends_on_time(potential) else of_any_kind.gradient(R_WB)
     return -np.sum(np.cross(R_WB, gradient, axisa=-2, axisb=-2, axisc=-2), axis=-1)

@@ -142,3 +142,8 @@ class Turning(_Fields):
         from ..kernels.field_in_time import start_turning
 
         return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))
+
+
+def static_part(potential: Any) -> Any:
+    """Return the potential that turns, of a `Turning`, else the potential, or None, as it is."""
+    return potential.potential if isinstance(potential, Turning) else potential
