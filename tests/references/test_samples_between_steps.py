@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative import registry
 from conservative.attitude import angle_between, rotation_about
 from conservative.methods import between
 from conservative.references.precise import Precise
@@ -52,7 +53,7 @@ def errors(found, R_WB, w_WB_B):
 )
 def test_a_sample_is_as_good_as_the_steps(case, name, dt, bound):
     scene, R_WB, w_WB_B = case
-    method = cv.registry.method(name)
+    method = registry.method(name)
     if method.unsupported(scene):
         pytest.skip("not for this field")
     found = cv.integrate(scene, dt, method, t_eval=TIMES)
