@@ -30,7 +30,7 @@ class _OrbitFields:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Orbit(_OrbitFields):
-    """Axes O that turn at a constant rate about a normal fixed in the world, as those of a circular orbit; O = W at t = 0.
+    """Axes O that turn at a constant rate, rad/s, about a normal fixed in the world, as in a circular orbit; O = W at t = 0.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Turning(_Fields):
         return build_unchecked(Turning, potential=convert(energy), orbit=orbit)
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the field that turns as the kernels want it, with the orbit."""
+        """Return the field that turns as the kernels want it, in axes that R_BP (3, 3) takes to the body's, with rad/s of O."""
         from ..kernels.field_in_time import start_turning
 
         return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))
