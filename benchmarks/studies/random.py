@@ -1,7 +1,7 @@
 """The study of random bodies: errors and times of our methods and of engines on bodies that nobody chose.
 
 The bodies are those of `conservative.scenes.random_body`, whose docstring is the distribution. On each of them a method is
-taken at up to 16 settings, the same steps for every method with a step, the same tolerances for every one without.
+taken at up to 17 settings, the same steps for every method with a step, the same tolerances for every one without.
 
 * The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, spread over the motion
   of the scene: 12 rad at the rate of the start, some 10 to 40 rad turned in fact. Asymmetric bodies in a field amplify errors,
@@ -40,7 +40,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
 from .case import Case, Failure, Success
-from .selection import at_tolerance, series, tolerance_setting
+from .selection import Missing, at_tolerance, series, tolerance_setting
 from .speed import keep_end
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -49,10 +49,10 @@ DECADES = tuple(10.0**-k for k in range(2, 13))
 """Attitude errors, rad, at which methods are compared."""
 SAMPLES = 12
 """Instants at which errors are read; the longest step is the time between two of them."""
-STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50))
+STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50, 60))
 """Steps of the motion, long to short."""
-TOLERANCES = tuple(10.0**-k for k in range(1, 17))
-"""Tolerances of adaptive methods."""
+TOLERANCES = (0.5, *(10.0**-k for k in range(1, 17)))
+"""Tolerances of adaptive methods; heyoka has its lowest order, 2, at the first."""
 FEW = slice(None, None, 2)
 """What a quick study takes of them."""
 ORDER = 4
@@ -90,16 +90,19 @@ def bodies(number: int, seed: int) -> tuple[Scene, ...]:
 
 
 def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings that a family's name stands for: of ours those that the automatic choice probes, of engines all."""
-    if method.role != Role.OURS:
-        return method.variants()
+    """Return the settings that a family's name stands for, of order `ORDER` at least.
+
+    Of ours they are those that the automatic choice probes, of engines all.
+    """
     approximate = method.candidacy is not None and not method.candidacy.exact
-    return method.candidate_settings() if approximate else ()
+    ours = method.candidate_settings() if approximate else ()
+    found = ours if method.role == Role.OURS else method.variants()
+    return tuple(each for each in found if (each.order or ORDER) >= ORDER)
 
 
 def select(methods: Iterable[Method]) -> tuple[Method, ...]:
     """Return those of some methods that the study takes where nobody has named them; see `settings`."""
-    return tuple(method for method in methods if method.role == Role.ENGINE or method in settings(method))
+    return tuple(method for method in methods if isinstance(method, Missing) or method in settings(method))
 
 
 def precise(scene: Scene, grid: Grid) -> Truth:
@@ -129,7 +132,7 @@ Line = list[Point]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    methods = list({series(method): method for method in study.competitors if (method.order or ORDER) >= ORDER}.values())
+    methods = list({series(method): method for method in study.competitors}.values())
     pieces = len(methods) + 2
     for i, scene in enumerate(study.scenes):
         progress(i * pieces, len(study.scenes) * pieces, f"{scene.name}: truth")

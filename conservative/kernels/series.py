@@ -116,11 +116,12 @@ def next_coefficients(emit, c, n, h, K, field):
 
 
 def sum_orders(emit, h, start, K, field):
-    """Yield, for each order up to the highest, what a step adds to (g, a, w), and the last term of those sums."""
-    c, total = Vectors(emit), None
+    """Yield, for each order up to the highest, three times (g, a, w): what a step adds, the last term of it, the one before."""
+    c, total, before = Vectors(emit), None, None
     c.push(start)
     for n in range(HIGHEST):
         term = next_coefficients(emit, c, n, h, K, field)
         total = term if total is None else tuple(emit.plus(s, x) for s, x in zip(total, term, strict=True))
-        yield total, term
+        yield total, term, before
         c.push(term)
+        before = term

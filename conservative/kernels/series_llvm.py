@@ -83,18 +83,18 @@ class Emitter:
 
 
 def sum_to_order(series, numbers, p, h, start, K):
-    """What a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, fours (x, y, z, anything).
+    """What a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, its last term and the one before.
 
-    `series` forms the coefficients of J^-1 T, of `numbers`, floats and fours. All are of `traced`.
+    Each of them is three fours (x, y, z, anything). `series` forms the coefficients of J^-1 T, of `numbers`, floats and fours. All are of `traced`.
     """
     builder, emit = p.builder, Emitter(p.builder)
     field = series(emit, *(each.ir if each.ir.type == _VECTOR else emit.splat(each.ir) for each in numbers))
     end = builder.function.append_basic_block("series_end")
     exits = []
-    for order, (total, _) in enumerate(sum_orders(emit, emit.splat(h.ir), tuple(each.ir for each in start), K.ir, field), 1):
+    for order, found in enumerate(sum_orders(emit, emit.splat(h.ir), tuple(each.ir for each in start), K.ir, field), 1):
         if order < LOWEST:
             continue
-        exits.append((builder.block, total))
+        exits.append((builder.block, found))
         if order == HIGHEST:
             builder.branch(end)
             break
@@ -102,8 +102,12 @@ def sum_to_order(series, numbers, p, h, start, K):
         builder.cbranch(builder.icmp_signed("<=", p.ir, p.ir.type(order)), end, proceed)
         builder.position_at_end(proceed)
     builder.position_at_end(end)
-    out = [builder.phi(_VECTOR) for _ in range(3)]
-    for block, values in exits:
-        for phi, value in zip(out, values, strict=True):
-            phi.add_incoming(value, block)
-    return tuple(p.make(phi) for phi in out)
+    return tuple(tuple(_join_exits(p, exits, k, i) for i in range(3)) for k in range(3))
+
+
+def _join_exits(p, exits, k, i):
+    """Value i of part k of what the exits found."""
+    phi = p.builder.phi(_VECTOR)
+    for block, found in exits:
+        phi.add_incoming(found[k][i], block)
+    return p.make(phi)

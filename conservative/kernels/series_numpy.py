@@ -53,8 +53,8 @@ class Emitter:
 
 
 def sum_to_order(series, numbers, p, h, start, K):
-    """What a step of order p and length h adds to g, a and w (`series_llvm`)."""
+    """What a step of order p and length h adds to g, a and w, and its last two terms (`series_llvm`)."""
     emit = Emitter()
     field = series(emit, *(np.broadcast_to(x, LANES) for x in numbers))
     totals = sum_orders(emit, emit.splat(h), start, K, field)
-    return next(islice(totals, p - 1, None))[0]
+    return next(islice(totals, p - 1, None))

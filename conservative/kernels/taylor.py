@@ -14,6 +14,7 @@ to be restored. Source: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical 
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ from .protocol import Result, Workspace, find_ends, loosen
 from .series import FreeSeries
 from .series_numpy import sum_to_order as sum_to_order_numpy
 from .signals import call_handlers, end_of_block
-from .traced import Value, add, cross, dot, join, scale, split, subtract, times, trace, where_above
+from .traced import Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
 
 if COMPILED:
     from .series_llvm import sum_to_order as sum_to_order_llvm
@@ -39,6 +40,8 @@ ROUND_OFF = 2.0**-51
 """Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect a step may have before projection, and after it."""
+SAFETY, SHORTEST = 0.9, 2.0**-30
+"""Share of the longest part that a tolerance allows, and the shortest part of a step."""
 DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
 """Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
 
@@ -65,10 +68,11 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Order of the series and length of the step, s."""
+    """Order of the series, length of the step, s, and the largest size of the last two terms of a part of it, 0 for no parts."""
 
     order: int
     h: float
+    tolerance: float
 
 
 class Free(NamedTuple):
@@ -104,11 +108,24 @@ def begin(model):
 
 @trace
 def take_step(field, constants, order, h, K, g, a, w):
-    """The state after one step, not projected."""
+    """The state after one step, not projected, and its last two terms as fours."""
     first = tuple(join(*v, 0.0) for v in (g, a, w))
     sum_to_order = sum_to_order_llvm if isinstance(order, Value) else sum_to_order_numpy
-    added = sum_to_order(*start_series(field, constants, g), order, h, first, K)
-    return tuple(split(v + d) for v, d in zip(first, added, strict=True))
+    added, last, before = sum_to_order(*start_series(field, constants, g), order, h, first, K)
+    return tuple(split(v + d) for v, d in zip(first, added, strict=True)), last, before
+
+
+@trace
+def sizes(scales, last, before):
+    """The sizes of two terms: of rows of a rotation, and of rates in units of what all energy makes of the largest moment."""
+    over = 0.5 * scales[1] * scales[2]
+    return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (map(split, last), map(split, before)))
+
+
+@small
+def stretch(tolerance, order, large):
+    """By which factor a step may be longer, by the sizes of its last two terms."""
+    return min((tolerance / large[0]) ** (1.0 / order), (tolerance / large[1]) ** (1.0 / (order - 1)))
 
 
 def significant(x, scale):
@@ -211,22 +228,37 @@ def project(field, constants, body, kept, scales, g, a, w):
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
     field, left, g, a = model.field, model.left, model.g, model.a
-    order, h = coefficients
+    order, h, tolerance = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     constants, K, w, kept, scales = begin(model)
     body = (model.J, model.J_inverse, model.loose)
     record(q_out, L_out, 0, model.q, model.L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
-    done = 0
+    done, parts, computed, part = 0, 0, 0, h
     while done < n_steps and defect < LEFT:
         last = end_of_block(done, n_steps, pause)
         while done < last:
-            g, a, w = take_step(field, constants, order, h, K, g, a, w)
-            g, a, w, more, defect = project(field, constants, body, kept, scales, g, a, w)
-            corrections += more
+            left_over, taken = h, 0
+            while left_over > 0.0 and defect < LEFT:
+                (g1, a1, w1), last_term, before = take_step(field, constants, order, part, K, g, a, w)
+                computed += 1
+                if tolerance > 0.0:
+                    factor = stretch(tolerance, order, sizes(scales, last_term, before))
+                    if not factor >= 1.0 and part > SHORTEST * h:
+                        part = part * (SAFETY * factor if factor > 0.1 else 0.1)
+                        continue
+                    longest = SAFETY * factor * part
+                left_over -= part
+                taken += 1
+                g, a, w, more, defect = project(field, constants, body, kept, scales, g1, a1, w1)
+                corrections += more
+                if tolerance > 0.0:
+                    rest = left_over if left_over > 0.0 else h
+                    part = rest / math.ceil(rest / longest) if longest < rest else rest
             if not defect < LEFT:
                 break
             done += 1
+            parts += taken
             until_sample -= 1
             if until_sample == 0 or done == n_steps:
                 until_sample = every
@@ -234,7 +266,7 @@ def march(model, coefficients, workspace):
                 record(q_out, L_out, row, vector.product(left, quaternion(g, a)), vector.times(model.J, w))
         if done < n_steps:
             call_handlers()
-    return Result(done, done * order, corrections, done * order, defect, False)
+    return Result(done, parts * order, corrections, computed * order, defect, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)

@@ -22,6 +22,7 @@ from ..method import Grid, Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
+from .between import Samples, divide_step, sample_between, spread
 from .search import Attempts, even_grid, find_cheapest, stalls, step_factor
 from .trials import Trials, trials_of
 
@@ -34,14 +35,12 @@ def integrate_to_error(
     scene: Scene,
     error: float,
     t_end: float,
-    spacing: float | None,
-    sample_every: int,
+    samples: Samples,
     progress: Callable[[Progress], object] | None = None,
 ) -> Trajectory:
     """Return the trajectory with the cheapest method and step found for an attitude error, rad; its `choice` says which.
 
-    With `spacing` (s) steps divide it, and every `sample_every`-th multiple of it is sampled; without, every `sample_every`-th
-    step. `progress` is called as `integrate` says.
+    The run takes t_end, s; `progress` is called as `integrate` says.
 
     Raises
     ------
@@ -50,9 +49,10 @@ def integrate_to_error(
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
+    dt = dt if samples.at is None else divide_step(scene, method, dt)
     attempts: Attempts = ()
     for _ in range(ATTEMPTS):
-        grid = grid_of(dt, t_end, spacing, sample_every)
+        grid = grid_of(dt, t_end, samples)
         found, trajectory = _recall_or_run(trials, method, grid)
         attempts = (*attempts, (grid.dt, found))
         if found <= error or stalls(attempts):
@@ -60,6 +60,8 @@ def integrate_to_error(
         dt = grid.dt * step_factor(found, error, method)
     best = Choice(method, grid.dt, error, found, attempts)
     trajectory = method.solve(scene, grid) if trajectory is None else trajectory
+    if samples.at is not None:
+        trajectory = sample_between(trajectory, method, grid, samples.at)
     if trajectory.ok and not best.reached:
         warnings.warn(AccuracyNotReached(error, found), stacklevel=4)
     return replace(trajectory, choice=best)
@@ -73,8 +75,8 @@ def _recall_or_run(trials: Trials, method: Method, grid: Grid) -> tuple[float, T
     return found.error, trajectory
 
 
-def grid_of(dt: float, t_end: float, spacing: float | None, sample_every: int) -> Grid:
-    """Return a grid of an even number of steps of at most dt, s, to t_end, s, whose samples are at multiples of the spacing, s.
+def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
+    """Return a grid of an even number of steps of at most dt, s, to t_end, s, with the samples, or steps to reach them from.
 
     Raises
     ------
@@ -83,8 +85,10 @@ def grid_of(dt: float, t_end: float, spacing: float | None, sample_every: int) -
     """
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"what takes {t_end / dt:.3g} steps", f"what {MOST_STEPS:g} steps reach: a larger one")
-    if spacing is None:
-        return even_grid(t_end, dt, sample_every)
-    each = 2 * max(1, math.ceil(spacing / dt / 2 * (1 - 1e-9)))
-    n = each * math.ceil(t_end / spacing * (1 - 1e-9))
-    return Grid(spacing / each, n, min(each * sample_every, n))
+    if samples.at is not None:
+        return even_grid(t_end, dt, spread(int(t_end / dt)))
+    if samples.spacing is None:
+        return even_grid(t_end, dt, samples.every)
+    each = 2 * max(1, math.ceil(samples.spacing / dt / 2 * (1 - 1e-9)))
+    n = each * math.ceil(t_end / samples.spacing * (1 - 1e-9))
+    return Grid(samples.spacing / each, n, min(each * samples.every, n))

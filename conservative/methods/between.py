@@ -6,14 +6,17 @@ coefficients are Dormand and Prince's, as in `conservative.methods.coefficients.
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from ..attitude import Array, to_quaternion
+from ..check import SAMPLE_BYTES, describe, most_samples, real_array
 from ..deferred_imports import kernels
-from ..errors import Diverged
+from ..errors import BadInput, Diverged
 from ..method import Grid, Method
 from ..scene import Scene
 from ..trajectory import Trajectory, accept_samples
@@ -31,15 +34,69 @@ MOST_KEPT = 10**6
 """Steps of a run that are kept to start from; of more, as many, evenly spaced."""
 
 
-def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
-    """Return the grid of steps dt, s, from which samples at times t (n,), s, are reached.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Which samples of a run are kept.
 
-    Where accuracy does not depend on the step, dt is divided so that no gap is long.
+    Attributes
+    ----------
+    spacing
+        Where steps have to divide it: the distance of samples, s. Else None.
+    every
+        So many of these distances, or of the steps, are from one sample to the next.
+    at
+        Times of the samples (n,), s, in increasing order, instead of both. Else None.
     """
-    if method.order is None:
-        dt = dt / max(1, np.ceil(min(dt, t[-1]) * bound_rate(scene) / LONGEST))
+
+    spacing: float | None = None
+    every: int = 1
+    at: Array | None = None
+
+
+def read_times(value: object, t_end: float) -> Array:
+    """Return times of samples (n,), s, as given or, where `value` is a number, so many evenly spaced ones from 0 to t_end, s.
+
+    Raises
+    ------
+    BadInput
+        They are no numbers, not finite, not in increasing order, not within 0 to t_end, none, or do not fit in memory.
+    """
+    allowed = f"times (n,), s, in increasing order from 0 to t_end = {t_end:g}, or their number, 2 or more"
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        _require_count(int(value), 2, allowed)
+        return np.linspace(0.0, t_end, int(value))
+    t = real_array(value)
+    if t is None or t.ndim != 1:
+        raise BadInput("t_eval", describe(value), allowed)
+    _require_count(len(t), 1, allowed)
+    if not np.isfinite(t).all():
+        raise BadInput("t_eval", f"{describe(t[~np.isfinite(t)][0].item())} at index {np.argmin(np.isfinite(t))}", allowed)
+    if (np.diff(t) <= 0).any():
+        i = int(np.argmax(np.diff(t) <= 0))
+        raise BadInput("t_eval", f"{t[i + 1]:.17g} after {t[i]:.17g}, at index {i + 1}", allowed)
+    if t[0] < 0 or t[-1] > t_end * (1 + 1e-9):
+        raise BadInput("t_eval", f"times from {t[0]:.17g} to {t[-1]:.17g}", allowed)
+    return t
+
+
+def _require_count(n: int, least: int, allowed: str) -> None:
+    """Raise `BadInput` unless the number n of samples is at least so large, and they fit in memory."""
+    if n < least:
+        raise BadInput("t_eval", "none" if n == 0 else f"{n}", allowed)
+    if n > most_samples():
+        raise BadInput("t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each")
+
+
+def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
+    """Return the grid of steps dt, s, from which samples at times t (n,), s, are reached."""
+    dt = divide_step(scene, method, dt)
     n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
     return Grid(dt, n_steps, spread(n_steps))
+
+
+def divide_step(scene: Scene, method: Method, dt: float) -> float:
+    """Return the step dt, s; an equal part of it where accuracy does not depend on the step, and gaps would be long."""
+    return dt if method.order is not None else dt / max(1, math.ceil(dt * bound_rate(scene) / LONGEST))
 
 
 def spread(n_steps: int) -> int:

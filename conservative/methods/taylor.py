@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, triple
-from ..check import describe
+from ..check import describe, positive_number
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -37,14 +37,19 @@ class Taylor(Method):
     ----------
     order
         Of the series, 4 to 18.
+    tolerance
+        None for steps as long as the grid's. Else each of these is divided into parts so short that the last two terms of the
+        series are no larger than this: of the rows of the attitude's matrix, dimensionless, and of rates in units of what all
+        energy makes of the largest moment.
 
     Raises
     ------
     BadInput
-        order is not an integer in that range.
+        order is not an integer in that range, or tolerance not a finite number above 0.
     """
 
     order: int = 14  # type: ignore[assignment]
+    tolerance: float | None = None
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
@@ -55,6 +60,8 @@ class Taylor(Method):
     def __post_init__(self) -> None:
         if isinstance(self.order, bool) or not isinstance(self.order, int) or not LOWEST <= self.order <= HIGHEST:
             raise BadInput("order", describe(self.order), f"an integer from {LOWEST} to {HIGHEST}")
+        if self.tolerance is not None:
+            positive_number("tolerance", self.tolerance, "a finite number above 0, or None")
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -81,7 +88,9 @@ class Taylor(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
-        return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.order, grid.dt))
+        return prepare_run(
+            scene, grid, label, start, kernel, model, kernel.Coefficients(self.order, grid.dt, self.tolerance or 0.0)
+        )
 
 
 def has_recurrence(scene: Scene) -> bool:

@@ -28,7 +28,7 @@ def ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
 def _panel(part: pd.DataFrame, field: str, y_scale: alt.Scale) -> Any:
     x = alt.X(**log_channel("error", "largest attitude error, rad", part["error"]))
     base = alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=field).encode(x=x)
-    y = {"scale": y_scale, "axis": alt.Axis(title="engine / ours", format="~g")}
+    y: dict[str, Any] = {"scale": y_scale, "axis": alt.Axis(title="engine / ours", format="~g")}
     band = base.mark_area(color=BLUE, opacity=0.18).encode(y=alt.Y("worst:Q", **y), y2="best:Q")
     shown = [alt.Tooltip(f"{name}:Q", format=".3g") for name in ("error", "mean", "worst", "best")]
     mark = base.mark_line(color=BLUE, strokeWidth=2, point=alt.OverlayMarkDef(color=BLUE, size=40))

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 FILES = ("study.md", "study.csv", "study.json")
 """The files of `--out`."""
+COLUMNS = 7
+"""Columns that a terminal has room for: of ratios all but the winners, which the files have."""
 
 
 @click.command(
@@ -91,13 +93,13 @@ def _measure(name: str, options: dict[str, Any]) -> StudyRows:
     from ..tables.study_rows import StudyRows
     from ..terminal.progress import progress
 
-    names = {key: tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods")}
+    scenes, methods = (tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods"))
     engines = tuple(split_list("engines", options.pop("engines")))
-    planned, source = plan_study(name, Extent(**names, engines=engines, **options)), provenance()
+    planned, source = plan_study(name, Extent(scenes, methods, engines, **options)), provenance()
     made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
     with interruptible(signal.SIGTERM), progress() as step:
         found = measure_study(planned, lambda done, total, what: step(done / total, what))
-    return StudyRows(name, found, made)
+    return StudyRows(name, found.table, found.samples, made)
 
 
 def _show(found: StudyRows) -> None:

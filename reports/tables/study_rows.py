@@ -14,8 +14,7 @@ from conservative.benchmarks.studies.studies import RANDOM
 from conservative.outcome import OutcomeKind
 
 from ..labels import with_names
-from ..run.measure import Measurements
-from . import random_ratios
+from . import random_contests, random_ratios
 from .cells import DASH, Cell, Table, markdown, number
 from .rows import prefix_quantity
 
@@ -31,22 +30,23 @@ class StudyRows:
     ----------
     name
         Of the study.
-    found
-        Its rows and samples.
+    table, samples
+        Its rows (see `Measurement`), and lines of pictures (see `Samples`).
     made
         How, where and when it was measured, by name.
     """
 
     name: str
-    found: Measurements
+    table: pd.DataFrame
+    samples: pd.DataFrame
     made: Mapping[str, str]
 
     @property
     def tables(self) -> list[Captioned]:
         """The tables: ratios of random bodies; of any other study its rows."""
         if self.name != RANDOM:
-            return [(f"{self.name}: {len(self.found.table)} rows", rows_table(self.found.table))]
-        contests = random_ratios.contests(self.found.table)
+            return [(f"{self.name}: {len(self.table)} rows", rows_table(self.table))]
+        contests = random_contests.contests(self.table)
         return [
             ("Random bodies: the cheapest engine's time over ours", random_ratios.as_table(contests)),
             ("Random bodies: each engine's time over ours, mean (worst to best)", random_ratios.by_engine(contests)),
@@ -55,17 +55,17 @@ class StudyRows:
     @property
     def statements(self) -> tuple[str, ...]:
         """What it comes to, in words; only of random bodies."""
-        return random_ratios.statements(random_ratios.contests(self.found.table)) if self.name == RANDOM else ()
+        return random_ratios.statements(random_contests.contests(self.table)) if self.name == RANDOM else ()
 
     def csv_text(self) -> str:
         """Return the rows as CSV, in the columns of a report's measurements.csv."""
-        return self.found.table.to_csv(index=False, lineterminator="\n")
+        return self.table.to_csv(index=False, lineterminator="\n")
 
     def json_text(self) -> str:
         """Return everything as JSON; null stands for a number that could not be measured."""
-        contests = random_ratios.contests(self.found.table) if self.name == RANDOM else ()
+        contests = random_contests.contests(self.table) if self.name == RANDOM else ()
         ratios = {"ratios": random_ratios.records(contests)} if contests else {}
-        parts = {**ratios, "rows": _records(self.found.table), "samples": _records(self.found.samples)}
+        parts = {**ratios, "rows": _records(self.table), "samples": _records(self.samples)}
         return json.dumps({"study": self.name, **self.made, **parts}, indent=1, ensure_ascii=False)
 
     def markdown_text(self) -> str:
@@ -77,9 +77,8 @@ class StudyRows:
         return "\n\n".join([f"# Study: {self.name}", *terms, *said, *tables, f"## How this was made\n\n{made}"]) + "\n"
 
 
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = table.astype(object).where(table.notna(), None).to_dict("records")
-    return found
+def _records(table: pd.DataFrame) -> list[dict[Any, Any]]:
+    return [dict(row) for row in table.astype(object).where(table.notna(), None).to_dict("records")]
 
 
 def rows_table(table: pd.DataFrame) -> Table:

@@ -14,6 +14,7 @@ import conservative as cv
 from conservative.declarations import Candidacy, Cost
 from conservative.errors import AccuracyNotReached, MissingEngine
 from conservative.methods import automatic, search, trials
+from conservative.methods.between import Samples
 from conservative.trajectory import Counters
 
 BODY = cv.RigidBody((1.0, 1.0, 1.0))
@@ -72,7 +73,7 @@ def fresh():
     ],
 )
 def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected):
-    grid = automatic.grid_of(dt, t_end, spacing, every)
+    grid = automatic.grid_of(dt, t_end, Samples(spacing, every))
     assert (grid.dt, grid.n_steps, grid.every) == pytest.approx(expected)
 
 
@@ -150,7 +151,7 @@ def choose(monkeypatch):
 
 def test_the_step_is_cut_until_the_error_is_reached(choose):
     choose(Known(size=0.1))
-    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, None, 1)
+    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples())
     choice = found.choice
     assert choice.reached
     assert choice.estimate <= 1e-5
@@ -165,15 +166,15 @@ def test_the_step_is_cut_until_the_error_is_reached(choose):
 def test_the_cheapest_at_its_step_is_taken(choose):
     dear, cheap = Known(size=0.1, step=50.0), Known(size=0.1, step=1.0)
     choose(dear, cheap)
-    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, None, 1).choice.method == cheap
+    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples()).choice.method == cheap
     high = Known(size=0.1, power=4, step=50.0)
     choose(cheap, high)
-    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, None, 1).choice.method == high
+    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, Samples()).choice.method == high
 
 
 def test_spacing_is_kept(choose):
     choose(Known(size=0.1))
-    found = automatic.integrate_to_error(SCENE, 1e-4, 8.0, 0.5, 2)
+    found = automatic.integrate_to_error(SCENE, 1e-4, 8.0, Samples(0.5, 2))
     np.testing.assert_allclose(found.t, np.arange(9.0), atol=1e-12)
     assert (0.5 / found.choice.dt) % 2 == pytest.approx(0, abs=1e-9)
 
@@ -181,7 +182,7 @@ def test_spacing_is_kept(choose):
 def test_more_steps_than_anybody_waits_for_are_refused_before_they_are_taken(choose):
     choose(Known(size=0.1))
     with pytest.raises(cv.BadInput, match=r"error: got what takes .* steps; allowed: what 1e\+10 steps reach"):
-        automatic.integrate_to_error(SCENE, 1e-9, 1e9, None, 10**12)
+        automatic.integrate_to_error(SCENE, 1e-9, 1e9, Samples(None, 10**12))
     assert max(grid.n_steps for grid in Known.taken) <= search.MOST_PROBED
     candidate = drive(Known(size=1.0), 1e-15, 8.0)
     assert candidate.hopeless

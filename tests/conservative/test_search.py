@@ -54,8 +54,7 @@ def test_the_choice_for_a_satellite_costs_few_runs(runs, factor):
     found = cv.integrate(satellite(factor), error=1e-9)
     whole = found.choice.method.cost.least * found.counters.steps
     assert found.choice.reached
-    assert work(runs) < 25 * whole  # measured 6, 5 and 5, where driving order 2 to the error took 2,000 to 70,000
-    assert max(steps for _, steps in runs) <= 2 * found.counters.steps
+    assert work(runs) < 25 * whole  # measured 5 to 7, where a search that drove all orders to the error took 840 to 15,000
 
 
 @pytest.mark.parametrize("error", [1e-3, 1e-6, 1e-9])
