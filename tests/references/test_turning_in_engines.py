@@ -41,6 +41,14 @@ def test_every_formulation_gives_the_same_motion(field):
         assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 10 * allowed, method.name
 
 
+@pytest.mark.parametrize("method", [cv.Taylor(14), cv.Taylor(18)])
+def test_taylor_in_the_field_of_a_satellite(method):
+    scene = scene_in(TURNING["satellite"])
+    truth, found = cv.integrate(scene, 0.1, Precise(128)), cv.integrate(scene, 0.02, method, sample_every=5)
+    assert angle_between(truth.R_WB, found.R_WB).max() < 1e-13  # measured up to 1.3e-15
+    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 1e-12
+
+
 def test_truth_of_a_satellite_is_multi_precision():
     scene = scene_in(TURNING["satellite"])
     assert reference(scene, cv.Grid(0.1, 10)).trajectory.label.startswith("heyoka")
