@@ -7,10 +7,10 @@ import pytest
 
 import conservative as cv
 from conservative.declarations import Candidacy
+from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
-from conservative.invariants import JACOBI_INTEGRAL
 
 from .exact_motion import free, in_field, top
 
