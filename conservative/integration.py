@@ -143,7 +143,9 @@ def _require_choice(error: float, dt: float | None, method: Method | str | None,
     if method is not None:
         raise BadInput("method", describe(method), "None together with error, which chooses the method")
     if dt is not None and at is not None:
-        raise BadInput("dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples")
+        raise BadInput(
+            "dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples"
+        )
 
 
 def _integrate_with(

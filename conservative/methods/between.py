@@ -84,7 +84,9 @@ def _require_count(n: int, least: int, allowed: str) -> None:
     if n < least:
         raise BadInput("t_eval", "none" if n == 0 else f"{n}", allowed)
     if n > most_samples():
-        raise BadInput("t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each")
+        raise BadInput(
+            "t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each"
+        )
 
 
 def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:

@@ -7,6 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.declarations import Candidacy
+from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
@@ -27,8 +28,11 @@ AXIS = "momentum along the field's axis"
         (cv.MoserVeselov(4), "moser_veselov:order=4", 4, {"energy", "momentum", "axial momentum"}),
         (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
         (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
-        (cv.Projected(), "projected", 8, {"energy", "vertical momentum", AXIS}),
-        (cv.Taylor(9), "taylor:order=9", 9, {"energy", "momentum", "vertical momentum", AXIS, "axial momentum"}),
+        (cv.Projected(), "projected", 8, {"energy", JACOBI_INTEGRAL, "vertical momentum", AXIS}),
+        (
+            *(cv.Taylor(9), "taylor:order=9", 9),
+            {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", AXIS, "axial momentum"},
+        ),
         (
             cv.Substepped("reduced:order=4"),
             "substepped:method=reduced:order=4",
