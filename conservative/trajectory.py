@@ -169,7 +169,7 @@ def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) 
 
 
 def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return samples at any times of a run that may be called ok if they may be, too, else those that are good, with the failure.
+    """Return samples at any times of a run that is ok, if they may be called so, too, else those that are, with the failure.
 
     `kept` are the names of the invariants that are asked for.
     """

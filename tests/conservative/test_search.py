@@ -63,7 +63,7 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
     low, high = Known(size=0.1, power=2, step=10.0), Known(size=0.1, power=8, step=50.0)
     choose(*((high, low) if reverse else (low, high)))
     made = []
-    method, dt = search.find_cheapest(trials.Trials(SCENE, {}, lambda method, grid: made.append((method, grid))), error, 8.0)
+    method, _ = search.find_cheapest(trials.Trials(SCENE, {}, lambda method, grid: made.append((method, grid))), error, 8.0)
     needed = {each: each.cost.least * (0.1 / error * 8) ** (1 / each.power) * 8 for each in (low, high)}
     cheapest = min(needed, key=needed.get)
     assert needed[method] <= search.LENIENCY * needed[cheapest]
