@@ -1,6 +1,6 @@
 """What a call costs beside the compiled code, us: a prepared run, its check, `solve` and `integrate`. Nothing is asserted.
 
-    python -m conservative.benchmarks.verification.call_cost --method taylor --method reduced
+    python -m conservative.benchmarks.verification.call_cost --steps 1 --steps 1000
 
 Times are those of this thread alone, the smallest of many rounds in which all calls take turns. A busy machine makes them
 longer all the same, so that what counts is what the calls add, in the same rounds, to the bare entries. These are the kernel's
@@ -85,13 +85,14 @@ def time_call(call: Call, repeats: int) -> float:
 
 
 @click.command()
-@click.option("--method", "-m", "names", multiple=True, default=("taylor", "projected", "reduced"), show_default=True)
+@click.option("--method", "-m", "names", multiple=True, help="Names.  [default: all with a compiled loop]")
 @click.option("--scene", default="asymmetric_top", show_default=True)
 @click.option("--steps", multiple=True, type=int, default=(1, 1000), show_default=True)
 def main(names: tuple[str, ...], scene: str, steps: tuple[int, ...]) -> None:
     """Print what each call costs, and what it adds to the compiled code, us."""
     body = registry.scene(scene)
-    for name in names:
+    compiled = [name for name, family in registry.list_families().items() if family.kernel and not family().unsupported(body)]
+    for name in names or compiled:
         for n in steps:
             times = time_calls(calls_of(registry.method(name), body, Grid(body.dt, n, 1)))
             bare = times["kernel"] + times["to body axes"]

@@ -116,11 +116,7 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     row = np.searchsorted(found.t, t + SAME * grid.dt, side="right") - 1
     gaps = t - found.t[row]
     gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
-    n = (
-        len(t)
-        if found.ok
-        else int(np.count_nonzero(gaps[row == len(found) - 1] == 0.0) + np.count_nonzero(row < len(found) - 1))
-    )
+    n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
     row, gaps = row[:n], gaps[:n]
     R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
@@ -131,7 +127,8 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
 def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
     """Return what follows after gaps (n,), s, on states at times t (n,), s, and how many were moved.
 
-    These are all before the first that cannot be. States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those whose gap is 0 stay as they are, bit for bit.
+    These are all before the first that cannot be. States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those
+    whose gap is 0 stay as they are, bit for bit.
     """
     far = np.flatnonzero(gaps)
     R, w = R_WB.copy(), w_WB_B.copy()
