@@ -70,8 +70,8 @@ MARGIN = 3.0
 BITS = 96
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run from which on a line gets one setting of so many."""
-ROUNDS, QUICK_ROUNDS, BUDGET = 25, 7, 0.05
-"""Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get three."""
+ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
+"""Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get fewer."""
 TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
 
@@ -183,8 +183,9 @@ def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Gener
 
 
 def estimate(done: Success) -> float:
-    """Return about what a run costs, s: the least of a few calls, of one call where that is slow."""
-    return done.cost.first_call if done.cost.first_call > SLOW else min(wall_time(done.run) for _ in range(3))
+    """Return about what a run costs, s: the least of a few calls, of two where it is slow; the very first may have compiled."""
+    spent = min(wall_time(done.run) for _ in range(2))
+    return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
 
 
 def worth_timing(lines: Iterable[Line]) -> list[Point]:

@@ -36,11 +36,11 @@ PAUSE = 2**16
 MOST_CORRECTIONS = 8
 ENOUGH = 2.0**-26
 """Relative defect whose square, which a correction leaves, is round-off."""
-ROUND_OFF = 2.0**-51
+ROUND_OFF = 2.0**-50
 """Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect a step may have before projection, and after it."""
-SAFETY, SHORTEST = 0.9, 2.0**-30
+SAFETY, SHORTEST = 0.8, 2.0**-30
 """Share of the longest part that a tolerance allows, and the shortest part of a step."""
 DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
 """Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
@@ -68,7 +68,7 @@ class Model(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Order of the series, length of the step, s, and the largest size of the last two terms of a part of it, 0 for no parts."""
+    """Order of the series, length of the step, s, and the largest size of the last two terms of its parts, 0 for no parts."""
 
     order: int
     h: float
@@ -96,14 +96,20 @@ def _start_series_free(field, constants, g):
     return FreeSeries, ()
 
 
+def values(field, constants, L, n, g, w):
+    """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
+    V, slope = axial_energy(field, constants, g)
+    return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
+
+
 @trace
 def begin(model):
     """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-    energy = 0.5 * dot(model.L, w) + axial_energy(field, constants, model.g)[0]
-    return constants, K, w, (energy, dot(model.L, model.g)), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
+    kept = values(field, constants, times(J, w), 1.5 - 0.5 * dot(model.g, model.g), model.g, w)[:2]
+    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
 
 
 @trace
@@ -162,9 +168,8 @@ def correct_in_field(field, constants, body, kept, scales, g, a, w):
     """
     J, J_inverse, loose = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
-    V, slope = axial_energy(field, constants, g)
-    e = kept[0] - (0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g))
-    m = kept[1] - n * dot(L, g)
+    energy, momentum, slope = values(field, constants, L, n, g, w)
+    e, m = kept[0] - energy, kept[1] - momentum
     wanted = significant(e, scales[0]), significant(m, scales[1])
     dL, turn = shortest_move(loose, scales, w, L, cross(g, slope), *wanted, g)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))

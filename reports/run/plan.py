@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
+from typing import TypedDict, Unpack
 
 from conservative.benchmarks.studies import engine_selection, random, selection, studies
 from conservative.benchmarks.studies.study import Study
@@ -116,26 +117,36 @@ class Plan:
         return len(self.scenes) * len(self.engines if name in studies.ENGINES else self.methods)
 
 
-def plan_report(
-    scenes: list[str],
-    methods: list[str],
-    quick: bool = False,
-    skip_missing: bool = False,
-    png: bool = False,
-    time_limit: float | None = None,
-    engines: Iterable[str] = (),
-    bodies: int | None = None,
-    seed: int = 0,
-) -> Plan:
+class Extent(TypedDict, total=False):
+    """How much a report measures, by keyword: fields of `Plan`, with engines by name and the number of bodies left open."""
+
+    quick: bool
+    skip_missing: bool
+    png: bool
+    time_limit: float | None
+    engines: Iterable[str]
+    bodies: int | None
+    seed: int
+
+
+def plan_report(scenes: list[str], methods: list[str], **extent: Unpack[Extent]) -> Plan:
     """Return the plan for scenes, methods and engines by name.
 
     No scene stands for the default ones, no method for every registered one, and no engine for none. The number of random
     bodies is by default `BODIES` or `QUICK_BODIES`, and 0 where scenes are named.
     """
-    values = selection.scenes(scenes) if scenes else selection.scenes()
-    chosen = selection.methods(methods or None, skip_missing)
-    competitors = engine_selection.select_engines(engines, skip_missing) if engines else ()
+    quick, skip_missing = extent.get("quick", False), extent.get("skip_missing", False)
+    engines, bodies = extent.get("engines", ()), extent.get("bodies")
     usual = 0 if scenes else QUICK_BODIES if quick else BODIES
-    number = usual if bodies is None else bodies
-    hard = not (scenes or quick)
-    return Plan(values, chosen, quick, skip_missing, png, hard, time_limit, competitors, number, seed)
+    return Plan(
+        scenes=selection.scenes(scenes) if scenes else selection.scenes(),
+        methods=selection.methods(methods or None, skip_missing),
+        quick=quick,
+        skip_missing=skip_missing,
+        png=extent.get("png", False),
+        hard=not (scenes or quick),
+        time_limit=extent.get("time_limit"),
+        engines=engine_selection.select_engines(engines, skip_missing) if engines else (),
+        bodies=usual if bodies is None else bodies,
+        seed=extent.get("seed", 0),
+    )
