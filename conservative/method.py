@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, convert_steps, positive_integer, positive_number, require_memory
+from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory
 from .declarations import Candidacy, Claims, Cost, refuse_time, settings_text
 from .declarations import Role as Role
 from .errors import BadInput
@@ -77,9 +77,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
-    if step > end:
-        raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
+    step = dt if type(dt) is float and SMALLEST <= dt <= end else _read_step(dt, end)
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
     n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
     if n_steps > MOST_STEPS:
@@ -87,6 +85,14 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
     return Grid(step, n_steps, every)
+
+
+def _read_step(dt: object, end: float) -> float:
+    """Return a step, s; raise `BadInput` if it cannot be used, or is longer than the run to `end`, s."""
+    allowed = f"a finite step above 0 and at most t_end = {end:g}, s"
+    if (step := positive_number("dt", dt, allowed)) > end:
+        raise BadInput("dt", f"{step:g}", allowed)
+    return step
 
 
 class Method(ABC):
@@ -176,9 +182,10 @@ class Method(ABC):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
-        Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the scene, which never changes. A run may be called many times and starts afresh each time. Runs that were prepared
-        apart may overlap, in threads; nobody calls one run twice at a time.
+        All that happens once per model belongs before the run, which timing calls, and who has many short runs: a run by itself
+        is not checked, `check(scene, grid, run())` is. What is converted may be kept for later runs of the scene, which never
+        changes. A run may be called many times and starts afresh each time. Runs that were prepared apart may overlap, in
+        threads; nobody calls one run twice at a time.
         """
 
     def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:

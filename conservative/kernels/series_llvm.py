@@ -15,7 +15,7 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INDEX = ir.IntType(32)
 
 
-class _VolatileLoad(ir.instructions.LoadInstr):
+class _VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
     """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
 
     def descr(self, buf):
@@ -85,7 +85,8 @@ class Emitter:
 def sum_to_order(series, numbers, p, h, start, K):
     """What a step of order p, LOWEST to HIGHEST, and length h adds to g, a and w, its last term and the one before.
 
-    Each of them is three fours (x, y, z, anything). `series` forms the coefficients of J^-1 T, of `numbers`, floats and fours. All are of `traced`.
+    Each of them is three fours (x, y, z, anything). `series` forms the coefficients of J^-1 T, of `numbers`, floats and fours.
+    All are of `traced`.
     """
     builder, emit = p.builder, Emitter(p.builder)
     field = series(emit, *(each.ir if each.ir.type == _VECTOR else emit.splat(each.ir) for each in numbers))
