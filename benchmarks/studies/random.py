@@ -12,9 +12,8 @@ taken at up to 17 settings, the same steps for every method with a step, the sam
   takes longer than `LONG` already is timed over the motion itself. All runs of a body are timed in interleaved rounds.
 * Not timed, as that would cost more than all else, is what cannot decide anything: see `worth_timing`.
 
-Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies, four in each
-field). No second truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an
-error, they confirm it.
+Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies). No second
+truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an error, they confirm it.
 """
 
 from __future__ import annotations
