@@ -100,7 +100,6 @@ def _start_series_free(field, constants, g):
     return FreeSeries, ()
 
 
-<<<<<<< HEAD
 class Revolving(NamedTuple):
     """A field that turns with axes D about their second one, and the rate, rad/s."""
 
@@ -122,12 +121,12 @@ def _axial_energy_revolving(field, constants, g):
 def _start_series_revolving(field, constants, g):
     inner, numbers = start_series(field.field, constants, g)
     return partial(TurningSeries, inner), (field.turn, *numbers)
-=======
+
+
 def values(field, constants, L, n, g, w):
     """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
     V, slope = axial_energy(field, constants, g)
     return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
->>>>>>> int13
 
 
 @trace
@@ -136,15 +135,11 @@ def begin(model):
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-<<<<<<< HEAD
-    energy = 0.5 * dot(model.L, w) + axial_energy(field, constants, model.g)[0]
+    n = 1.5 - 0.5 * dot(model.g, model.g)
+    energy, momentum, _ = values(field, constants, times(J, w), n, model.g, w)
     if isinstance(field, Revolving):
-        energy = energy - field.turn * dot(model.L, cross(model.g, model.a))
-    return constants, K, w, (energy, dot(model.L, model.g)), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
-=======
-    kept = values(field, constants, times(J, w), 1.5 - 0.5 * dot(model.g, model.g), model.g, w)[:2]
-    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
->>>>>>> int13
+        energy = energy - field.turn * n * dot(times(J, w), cross(model.g, straighten(model.g, model.a)[1]))
+    return constants, K, w, (energy, momentum), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
 
 
 @trace
