@@ -100,7 +100,6 @@ def _start_series_free(field, constants, g):
     return FreeSeries, ()
 
 
-<<<<<<< HEAD
 class Revolving(NamedTuple):
     """A field that turns with axes D about their second one, and the rate, rad/s."""
 
@@ -122,12 +121,19 @@ def _axial_energy_revolving(field, constants, g):
 def _start_series_revolving(field, constants, g):
     inner, numbers = start_series(field.field, constants, g)
     return partial(TurningSeries, inner), (field.turn, *numbers)
-=======
+
+
 def values(field, constants, L, n, g, w):
     """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
     V, slope = axial_energy(field, constants, g)
     return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
->>>>>>> int13
+
+
+def turning_values(field, constants, L, n, g, upright, w):
+    """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, with g longer by n and a upright."""
+    energy, momentum, slope = values(field, constants, L, n, g, w)
+    o = scale(field.turn * n, cross(g, upright))
+    return energy - dot(L, o), momentum, slope, o
 
 
 @trace
@@ -136,15 +142,13 @@ def begin(model):
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-<<<<<<< HEAD
-    energy = 0.5 * dot(model.L, w) + axial_energy(field, constants, model.g)[0]
+    n, upright, _ = straighten(model.g, model.a)
     if isinstance(field, Revolving):
-        energy = energy - field.turn * dot(model.L, cross(model.g, model.a))
-    return constants, K, w, (energy, dot(model.L, model.g)), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
-=======
-    kept = values(field, constants, times(J, w), 1.5 - 0.5 * dot(model.g, model.g), model.g, w)[:2]
+        jacobi, momentum, *_ = turning_values(field, constants, times(J, w), n, model.g, upright, w)
+        kept = jacobi, momentum
+    else:
+        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
     return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
->>>>>>> int13
 
 
 @trace
@@ -225,9 +229,8 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
     """`correct` where the field turns: the Jacobi integral's gradients are the rates less those of D, and -(T + L x these)."""
     J, J_inverse, _ = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
-    V, slope = axial_energy(field, constants, g)
-    o = scale(field.turn * n, cross(g, upright))
-    e = kept[0] - (0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g) - dot(L, o))
+    jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
+    e = kept[0] - jacobi
     v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
     square = scales[1] * scales[1]
     x = significant(e, scales[0]) / (square * dot(v, v) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY)
