@@ -67,7 +67,7 @@ class Taylor(Method):
         order is not an integer in that range, or tolerance not a finite number above 0.
     """
 
-    order: int = 14  # type: ignore[assignment]
+    order: int = 14
     tolerance: float | None = None
 
     family: ClassVar[str] = "taylor"

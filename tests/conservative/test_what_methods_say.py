@@ -52,7 +52,7 @@ def test_candidates_and_their_cost():
     assert (cv.Taylor.candidacy, cv.Projected.candidacy) == (Candidacy(1, "explicit"), Candidacy(2, "explicit"))
     assert (cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (3, "implicit")
     costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
-    assert costs == [(10, 50), (50, 60), (340, 80)]
+    assert costs == [(10, 50), (90, 32.5), (340, 80)]
     assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
     assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
 
