@@ -70,8 +70,8 @@ def integrate(
     on_failure
         "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
     t_eval
-        By keyword, as `progress`: times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0 to
-        t_end, instead of `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step
+        By keyword, as `progress`: times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0
+        to t_end, instead of `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step
         before it, by short steps that leave nothing but round-off. The run ends with the last sample.
     progress
         Called with a `Progress`, whose text is a line, before a trial run for an `error`: from one second on, and not more
@@ -143,7 +143,9 @@ def _require_choice(error: float, dt: float | None, method: Method | str | None,
     if method is not None:
         raise BadInput("method", describe(method), "None together with error, which chooses the method")
     if dt is not None and at is not None:
-        raise BadInput("dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples")
+        raise BadInput(
+            "dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples"
+        )
 
 
 def _integrate_with(

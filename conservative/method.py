@@ -90,8 +90,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
 def _read_step(dt: object, end: float) -> float:
     """Return a step, s; raise `BadInput` if it cannot be used, or is longer than the run to `end`, s."""
     allowed = f"a finite step above 0 and at most t_end = {end:g}, s"
-    step = positive_number("dt", dt, allowed)
-    if step > end:
+    if (step := positive_number("dt", dt, allowed)) > end:
         raise BadInput("dt", f"{step:g}", allowed)
     return step
 
@@ -183,9 +182,10 @@ class Method(ABC):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
-        Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the scene, which never changes. A run may be called many times and starts afresh each time. Runs that were prepared
-        apart may overlap, in threads; nobody calls one run twice at a time.
+        All that happens once per model belongs before the run, which timing calls, and who has many short runs: a run by itself
+        is not checked, `check(scene, grid, run())` is. What is converted may be kept for later runs of the scene, which never
+        changes. A run may be called many times and starts afresh each time. Runs that were prepared apart may overlap, in
+        threads; nobody calls one run twice at a time.
         """
 
     def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:

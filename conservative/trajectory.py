@@ -125,8 +125,6 @@ class Trajectory:
 
 START_TOLERANCE = 1e-6
 """How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
-
-
 Steps = Any
 """A `conservative.method.Grid`: naming the type would close a circle, as that file imports this one."""
 
@@ -169,10 +167,7 @@ def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) 
 
 
 def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return samples at any times of a run that may be called ok if they may be, too, else those that are good, with the failure.
-
-    `kept` are the names of the invariants that are asked for.
-    """
+    """Return samples at any times of a run, those up to the first that breaks the bounds of invariants of the names `kept`."""
     with np.errstate(all="ignore"):
         return _cut_at_drift(_cut_to_finite(found), kept, bounds)
 

@@ -62,7 +62,7 @@ def read_times(value: object, t_end: float) -> Array:
         They are no numbers, not finite, not in increasing order, not within 0 to t_end, none, or do not fit in memory.
     """
     allowed = f"times (n,), s, in increasing order from 0 to t_end = {t_end:g}, or their number, 2 or more"
-    if isinstance(value, Integral) and not isinstance(value, bool):
+    if not isinstance(value, bool) and isinstance(value, Integral):
         _require_count(int(value), 2, allowed)
         return np.linspace(0.0, t_end, int(value))
     t = real_array(value)
@@ -84,7 +84,9 @@ def _require_count(n: int, least: int, allowed: str) -> None:
     if n < least:
         raise BadInput("t_eval", "none" if n == 0 else f"{n}", allowed)
     if n > most_samples():
-        raise BadInput("t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each")
+        raise BadInput(
+            "t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each"
+        )
 
 
 def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
@@ -114,11 +116,7 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     row = np.searchsorted(found.t, t + SAME * grid.dt, side="right") - 1
     gaps = t - found.t[row]
     gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
-    n = (
-        len(t)
-        if found.ok
-        else int(np.count_nonzero(gaps[row == len(found) - 1] == 0.0) + np.count_nonzero(row < len(found) - 1))
-    )
+    n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
     row, gaps = row[:n], gaps[:n]
     R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
@@ -127,9 +125,10 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
 
 
 def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
-    """Return what follows after gaps (n,), s, on states at times t (n,), s, and how many were moved, before the first that cannot.
+    """Return what follows after gaps (n,), s, on states at times t (n,), s, and how many were moved.
 
-    States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those whose gap is 0 stay as they are, bit for bit.
+    These are all before the first that cannot be. States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those
+    whose gap is 0 stay as they are, bit for bit.
     """
     far = np.flatnonzero(gaps)
     R, w = R_WB.copy(), w_WB_B.copy()
@@ -156,7 +155,7 @@ def _move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tu
 
 
 def into_principal_axes(scene: Scene, start: PrincipalStart, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array]:
-    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes, of attitudes (n, 3, 3) and rates (n, 3), rad/s."""
+    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes: of attitudes (n, 3, 3), rates (n, 3), rad/s."""
     R_BP = scene.body.R_BP
     return np.ascontiguousarray(to_quaternion(R_WB @ R_BP)), np.ascontiguousarray((w_WB_B @ R_BP) * scene.body.moments)
 

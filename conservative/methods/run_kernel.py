@@ -43,19 +43,20 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
         fields["counters"], fields["failure"], fields["choice"] = build_whole(Counters, counts), None, None
         if done == n_steps and to_body_axes(t, q, L, *turn, fields["R_WB"], fields["w_WB_B"]) == n:
             return build_whole(Trajectory, fields)
-        *early, failure = turn_back(start, grid, n if done == n_steps else grid.count_samples(done), q, L)
+        n_good = n if done == n_steps else grid.count_samples(done)
+        fields["t"], fields["R_WB"], fields["w_WB_B"], failure = turn_back(start, grid, n_good, q, L)
         if failure is None:
             kind = WrongBranch if elsewhere else NotConverged
             failure = kind(done + 1, done * grid.dt, size, kernel.FAILURE)
-        return Trajectory(scene, *early, label, fields["counters"], failure)
+        return build_whole(Trajectory, {**fields, "failure": failure})
 
     return run
 
 
 def build_whole(kind: type[Frozen], values: dict[str, Any]) -> Frozen:
-    """Return a frozen value with all of its fields given, in a third of the time that its constructor takes."""
+    """Return a frozen value that has `values` for all its fields, in a third of the time that its constructor takes."""
     made = object.__new__(kind)
-    made.__dict__.update(values)
+    object.__setattr__(made, "__dict__", values)
     return made
 
 

@@ -124,7 +124,7 @@ class Candidate:
         return self.method.cost.least * self.goal.rate * self.goal.duration / step
 
     def expected_work(self, scale: float) -> float:
-        """Return the least work, ns, with which it may reach the goal; that of a method not tried yet is `scale` * its prior."""
+        """Return the least work, ns, with which it may reach the goal; of a method not tried yet `scale` times its prior."""
         if self.hopeless:
             return math.inf
         if not self.attempts:

@@ -109,7 +109,7 @@ def plain(value: Any) -> Any:
 
 
 def tell(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:
-    """Return what calls `progress` before a run: not in the first `QUIET` seconds, and then not more often than each `PAUSE`."""
+    """Return what calls `progress` before a run: not in the first `QUIET` seconds, then each `PAUSE` at most."""
     start, runs, due = clock(), 0, QUIET
 
     def observe(method: Method, grid: Grid) -> None:

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative.declarations import Candidacy, Cost
-from conservative.errors import AccuracyNotReached, MissingEngine
+from conservative.declarations import Cost
+from conservative.errors import AccuracyNotReached
 from conservative.methods import automatic, search, trials
 from conservative.methods.between import Samples
 from conservative.trajectory import Counters
@@ -221,40 +221,3 @@ def test_a_probe_is_short_and_asks_for_its_share():
     Known.taken.clear()
     whole = drive(Known(size=1e-9, power=0), 1e-4, 8.0)
     assert whole.dt == Known.taken[0].dt == 0.5
-
-
-def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
-    def family(name, candidacy, supported=True, missing=False):
-        def settings(cls):
-            if missing:
-                raise MissingEngine(name, "nothing")
-            return (cls(),)
-
-        return dataclass(frozen=True)(
-            type(
-                name,
-                (Known,),
-                {
-                    "family": name,
-                    "candidacy": candidacy,
-                    "candidate_settings": classmethod(settings),
-                    "unsupported": lambda self, scene: None if supported else "no",
-                },
-            )
-        )
-
-    first, second = family("first", Candidacy(2, "group")), family("second", Candidacy(3, "group"))
-    third, none = family("third", Candidacy(1)), family("none", None)
-    exact = family("exact", Candidacy(4, exact=True))
-    gone, other = family("gone", Candidacy(0), missing=True), family("other", Candidacy(0), supported=False)
-
-    def names(*families):
-        monkeypatch.setattr(search.registry, "list_families", lambda: {each.family: each for each in families})
-        return [method.family for method in search.candidates(SCENE)]
-
-    assert names(second, none, first, third, gone, other) == ["third", "first"]
-    assert names(second, first, exact) == ["exact"]
-    assert names(none) == []
-    foreign = family("foreign", Candidacy(0))
-    foreign.role = cv.Role.ENGINE
-    assert names(foreign, first) == ["first"]

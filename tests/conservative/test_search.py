@@ -1,14 +1,16 @@
 """What a search for the cheapest method costs, and what it remembers."""
 
-import dataclasses
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
+from conservative.declarations import Candidacy
+from conservative.errors import MissingEngine
 from conservative.methods import search, trials
 from conservative.outcome import Progress
 
@@ -63,7 +65,7 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
     low, high = Known(size=0.1, power=2, step=10.0), Known(size=0.1, power=8, step=50.0)
     choose(*((high, low) if reverse else (low, high)))
     made = []
-    method, dt = search.find_cheapest(trials.Trials(SCENE, {}, lambda method, grid: made.append((method, grid))), error, 8.0)
+    method, _ = search.find_cheapest(trials.Trials(SCENE, {}, lambda method, grid: made.append((method, grid))), error, 8.0)
     needed = {each: each.cost.least * (0.1 / error * 8) ** (1 / each.power) * 8 for each in (low, high)}
     cheapest = min(needed, key=needed.get)
     assert needed[method] <= search.LENIENCY * needed[cheapest]
@@ -157,7 +159,7 @@ def test_functions_are_the_same_where_they_are_the_same_object():
 
 
 def test_a_field_that_cannot_be_compared_belongs_to_its_scene():
-    @dataclasses.dataclass(frozen=True)
+    @dataclass(frozen=True)
     class Listed:
         values: list
 
@@ -200,3 +202,40 @@ def test_progress_is_told_after_a_second_and_not_too_often():
 def test_estimates_of_what_has_no_samples_are_infinite():
     nothing = cv.Trajectory(SCENE, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), "nothing")
     assert trials.rounding_error(nothing) == math.inf
+
+
+def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
+    def family(name, candidacy, supported=True, missing=False):
+        def settings(cls):
+            if missing:
+                raise MissingEngine(name, "nothing")
+            return (cls(),)
+
+        return dataclass(frozen=True)(
+            type(
+                name,
+                (Known,),
+                {
+                    "family": name,
+                    "candidacy": candidacy,
+                    "candidate_settings": classmethod(settings),
+                    "unsupported": lambda self, scene: None if supported else "no",
+                },
+            )
+        )
+
+    first, second = family("first", Candidacy(2, "group")), family("second", Candidacy(3, "group"))
+    third, none = family("third", Candidacy(1)), family("none", None)
+    exact = family("exact", Candidacy(4, exact=True))
+    gone, other = family("gone", Candidacy(0), missing=True), family("other", Candidacy(0), supported=False)
+
+    def names(*families):
+        monkeypatch.setattr(search.registry, "list_families", lambda: {each.family: each for each in families})
+        return [method.family for method in search.candidates(SCENE)]
+
+    assert names(second, none, first, third, gone, other) == ["third", "first"]
+    assert names(second, first, exact) == ["exact"]
+    assert names(none) == []
+    foreign = family("foreign", Candidacy(0))
+    foreign.role = cv.Role.ENGINE
+    assert names(foreign, first) == ["first"]
