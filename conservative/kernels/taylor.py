@@ -170,12 +170,14 @@ def sizes(scales, last, before):
 @small
 def stretch(tolerance, order, large):
     """By which factor a step may be longer, by the sizes of its last two terms."""
-    return min((tolerance / large[0]) ** (1.0 / order), (tolerance / large[1]) ** (1.0 / (order - 1)))
+    last, before = large[0] + TINY, large[1] + TINY
+    return min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
 
 
 def significant(x, scale):
-    """x, or 0 where it is round-off of that scale."""
-    return where_above(x, ROUND_OFF * scale, abs(x))
+    """x, less in size by what counts as round-off of that scale: a continuous function, which amplifies no noise."""
+    least = ROUND_OFF * scale
+    return where_above(x - least, least, x) + where_above(x + least, least, -x)
 
 
 def straighten(g, a):
