@@ -64,7 +64,7 @@ def kinetic_energy(body: RigidBody, w_WB_B: Array) -> Array:
 
 
 def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B: Array, t: Array) -> Array:
-    """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3), rates (..., 3), rad/s, body axes, and times."""
+    """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3), rates (..., 3), rad/s, and times (...), s."""
     kinetic = kinetic_energy(body, w_WB_B)
     return kinetic if potential is None else kinetic + energy_at(potential, R_WB, t)
 

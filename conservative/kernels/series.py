@@ -8,7 +8,8 @@ sum, for n = 0, 1, ...
 
 A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run from
 the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
-constants that hold the factor h/(n+1).
+constants that hold the factor h/(n+1). Where the axes of the rows turn at a rate u about their second one, g' gains u a, and
+a' loses u g.
 
 What a field adds is its own: an object whose `accelerate` returns J^-1 T'[n], made next to the field's torque. All arithmetic
 is that of an `emit`: `add(c, a, b)` is c + a b, where c may be None for 0, `subtract(c, a, b)` is c - a b, and `store` and
@@ -73,6 +74,17 @@ class FreeSeries:
         return None
 
 
+class TurningSeries:
+    """A field that turns with the axes of g and a: its own recurrence, of the class `inner`, and the rate `turn`."""
+
+    def __init__(self, inner, emit, turn, *numbers):
+        self.turn, self._inner = turn, inner(emit, *numbers)
+
+    def accelerate(self, c, n):
+        """Coefficient n of J^-1 T."""
+        return self._inner.accelerate(c, n)
+
+
 def _sum_inner(emit, c, n):
     """Sums without the newest: both halves of g x w, both of a x w, and w2 w3 and its kin; None where there are no terms."""
     sums = [None] * 5
@@ -112,6 +124,9 @@ def next_coefficients(emit, c, n, h, K, field):
     f1, f2 = emit.times(f, c[0, 4]), emit.times(f, c[0, 5])
     g = _next_row(emit, c, n, 0, g_plus, g_minus, f, f1, f2)
     a = _next_row(emit, c, n, 2, a_plus, a_minus, f, f1, f2)
+    if isinstance(field, TurningSeries):
+        by = emit.times(f, field.turn)
+        g, a = emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
     return g, a, _next_rates(emit, c, n, ww, f, f1, f2, K, field)
 
 

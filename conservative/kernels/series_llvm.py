@@ -15,7 +15,7 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INDEX = ir.IntType(32)
 
 
-class _VolatileLoad(ir.instructions.LoadInstr):
+class _VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
     """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
 
     def descr(self, buf):

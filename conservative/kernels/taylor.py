@@ -5,6 +5,10 @@ is g and a, third and first row of the attitude's matrix against D, and the rate
 
     g' = g x w        a' = a x w        J w' = J w x w + T        T = g x dV/dg
 
+Where the field turns about an axis at right angles to its own, axes D turn with it about their second one at the rate u: then
+g' has u a more and a' has u g less, and the Jacobi integral E - u b.L, b the second row, takes the place of the energy, without
+the momentum about the axis.
+
 The coefficients of a step come from the field's recurrence (`axial`, `series`). After the step g and a are made orthonormal,
 and energy and momentum about the axis are brought back to their values at the start as in `projected`: by Newton's method along
 their gradients with respect to L and to a turn of the body. A momentum about an axis of symmetry, which the series keeps, is
@@ -21,7 +25,7 @@ from typing import Any, NamedTuple
 from . import COMPILED, entry, kernel, small, vector
 from .axial import axial_constants, axial_energy, start_series
 from .protocol import Result, Workspace, find_ends, loosen
-from .series import FreeSeries
+from .series import FreeSeries, TurningSeries
 from .series_numpy import sum_to_order as sum_to_order_numpy
 from .signals import call_handlers, end_of_block
 from .traced import Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
@@ -96,6 +100,29 @@ def _start_series_free(field, constants, g):
     return FreeSeries, ()
 
 
+class Revolving(NamedTuple):
+    """A field that turns with axes D about their second one, and the rate, rad/s."""
+
+    field: Any
+    turn: float
+
+
+@axial_constants.register(Revolving)
+def _axial_constants_revolving(field, J_inverse):
+    return axial_constants(field.field, J_inverse)
+
+
+@axial_energy.register(Revolving)
+def _axial_energy_revolving(field, constants, g):
+    return axial_energy(field.field, constants, g)
+
+
+@start_series.register(Revolving)
+def _start_series_revolving(field, constants, g):
+    inner, numbers = start_series(field.field, constants, g)
+    return partial(TurningSeries, inner), (field.turn, *numbers)
+
+
 def values(field, constants, L, n, g, w):
     """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
     V, slope = axial_energy(field, constants, g)
@@ -108,8 +135,11 @@ def begin(model):
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-    kept = values(field, constants, times(J, w), 1.5 - 0.5 * dot(model.g, model.g), model.g, w)[:2]
-    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
+    n = 1.5 - 0.5 * dot(model.g, model.g)
+    energy, momentum, _ = values(field, constants, times(J, w), n, model.g, w)
+    if isinstance(field, Revolving):
+        energy = energy - field.turn * n * dot(times(J, w), cross(model.g, straighten(model.g, model.a)[1]))
+    return constants, K, w, (energy, momentum), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
 
 
 @trace
@@ -186,6 +216,21 @@ def correct_free(field, constants, body, kept, scales, g, a):
     return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off
 
 
+def correct_revolving(field, constants, body, kept, scales, g, a, w):
+    """`correct` where the field turns: the Jacobi integral's gradients are the rates less those of D, and -(T + L x these)."""
+    J, J_inverse, _ = body
+    L, (n, upright, off) = times(J, w), straighten(g, a)
+    V, slope = axial_energy(field, constants, g)
+    o = scale(field.turn * n, cross(g, upright))
+    e = kept[0] - (0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g) - dot(L, o))
+    v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
+    square = scales[1] * scales[1]
+    x = significant(e, scales[0]) / (square * dot(v, v) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY)
+    dL, turn = scale(x * square, v), scale(-x, T)
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + off
+
+
 @trace
 def correct(field, constants, body, kept, scales, g, a, w):
     """Return (g, a, w, relative defect before) of a state brought closer to orthonormality and to what is `kept`.
@@ -194,6 +239,8 @@ def correct(field, constants, body, kept, scales, g, a, w):
     """
     if isinstance(field, Free):
         return correct_free(field, constants, body, kept, scales, g, a)
+    if isinstance(field, Revolving):
+        return correct_revolving(field, constants, body, kept, scales, g, a, w)
     return correct_in_field(field, constants, body, kept, scales, g, a, w)
 
 

@@ -13,10 +13,11 @@ from ..check import describe, positive_number
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..invariants import momentum_W
+from ..invariants import JACOBI_INTEGRAL, momentum_W
 from ..method import Grid, Method, Role, Run
+from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
-from ..trajectory import Bounds
+from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, start_along
 from .run_kernel import prepare_run
@@ -24,6 +25,8 @@ from .units import in_own_units
 
 LOWEST, HIGHEST = 4, 18
 """Orders that the kernel has code for."""
+RIGHT_ANGLE = 1e-15
+"""Cosine of an angle that is a right one."""
 PARTS = 100
 """Parts of a step that bounds allow for where a tolerance divides it."""
 
@@ -64,7 +67,7 @@ class Taylor(Method):
         order is not an integer in that range, or tolerance not a finite number above 0.
     """
 
-    order: int = 14  # type: ignore[assignment]
+    order: int = 14
     tolerance: float | None = None
 
     family: ClassVar[str] = "taylor"
@@ -72,6 +75,7 @@ class Taylor(Method):
     candidacy: ClassVar[Candidacy] = Candidacy(1, "explicit")
     colour: ClassVar[str] = "green"
     kernel: ClassVar[str] = "taylor"
+    time_dependent: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if isinstance(self.order, bool) or not isinstance(self.order, int) or not LOWEST <= self.order <= HIGHEST:
@@ -81,7 +85,8 @@ class Taylor(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"})
+        momenta = {"momentum", "vertical momentum", "momentum along the field's axis", "axial momentum"}
+        return frozenset({"energy", JACOBI_INTEGRAL, *momenta})
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         parts = 1 if self.tolerance is None else PARTS
@@ -92,7 +97,11 @@ class Taylor(Method):
         return Cost(step=60.0 + 0.55 * self.order**2, correction=40.0)
 
     def unsupported(self, scene: Scene) -> str | None:
-        return None if scene.derive(has_recurrence) else "it is for fields with a recurrence, which functions have not"
+        if not scene.derive(has_recurrence):
+            return "it is for fields with a recurrence, which functions have not"
+        if scene.derive(turning_rate) is None:
+            return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
+        return None
 
     @classmethod
     def variants(cls) -> tuple[Taylor, ...]:
@@ -105,24 +114,48 @@ class Taylor(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
-        return prepare_run(
-            scene, grid, label, start, kernel, model, kernel.Coefficients(self.order, grid.dt, self.tolerance or 0.0)
-        )
+        coefficients = kernel.Coefficients(self.order, grid.dt, self.tolerance or 0.0)
+        run = prepare_run(scene, grid, label, start, kernel, model, coefficients)
+        return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
+
+
+def turn_samples(run: Run, orbit: Orbit) -> Run:
+    """Return a run whose attitudes are turned from the axes of an orbit to the world's."""
+
+    def run_and_turn() -> Trajectory:
+        found = run()
+        return replace(found, R_WB=orbit.R_WO(found.t) @ found.R_WB)
+
+    return run_and_turn
 
 
 def has_recurrence(scene: Scene) -> bool:
     """Return whether a scene has no field or one with a recurrence."""
-    if scene.potential is None:
+    potential = static_part(scene.potential)
+    if potential is None:
         return True
-    return type(scene.potential.kernel_field(scene.body.R_BP)) in kernels("axial").start_series.registry
+    return type(potential.kernel_field(scene.body.R_BP)) in kernels("axial").start_series.registry
+
+
+def turning_rate(scene: Scene) -> float | None:
+    """Return the rate, rad/s, at which the field turns about an axis at right angles to its own: 0 where it does not turn.
+
+    It is None where the axes are at another angle.
+    """
+    if not isinstance(scene.potential, Turning):
+        return 0.0
+    orbit, axis = scene.potential.orbit, scene.potential.potential.axis_W
+    return orbit.rate if axis is not None and abs(axis @ orbit.normal_W) <= RIGHT_ANGLE else None
 
 
 def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start, loose = start_about_symmetry(scene)
-    kernel, R_WD = kernels("taylor"), axes_about(third_axis(scene))
+    kernel, R_WD = kernels("taylor"), axes_of(scene)
     R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
     field = start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L))
+    if isinstance(scene.potential, Turning):
+        field = kernel.Revolving(start.field.field, scene.potential.orbit.rate)
     rows = triple(R_DP[2]), triple(R_DP[0])
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
     return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L)
@@ -138,6 +171,16 @@ def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:
     start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
     along = start.field and start.field._replace(x=0.0, y=0.0)  # a uniform one, along the axis but for round-off
     return replace(start, field=along), (1.0, 1.0, 0.0)
+
+
+def axes_of(scene: Scene) -> Array:
+    """Return the rotation (3, 3) to the world from axes D, of which the third is the field's and, if it turns, it turns about
+    the second.
+    """
+    if not isinstance(scene.potential, Turning):
+        return axes_about(third_axis(scene))
+    second, third = scene.potential.orbit.normal_W, np.asarray(scene.potential.potential.axis_W)
+    return np.stack([np.cross(second, third), second, third], axis=1)
 
 
 def third_axis(scene: Scene) -> Array:

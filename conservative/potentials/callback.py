@@ -80,7 +80,10 @@ def _attitude(R_BP: Array, state: Array) -> Array:
 
 
 def moment(R_0: Array, R: Array, gradient: Array) -> Array:
-    """Return the torque sum_j r_j x (-V*_j) in body axes of the attitude R_0: the skew part of R V*'."""
+    """Return the torque sum_j r_j x (-V*_j), (3,), N m, in body axes of the attitude R_0 (3, 3): the skew part of R V*'.
+
+    R and the gradient are (3, 3), too.
+    """
     product = R @ gradient.T
     torque_W = [product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]]
     return np.array(torque_W) @ R_0

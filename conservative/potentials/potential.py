@@ -79,7 +79,7 @@ class PotentialInTime(Protocol):
         """Return the unit vector (3,), world axes, about which the field is symmetric at all times; None without one."""
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the parameters for the compiled kernels in principal axes."""
+        """Return the parameters for the compiled kernels in principal axes, which R_BP (3, 3) takes to the body's."""
 
 
 AnyPotential = Potential | PotentialInTime

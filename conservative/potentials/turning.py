@@ -30,7 +30,7 @@ class _OrbitFields:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Orbit(_OrbitFields):
-    """Axes O that turn at a constant rate about a normal fixed in the world, as those of a circular orbit; O = W at t = 0.
+    """Axes O that turn at a constant rate, rad/s, about a normal fixed in the world, as in a circular orbit; O = W at t = 0.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Orbit(_OrbitFields):
             That of the satellite: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
         direction_W
             Direction (3,) of the planet, or away from it, at t = 0, world axes: in the plane of the orbit, at right angles to
-            `normal_W`.
+            `normal_W`. What it has along that, up to 1e-9, is taken off.
 
         Raises
         ------
@@ -70,12 +70,12 @@ class Orbit(_OrbitFields):
             It is not; or a parameter is not finite, of another shape, not above 0, or not an inertia.
         """
         found = GravityGradient(self.rate, inertia, direction_W)
+        nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
         if abs(found.direction_W @ self.normal_W) > _ACROSS:
-            nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
             hint = f", such as {nearest.tolist()}" if np.linalg.norm(nearest) > _ACROSS else ""
             allowed = f"a direction in the plane of the orbit, at right angles to {self.normal_W.tolist()}{hint}"
             raise BadInput("direction_W", describe(found.direction_W.tolist()), allowed)
-        return Turning(found, self)
+        return Turning(GravityGradient(self.rate, inertia, nearest), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ class Turning(_Fields):
         return build_unchecked(Turning, potential=convert(energy), orbit=orbit)
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the field that turns as the kernels want it, with the orbit."""
+        """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and the axes O."""
         from ..kernels.field_in_time import start_turning
 
         return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))

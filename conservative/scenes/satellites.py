@@ -22,7 +22,7 @@ import numpy as np
 
 from ..attitude import Array, rotation_about
 from ..body import RigidBody
-from ..check import describe, finite_number, positive_number
+from ..check import describe, finite_number
 from ..errors import BadInput
 from ..potentials.turning import Orbit
 from ..scene import Scene

@@ -95,6 +95,19 @@ def test_the_jacobi_integral_is_kept_and_energy_is_not(field):
     assert np.ptp(by_hand) < 1e-13 * invariant.scale
 
 
+def test_taylor_keeps_the_jacobi_integral_and_follows_projected():
+    found = cv.integrate(scene(t_end=300.0), 0.05, cv.Taylor())
+    assert np.abs(found.drift(found.scene.invariants[0])).max() < 4e-15  # measured 1.1e-15
+    assert np.ptp(found.energy) > 0.01 * found.scene.energy_scale
+    short = cv.integrate(scene(), 0.05, cv.Taylor()), cv.integrate(scene(), 0.0125, cv.Projected(), sample_every=4)
+    assert angle_between(short[0].R_WB, short[1].R_WB).max() < 3e-13
+
+
+def test_taylor_refuses_other_fields_that_turn():
+    assert "right angles" in cv.Taylor().unsupported(scene("spring"))
+    assert "recurrence" in cv.Taylor().unsupported(scene("two functions"))
+
+
 def test_order_eight_in_a_field_that_turns():
     truth = cv.integrate(scene(), 0.005, cv.Projected()).R_WB[-1]
     coarse, fine = (angle_between(truth, cv.integrate(scene(), T_END / n, cv.Projected()).R_WB[-1]) for n in (24, 48))

@@ -7,6 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.declarations import Candidacy
+from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
@@ -27,8 +28,11 @@ AXIS = "momentum along the field's axis"
         (cv.MoserVeselov(4), "moser_veselov:order=4", 4, {"energy", "momentum", "axial momentum"}),
         (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
         (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
-        (cv.Projected(), "projected", 8, {"energy", "vertical momentum", AXIS}),
-        (cv.Taylor(9), "taylor:order=9", 9, {"energy", "momentum", "vertical momentum", AXIS, "axial momentum"}),
+        (cv.Projected(), "projected", 8, {"energy", JACOBI_INTEGRAL, "vertical momentum", AXIS}),
+        (
+            *(cv.Taylor(9), "taylor:order=9", 9),
+            {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", AXIS, "axial momentum"},
+        ),
         (
             cv.Substepped("reduced:order=4"),
             "substepped:method=reduced:order=4",
@@ -48,7 +52,7 @@ def test_candidates_and_their_cost():
     assert (cv.Taylor.candidacy, cv.Projected.candidacy) == (Candidacy(1, "explicit"), Candidacy(2, "explicit"))
     assert (cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (3, "implicit")
     costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
-    assert costs == [(10, 50), (50, 60), (340, 80)]
+    assert costs == [(10, 50), (90, 32.5), (340, 80)]
     assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
     assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
 

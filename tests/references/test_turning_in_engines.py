@@ -1,7 +1,7 @@
 """Fields that turn, in engines and in multi-precision: no two of these write the equations the same way.
 
-`Precise` has the field as a function of time in the world's axes, heyoka and SciPy have it in axes that turn, `Projected` at the
-times of its stages. What each does with the textbook's equations, tests/conservative/test_turning.py has for `Projected`.
+`Precise` has the field as a function of time in the world's axes, heyoka and SciPy have it in axes that turn, `Projected` has it
+at the times of its stages and is compared with the textbook's equations in tests/conservative/test_turning.py.
 """
 
 import numpy as np
@@ -39,6 +39,14 @@ def test_every_formulation_gives_the_same_motion(field):
         )
         assert angle_between(truth.R_WB, found.R_WB).max() < allowed, method.name
         assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 10 * allowed, method.name
+
+
+@pytest.mark.parametrize("method", [cv.Taylor(14), cv.Taylor(18)])
+def test_taylor_in_the_field_of_a_satellite(method):
+    scene = scene_in(TURNING["satellite"])
+    truth, found = cv.integrate(scene, 0.1, Precise(128)), cv.integrate(scene, 0.02, method, sample_every=5)
+    assert angle_between(truth.R_WB, found.R_WB).max() < 1e-13  # measured up to 1.3e-15
+    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 1e-12
 
 
 def test_truth_of_a_satellite_is_multi_precision():
