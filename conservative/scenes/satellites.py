@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..attitude import Array, rotation_about
 from ..body import RigidBody
@@ -145,8 +146,9 @@ def _near_rest(name: str, k1: float, k3: float, disturbance: float, t_end: float
     return _in_orbit(scene, orbit, planet)
 
 
-def _in_orbit(scene: Scene, orbit: Orbit, direction_W: object) -> Scene:
+def _in_orbit(scene: Scene, orbit: Orbit, direction_W: ArrayLike) -> Scene:
     """Return the scene with the gradient of gravity in an orbit, where the planet is in about that direction at the start."""
-    across = np.array(direction_W) - orbit.normal_W @ direction_W * orbit.normal_W
+    direction = np.asarray(direction_W, dtype=float)
+    across = direction - orbit.normal_W @ direction * orbit.normal_W
     field = orbit.gravity_gradient(scene.body.inertia, across)
     return scene.rename(scene.name, potential=field, group="satellite", source=scene.source or SOURCE)
