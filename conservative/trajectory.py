@@ -29,18 +29,14 @@ class Trajectory:
 
     Attributes
     ----------
-    scene
-        What was integrated.
-    t
-        Times (n,), s.
+    scene, t
+        What was integrated, and times (n,), s.
     R_WB
         Attitudes (n, 3, 3), body to world, as the method has them: not tidied up.
     w_WB_B
         Angular velocities (n, 3), rad/s, body axes.
-    label
-        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`.
-    counters
-        Work done.
+    label, counters
+        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`, and work done.
     failure
         What ended the run early, as the exception that `integrate` raises; the samples then end before it. Else None.
     choice

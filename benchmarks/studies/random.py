@@ -4,16 +4,16 @@ The bodies are those of `conservative.scenes.random_body`, whose docstring is th
 taken at up to 17 settings, the same steps for every method with a step, the same tolerances for every one without.
 
 * The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, spread over the motion
-  of the scene: 12 rad at the rate of the start, some 10 to 40 rad turned in fact. Asymmetric bodies in a field amplify errors,
-  and in this time by 10 to 10,000: over a longer one, no method in double precision would reach 1e-12 on every body.
+  of the scene: 12 rad at the rate of the start, 11 to 49 rad turned in fact (nine in ten of 120 bodies). Asymmetric bodies in a
+  field amplify errors: a relative one of the start 15 times at the median, 300 times and more on one body in ten. Over a longer
+  time, on many bodies no method in double precision would reach 1e-12.
 * The time of a setting is that of a whole call of a prepared run, over a motion `DURATIONS` times as long in the same steps, of
   which only the end is kept: what a call costs before its first step is then a few per cent, and decides nothing. A run that
   takes longer than `LONG` already is timed over the motion itself. All runs of a body are timed in interleaved rounds.
 * Not timed, as that would cost more than all else, is what cannot decide anything: see `worth_timing`.
 
-Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies, four in each
-field). No second truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an
-error, they confirm it.
+Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies). No second
+truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an error, they confirm it.
 """
 
 from __future__ import annotations

@@ -129,17 +129,26 @@ def values(field, constants, L, n, g, w):
     return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
 
 
+def turning_values(field, constants, L, n, g, upright, w):
+    """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, with g longer by n and a upright."""
+    energy, momentum, slope = values(field, constants, L, n, g, w)
+    o = scale(field.turn * n, cross(g, upright))
+    return energy - dot(L, o), momentum, slope, o
+
+
 @trace
 def begin(model):
     """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
     K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-    n = 1.5 - 0.5 * dot(model.g, model.g)
-    energy, momentum, _ = values(field, constants, times(J, w), n, model.g, w)
+    n, upright, _ = straighten(model.g, model.a)
     if isinstance(field, Revolving):
-        energy = energy - field.turn * n * dot(times(J, w), cross(model.g, straighten(model.g, model.a)[1]))
-    return constants, K, w, (energy, momentum), (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
+        jacobi, momentum, *_ = turning_values(field, constants, times(J, w), n, model.g, upright, w)
+        kept = jacobi, momentum
+    else:
+        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
+    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
 
 
 @trace
@@ -222,9 +231,8 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
     """`correct` where the field turns: the Jacobi integral's gradients are the rates less those of D, and -(T + L x these)."""
     J, J_inverse, _ = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
-    V, slope = axial_energy(field, constants, g)
-    o = scale(field.turn * n, cross(g, upright))
-    e = kept[0] - (0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g) - dot(L, o))
+    jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
+    e = kept[0] - jacobi
     v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
     square = scales[1] * scales[1]
     x = significant(e, scales[0]) / (square * dot(v, v) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY)

@@ -138,7 +138,7 @@ class Turning(_Fields):
         return build_unchecked(Turning, potential=convert(energy), orbit=orbit)
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and the axes O."""
+        """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and O."""
         from ..kernels.field_in_time import start_turning
 
         return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))

@@ -72,6 +72,11 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
     assert sum(1.5 * each.cost.least * grid.n_steps for each, grid in made) < 40 * needed[method]
 
 
+def test_work_is_extrapolated_from_the_order():
+    candidate = search.Candidate(Known(power=2), search.Goal(2e-9, 8.0, 8.0, 1.0), 0.01, ((0.1, 1e-3),), 2.0)
+    assert candidate.expected_work(1.0) == pytest.approx(2.0 * 80 * 1e3 / search.LENIENCY)
+
+
 def test_the_first_rank_is_tried_first_and_the_hopeless_not_at_all(choose):
     first, never = Known(size=0.1, power=8, step=50.0), Known(size=0.1, power=2, step=49.0)
     choose(first, never)

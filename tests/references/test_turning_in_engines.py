@@ -1,7 +1,7 @@
 """Fields that turn, in engines and in multi-precision: no two of these write the equations the same way.
 
-`Precise` has the field as a function of time in the world's axes, heyoka and SciPy have it in axes that turn, `Projected` has it
-at the times of its stages and is compared with the textbook's equations in tests/conservative/test_turning.py.
+`Precise` has the field as a function of time in the world's axes, heyoka and SciPy have it in axes that turn, `Projected` has
+it at the times of its stages, and is compared with the textbook's equations in tests/conservative/test_turning.py.
 """
 
 import numpy as np
