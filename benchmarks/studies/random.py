@@ -92,10 +92,11 @@ def bodies(number: int, seed: int) -> tuple[Scene, ...]:
 def settings(method: Method) -> tuple[Method, ...]:
     """Return the settings that a family's name stands for, of order `ORDER` at least.
 
-    Of ours they are those that the automatic choice probes, of engines all.
+    Of ours they are those that the automatic choice probes, and those with a tolerance; of engines all.
     """
     approximate = method.candidacy is not None and not method.candidacy.exact
-    ours = method.candidate_settings() if approximate else ()
+    adaptive = (each for each in method.variants() if tolerance_setting(each))
+    ours = (*method.candidate_settings(), *adaptive) if approximate else ()
     found = ours if method.role == Role.OURS else method.variants()
     return tuple(each for each in found if (each.order or ORDER) >= ORDER)
 

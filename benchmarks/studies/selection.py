@@ -12,7 +12,7 @@ from conservative.method import Grid, Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
-TOLERANCES = ("tol", "rtol")
+TOLERANCES = ("tol", "rtol", "tolerance")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
 
 Settings = Callable[[Method], tuple[Method, ...]]

@@ -165,8 +165,10 @@ PASSING = cv.Scene(
 def test_a_tolerance_finds_the_parts_that_a_close_passage_asks_for() -> None:
     exact = Precise(256).prepare(PASSING, cv.Grid(4.0, 1))().R_WB[-1]
     assert not cv.Taylor().run(PASSING, 0.005).ok
-    for order, tolerance, allowed in ((10, 1e-9, 3e-9), (14, 1e-9, 3e-9), (14, 1e-12, 3e-12), (18, 1e-14, 1e-13)):
-        found = cv.Taylor(order, tolerance).run(PASSING, 4.0)
+    for order, tolerance, allowed in ((10, 1e-6, 3e-6), (12, 1e-9, 3e-9), (14, 1e-12, 3e-12), (15, 1e-14, 1e-13)):
+        method = cv.Taylor(tolerance=tolerance)
+        found = method.run(PASSING, 4.0)
+        assert method.terms == order
         assert found.ok
         assert angle_between(exact, found.R_WB[-1]) < allowed
         assert drift(found) < 2e-14  # measured 5e-15
@@ -176,7 +178,8 @@ def test_a_tolerance_finds_the_parts_that_a_close_passage_asks_for() -> None:
 
 def test_a_tolerance_samples_at_the_times_of_the_grid() -> None:
     grid = cv.Grid(0.25, 16, 1)
-    fine, free = cv.Taylor(14, 1e-13).solve(PASSING, grid), cv.Taylor(14, 1e-13).solve(PASSING, cv.Grid(4.0, 1))
+    method = cv.Taylor(tolerance=1e-13)
+    fine, free = method.solve(PASSING, grid), method.solve(PASSING, cv.Grid(4.0, 1))
     exact = Precise(256).prepare(PASSING, grid)()
     np.testing.assert_array_equal(fine.t, grid.t)
     assert angle_between(exact.R_WB, fine.R_WB).max() < 1e-12
@@ -185,7 +188,7 @@ def test_a_tolerance_samples_at_the_times_of_the_grid() -> None:
 
 
 def test_a_loose_tolerance_leaves_steps_whole() -> None:
-    whole, loose = (cv.integrate(scene("gravity"), 0.01, method) for method in (cv.Taylor(), cv.Taylor(tolerance=1.0)))
+    whole, loose = (cv.integrate(scene("gravity"), 0.01, method) for method in (cv.Taylor(6), cv.Taylor(tolerance=1.0)))
     np.testing.assert_array_equal(whole.R_WB, loose.R_WB)
     assert whole.counters == loose.counters
 
@@ -193,13 +196,20 @@ def test_a_loose_tolerance_leaves_steps_whole() -> None:
 @pytest.mark.parametrize("tolerance", [0.0, -1e-9, np.nan, np.inf, "fine", True])
 def test_a_tolerance_is_a_number_above_0(tolerance: object) -> None:
     with pytest.raises(cv.BadInput) as raised:
-        cv.Taylor(14, tolerance)
+        cv.Taylor(tolerance=tolerance)
     assert raised.value.argument == "tolerance"
+
+
+def test_an_order_and_a_tolerance_are_one_too_many() -> None:
+    with pytest.raises(cv.BadInput, match="which chooses the order"):
+        cv.Taylor(14, 1e-9)
+    assert (cv.Taylor().order, cv.Taylor(tolerance=1e-9).order) == (14, None)
+    assert cv.Taylor(tolerance=1e-30).terms == 18
 
 
 def test_the_name_says_the_tolerance() -> None:
     from conservative import registry
 
-    method = cv.Taylor(12, 1e-10)
-    assert method.name == "taylor:order=12,tolerance=1e-10"
+    method = cv.Taylor(tolerance=1e-10)
+    assert method.name == "taylor:tolerance=1e-10"
     assert registry.method(method.name) == method
