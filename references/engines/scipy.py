@@ -98,7 +98,8 @@ class SciPy(Method):
             return finish(y.T, Counters(solver.steps, evaluations=int(found.nfev)), found.message)
 
         def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
-            R_WF = R_WD @ from_quaternion(y[:, :4])
+            with np.errstate(all="ignore"):
+                R_WF = R_WD @ from_quaternion(y[:, :4])
             if turn_D is not None and isinstance(scene.potential, Turning):
                 R_WF = scene.potential.orbit.R_WO(grid.t[: len(y)]) @ R_WF
             return axes.trajectory(grid, self.label, R_WF, y[:, 4:], work, *reason)
@@ -214,5 +215,7 @@ def _general(potential: AnyPotential, axes: Axes) -> Acceleration:
 
 
 def _third_row(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float, float]:
-    """Return the last row of the rotation matrix."""
-    return 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
+    """Return the last row of the rotation matrix: of length one, also within a step that a loose tolerance makes too long."""
+    a, b, c = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
+    square = q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3
+    return a / square, b / square, c / square

@@ -13,6 +13,7 @@ from conservative.references.engines.scipy import SciPy
 from conservative.references.heyoka_equations import formulations, torques
 from conservative.references.heyoka_equations.accelerations import READERS, express_field
 from conservative.references.precise import Precise
+from conservative.scenes.random_body import random_body
 
 from .fields import FIELDS, make_fields, scene_in
 
@@ -93,6 +94,13 @@ def test_scipy_takes_functions_through_their_gradient():
     functions = cv.FunctionPotential(field.energy, field.gradient)
     written_out, called = (SciPy(rtol=1e-12).prepare(scene_in(each), GRID)() for each in (field, functions))
     assert angle_between(written_out.R_WB, called.R_WB).max() < 1e-9  # measured 3e-11, as steps differ
+
+
+@pytest.mark.parametrize("field", ["spring", "attraction"])
+def test_scipy_takes_fields_at_loose_tolerances(field):
+    """Within a step the quaternion is longer than one; a distance made of it as it is would be a root of a negative number."""
+    scene = random_body(field, seed=7, index=1)
+    assert SciPy(rtol=0.1).run(scene, scene.t_end / 12).R_WB.shape == (13, 3, 3)
 
 
 def test_both_take_every_scene_of_the_catalogue():
