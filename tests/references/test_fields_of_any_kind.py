@@ -100,7 +100,8 @@ def test_scipy_takes_functions_through_their_gradient():
 def test_scipy_takes_fields_at_loose_tolerances(field):
     """Within a step the quaternion is longer than one; a distance made of it as it is would be a root of a negative number."""
     scene = random_body(field, seed=7, index=1)
-    assert SciPy(rtol=0.1).run(scene, scene.t_end / 12).R_WB.shape == (13, 3, 3)
+    outcome = SciPy(rtol=0.1).run(scene, scene.t_end / 12).outcome
+    assert outcome.kind is cv.OutcomeKind.NOT_CONSERVED, outcome  # and not an exception from within its steps
 
 
 def test_both_take_every_scene_of_the_catalogue():
