@@ -15,6 +15,7 @@ from .method import Method, grid_for
 from .methods.automatic import integrate_to_error
 from .methods.between import Samples, grid_before, read_times, sample_between
 from .methods.reduced import Reduced
+from .methods.search import candidates
 from .outcome import Progress
 from .scene import Scene
 from .trajectory import Trajectory
@@ -37,6 +38,12 @@ def require_support(method: Method, scene: Scene) -> None:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene it can do ({reason})")
 
 
+def default_method(scene: Scene) -> Method:
+    """Return what a scene is integrated with where nobody names a method."""
+    first = Reduced()
+    return first if first.unsupported(scene) is None else (*candidates(scene), first)[0]
+
+
 def integrate(
     scene: Scene,
     dt: float | None = None,
@@ -57,7 +64,8 @@ def integrate(
     dt
         Step, s, by default 0.01. For adaptive methods, and with `error`, the distance of samples.
     method
-        A method, or its name, as everywhere: `"mujoco@3.6.0:RK4"`. Default `Reduced()`, the paper's map in three unknowns.
+        A method, or its name, as everywhere: `"mujoco@3.6.0:RK4"`. Default `Reduced()`, the paper's map in three unknowns;
+        in fields that depend on the time, the first that the automatic choice tries.
     t_end
         Duration, s; default the scene's. The run ends with the first step at or past it.
     sample_every
@@ -153,7 +161,7 @@ def _integrate_with(
 ) -> Trajectory:
     if isinstance(method, str):
         method = registry.method(method)
-    method = Reduced() if method is None else method
+    method = default_method(scene) if method is None else method
     if not isinstance(method, Method):
         raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
     step = DEFAULT_DT if dt is None else dt

@@ -23,13 +23,16 @@ from .options import FilePath, epilog
 )
 @click.argument("scene", shell_complete=completion.scenes)
 @click.option(
-    "--method", "-m", default=DEFAULT_METHOD, show_default=True, shell_complete=completion.methods, help="Name, with settings."
+    "--method",
+    "-m",
+    shell_complete=completion.methods,
+    help=f"Name, with settings.  [default: {DEFAULT_METHOD}, or one for fields that depend on the time]",
 )
 @click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
 @click.option("--csv", type=FilePath(), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
-def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
+def run(scene: str, method: str | None, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and show how it ended, its drifts and its last state.
 
     Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
@@ -39,7 +42,7 @@ def run(scene: str, method: str, dt: float | None, t_end: float | None, as_json:
     from ..run.single_run import json_text, run_once, summary_text
     from ..terminal.progress import show_waiting
 
-    with show_waiting(f"{scene}: {method}") as expect:
+    with show_waiting(f"{scene}: {method}" if method else scene) as expect:
         summary = run_once(scene, method, dt, t_end, csv, expect)
     click.echo(json_text(summary) if as_json else summary_text(summary))
     if not summary["outcome"].ok:

@@ -17,7 +17,7 @@ from conservative.attitude import orthonormality
 from conservative.benchmarks.measures.timing import wall_time
 from conservative.errors import BadInput
 from conservative.files import text_file
-from conservative.integration import integrate, require_support
+from conservative.integration import default_method, integrate, require_support
 from conservative.invariants import Invariant, sizes
 from conservative.method import Grid, Method, grid_for
 from conservative.presentation import COLUMNS
@@ -38,7 +38,7 @@ STEPS = 10**11
 
 def run_once(
     scene_name: str,
-    method_name: str,
+    method_name: str | None,
     dt: float | None,
     t_end: float | None,
     samples: Path | None,
@@ -53,7 +53,8 @@ def run_once(
     MissingEngine
         The method's engine is not installed.
     """
-    scene, method = registry.scene(scene_name), registry.method(method_name)
+    scene = registry.scene(scene_name)
+    method = registry.method(method_name) if method_name else default_method(scene)
     grid = _bounded_grid(scene, method, scene.dt if dt is None else dt, t_end)
     with text_file(samples, "csv") if samples else nullcontext() as stream:
         if expect is not None:

@@ -207,3 +207,11 @@ def test_the_direction_that_an_error_names_is_accepted():
         orbit.gravity_gradient(INERTIA, (1, 0, 1))
     named = str(caught.value).rpartition("such as ")[2]
     orbit.gravity_gradient(INERTIA, [float(x) for x in named.strip("[]()").split(",")])
+
+
+def test_a_field_that_depends_on_the_time_has_a_default_method():
+    scene = cv.scenes.tumbling_satellite(t_end=60.0)
+    found = cv.integrate(scene, dt=20)
+    assert found.ok
+    assert "reduced" not in found.label
+    assert cv.integrate(cv.scenes.brick_flip(), t_end=0.1).label.endswith("/reduced")
