@@ -96,7 +96,7 @@ def _run(row: EngineRow) -> list[str]:
 
 
 def random_bodies(table: pd.DataFrame) -> Iterator[Sequence[str]]:
-    """Yield the header, and a row for each field and error: each engine's time over ours, mean (worst to best)."""
+    """Yield the header, and a row for each field and engine: its time over ours, mean (worst to best)."""
     header, body = by_engine(contests(table))
     yield header
     yield from ([str(cell) for cell in row] for row in body)

@@ -86,15 +86,12 @@ def records(found: Iterable[Contest]) -> list[dict[str, Any]]:
 
 
 def by_engine(found: Iterable[Contest]) -> Table:
-    """Return mean, worst and best ratio to each engine at `MILESTONES`, a row for each field and error."""
+    """Return mean, worst and best ratio at `MILESTONES`, a row for each field and engine that takes it."""
     chosen = [contest for contest in found if contest.engine != ANY and contest.error in MILESTONES]
-    engines = list(dict.fromkeys(contest.engine for contest in chosen))
-    places = dict.fromkeys((contest.field, contest.error) for contest in chosen)
-    cells = {(contest.field, contest.error, contest.engine): _spread(contest) for contest in chosen}
-    rows = [
-        [field, f"{error:.0e}", *(cells.get((field, error, engine), DASH) for engine in engines)] for field, error in places
-    ]
-    return ["field", "error, rad", *engines], rows
+    cells = {(contest.field, contest.engine, contest.error): _spread(contest) for contest in chosen}
+    places = dict.fromkeys((contest.field, contest.engine) for contest in chosen if contest.pairs)
+    rows = [[*place, *(cells.get((*place, error), DASH) for error in MILESTONES)] for place in places]
+    return ["field", "engine", *(f"{error:.0e}" for error in MILESTONES)], rows
 
 
 def _spread(contest: Contest) -> str:
