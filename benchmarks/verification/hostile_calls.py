@@ -124,7 +124,7 @@ def _use(value: object) -> object:
     if isinstance(value, cv.Grid):
         return value.n_samples < 10**6 and value.t
     if isinstance(value, cv.FunctionPotential | cv.Turning):
-        return cv.integrate(_scene_in(value), 0.1, cv.Projected(), t_end=0.2)
+        return cv.integrate(_scene_in(value), 0.1, t_end=0.2)
     return value
 
 

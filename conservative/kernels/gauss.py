@@ -291,7 +291,7 @@ def remove_round_off(J_inverse, c, loose, kept, size, L, L_carry, g, g_carry):
     if abs(e) <= ROUND_OFF * size and max(abs(m), abs(longer)) <= ROUND_OFF:
         return L, L_carry, g, g_carry
     w, T = times(J_inverse, L), cross(g, c)
-    dL, turn = move(loose, (size, 1.0), w, L, T, e - longer * dot(c, g), m - longer * now[1], g)
+    dL, turn, _ = move(loose, (size, 1.0), w, L, T, e - longer * dot(c, g), m - longer * now[1], g)
     L, L_carry = add_carried(L, L_carry, dL)
     g, g_carry = add_carried(g, g_carry, add(scale(longer, g), cross(g, turn)))
     return L, L_carry, g, g_carry

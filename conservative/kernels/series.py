@@ -32,6 +32,7 @@ class History:
         self._emit, self._values, self._places = emit, [], []
 
     def push(self, value):
+        """Take the next coefficient."""
         self._values.append(value)
         self._places.append(self._emit.store(value))
 
@@ -46,6 +47,7 @@ class Vectors:
         self._emit, self._parts, self.newest = emit, [], ()
 
     def push(self, vectors):
+        """Take the next coefficients, one of each vector."""
         self.newest = vectors
         turned = [self._emit.shuffle(v, places) for v in vectors for places in (TURNED, TWICE)]
         if not self._parts:

@@ -38,8 +38,8 @@ FAILURE = "the step ends too far from the invariants to be projected onto them"
 PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
-ENOUGH = 2.0**-26
-"""Relative defect whose square, which a correction leaves, is round-off."""
+ENOUGH, NOISE = 2.0**-50, 2.0**-46
+"""Relative defect that a correction may leave: round-off, and the defect that round-off alone can make."""
 ROUND_OFF = 2.0**-50
 """Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
@@ -189,7 +189,8 @@ def straighten(g, a):
 def shortest_move(loose, scales, w, L, T, e, m, g):
     """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order, and moves least.
 
-    Gradients are with respect to (L / size, turn): (size w, -T) and (size g, L x g) with the torque T.
+    Gradients are with respect to (L / size, turn): (size w, -T) and (size g, L x g) with the torque T. The third that is
+    returned is the share of e and m that regularisation leaves where it is.
     """
     turn, square = cross(L, g), scales[1] * scales[1]
     w, g = times(loose, w), times(loose, g)
@@ -198,23 +199,25 @@ def shortest_move(loose, scales, w, L, T, e, m, g):
     em = square * dot(w, g) - dot(T, turn)
     over = 1.0 / ((1.0 + DEPENDENT) * (ee * mm) - em * em)
     x, y = over * (mm * e - em * m), over * (ee * m - em * e)
-    return scale(square, add(scale(x, w), scale(y, g))), add(scale(-x, T), scale(y, turn))
+    rest = over * (DEPENDENT * (ee * mm) + FLAT * (scales[0] * scales[0] * mm + square * ee))
+    return scale(square, add(scale(x, w), scale(y, g))), add(scale(-x, T), scale(y, turn)), rest
 
 
 def correct_in_field(field, constants, body, kept, scales, g, a, w):
     """`correct` where a field acts.
 
     The inverse length of g is two terms of its series (`projected.near_unit`), and energy and momentum are taken with g that
-    long to first order, so that no product waits for another. What is left is of the size of the defect's square.
+    long to first order, so that no product waits for another. What is left is of the size of the defect's square, and that
+    share of the defect which regularisation leaves.
     """
     J, J_inverse, loose = body
     L, (n, upright, off) = times(J, w), straighten(g, a)
     energy, momentum, slope = values(field, constants, L, n, g, w)
     e, m = kept[0] - energy, kept[1] - momentum
     wanted = significant(e, scales[0]), significant(m, scales[1])
-    dL, turn = shortest_move(loose, scales, w, L, cross(g, slope), *wanted, g)
+    dL, turn, rest = shortest_move(loose, scales, w, L, cross(g, slope), *wanted, g)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
-    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3] + off
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3] + off, rest
 
 
 def correct_free(field, constants, body, kept, scales, g, a):
@@ -222,9 +225,11 @@ def correct_free(field, constants, body, kept, scales, g, a):
     J_inverse, (n, upright, off) = body[1], straighten(g, a)
     L = scale(n * field.momentum, g)
     e, slope = kept[0] - 0.5 * dot(L, times(J_inverse, L)), cross(times(J_inverse, L), L)
-    turn = scale(significant(e, scales[0]) / (dot(slope, slope) + FLAT * (scales[0] * scales[0]) + TINY), slope)
+    flat = FLAT * (scales[0] * scales[0])
+    over = 1.0 / (dot(slope, slope) + flat + TINY)
+    turn = scale(significant(e, scales[0]) * over, slope)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
-    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off
+    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off, flat * over
 
 
 def correct_revolving(field, constants, body, kept, scales, g, a, w):
@@ -234,18 +239,19 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
     jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
     e = kept[0] - jacobi
     v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
-    square = scales[1] * scales[1]
-    x = significant(e, scales[0]) / (square * dot(v, v) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY)
+    square, flat = scales[1] * scales[1], FLAT * (scales[0] * scales[0])
+    over = 1.0 / (square * dot(v, v) + dot(T, T) + flat + TINY)
+    x = significant(e, scales[0]) * over
     dL, turn = scale(x * square, v), scale(-x, T)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
-    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + off
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + off, flat * over
 
 
 @trace
 def correct(field, constants, body, kept, scales, g, a, w):
-    """Return (g, a, w, relative defect before) of a state brought closer to orthonormality and to what is `kept`.
+    """Return (g, a, w, relative defect before, share left) of a state brought closer to orthonormality and to what is `kept`.
 
-    `body` is (J, J_inverse, loose) of `Model`.
+    `body` is (J, J_inverse, loose) of `Model`; the share is what regularisation leaves of the defect.
     """
     if isinstance(field, Free):
         return correct_free(field, constants, body, kept, scales, g, a)
@@ -279,11 +285,12 @@ def record(q_out, L_out, row, q, L):
 def project(field, constants, body, kept, scales, g, a, w):
     """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
     corrections = 0
-    defect = 1.0
-    while corrections == 0 or (corrections < MOST_CORRECTIONS and ENOUGH < defect < FAR):
-        g, a, w, defect = correct(field, constants, body, kept, scales, g, a, w)
+    defect, left = 1.0, 1.0
+    while corrections == 0 or (corrections < MOST_CORRECTIONS and ENOUGH < left and defect < FAR):
+        g, a, w, defect, rest = correct(field, constants, body, kept, scales, g, a, w)
+        left = defect * defect + min(rest, 1.0) * max(defect - NOISE, 0.0)
         corrections += 1
-    return g, a, w, corrections, defect * defect
+    return g, a, w, corrections, left
 
 
 @partial(kernel, inline="always")

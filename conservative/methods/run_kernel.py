@@ -56,7 +56,7 @@ def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, ker
 def build_whole(kind: type[Frozen], values: dict[str, Any]) -> Frozen:
     """Return a frozen value that has `values` for all its fields, in a third of the time that its constructor takes."""
     made = object.__new__(kind)
-    object.__setattr__(made, "__dict__", values)
+    made.__dict__.update(values)
     return made
 
 

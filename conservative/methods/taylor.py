@@ -32,7 +32,13 @@ PARTS = 100
 
 
 @dataclass(frozen=True)
-class Taylor(Method):
+class _Settings(Method):
+    order: int | None = None  # type: ignore[assignment]
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True, init=False)
+class Taylor(_Settings):
     """The series of the motion in powers of time, each step projected onto the invariants: the cheapest accuracy in a field.
 
     The coefficients of a step follow one from another, as every product in the equations of motion is one of two series; the
@@ -68,9 +74,6 @@ class Taylor(Method):
         order is not an integer in that range, tolerance not a finite number above 0, or both are given.
     """
 
-    order: int | None = None
-    tolerance: float | None = None
-
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(1, "explicit")
@@ -78,16 +81,16 @@ class Taylor(Method):
     kernel: ClassVar[str] = "taylor"
     time_dependent: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        if self.tolerance is not None:
-            positive_number("tolerance", self.tolerance, "a finite number above 0, or None")
-            if self.order is not None:
-                raise BadInput("order", describe(self.order), "None together with tolerance, which chooses the order")
-            return
-        if self.order is None:
-            object.__setattr__(self, "order", DEFAULT)
-        if isinstance(self.order, bool) or not isinstance(self.order, int) or not LOWEST <= self.order <= HIGHEST:
-            raise BadInput("order", describe(self.order), f"an integer from {LOWEST} to {HIGHEST}")
+    def __init__(self, order: int | None = None, tolerance: float | None = None) -> None:
+        if tolerance is not None:
+            positive_number("tolerance", tolerance, "a finite number above 0, or None")
+            if order is not None:
+                raise BadInput("order", describe(order), "None together with tolerance, which chooses the order")
+        elif order is None:
+            order = DEFAULT
+        elif isinstance(order, bool) or not isinstance(order, int) or not LOWEST <= order <= HIGHEST:
+            raise BadInput("order", describe(order), f"an integer from {LOWEST} to {HIGHEST}")
+        super().__init__(order, tolerance)
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -201,7 +204,7 @@ def axes_of(scene: Scene) -> Array:
 
 
 def third_axis(scene: Scene) -> Array:
-    """Return the direction (3,), world axes, of the field's axis; where nothing acts, of the momentum, if there is any."""
+    """Return the direction (3,), a unit vector in world axes, of the field's axis; where nothing acts, of the momentum."""
     axis = field_axis(scene)
     momentum = momentum_W(scene.body, scene.R_WB0, scene.w_WB_B0)
     size = float(np.linalg.norm(momentum))

@@ -64,7 +64,7 @@ METHODS: tuple[Method, ...] = (
     cv.Projected(),
     cv.Taylor(),
     cv.Taylor(5),
-    cv.Taylor(12, 1e-12),
+    cv.Taylor(tolerance=1e-12),
 )
 
 

@@ -133,5 +133,5 @@ def test_the_runner_takes_no_other_number_of_results(values: int) -> None:
     scene = cv.scenes.brick_flip()
     kernel = SimpleNamespace(enter=lambda *loose: (0,) * values, FAILURE="", PAUSE=1)
     run = prepare_run(scene, cv.Grid(0.1, 1), "label", principal_start(scene), kernel, (), ())
-    with pytest.raises(TypeError, match="Result"):
+    with pytest.raises(ValueError, match="to unpack"):
         run()
