@@ -95,8 +95,7 @@ def settings(method: Method) -> tuple[Method, ...]:
     Of ours they are those that the automatic choice probes, and those with a tolerance; of engines all.
     """
     approximate = method.candidacy is not None and not method.candidacy.exact
-    adaptive = (each for each in method.variants() if tolerance_setting(each))
-    ours = (*method.candidate_settings(), *adaptive) if approximate else ()
+    ours = (*method.candidate_settings(), *filter(tolerance_setting, method.variants())) if approximate else ()
     found = ours if method.role == Role.OURS else method.variants()
     return tuple(each for each in found if (each.order or ORDER) >= ORDER)
 

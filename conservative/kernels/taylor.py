@@ -286,7 +286,7 @@ def project(field, constants, body, kept, scales, g, a, w):
     """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
     corrections = 0
     defect, left = 1.0, 1.0
-    while corrections == 0 or (corrections < MOST_CORRECTIONS and ENOUGH < left and defect < FAR):
+    while corrections == 0 or (corrections < MOST_CORRECTIONS and left > ENOUGH and defect < FAR):
         g, a, w, defect, rest = correct(field, constants, body, kept, scales, g, a, w)
         left = defect * defect + min(rest, 1.0) * max(defect - NOISE, 0.0)
         corrections += 1

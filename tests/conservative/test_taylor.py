@@ -139,7 +139,7 @@ def test_a_step_that_overflows_is_a_failure() -> None:
 
 
 def test_samples_do_not_change_the_motion() -> None:
-    for method in (cv.Taylor(), cv.Taylor(10, 1e-10)):
+    for method in (cv.Taylor(), cv.Taylor(tolerance=1e-10)):
         every, few = (cv.integrate(scene("gravity"), 0.05, method, sample_every=n) for n in (1, 7))
         assert np.array_equal(every.R_WB[[0, 7, 14, 21, 28, 35, 40]], few.R_WB)
 
