@@ -33,7 +33,7 @@ PARTS = 100
 
 @dataclass(frozen=True)
 class _Settings(Method):
-    order: int | None = None  # type: ignore[assignment]
+    order: int | None = None
     tolerance: float | None = None
 
 
