@@ -125,7 +125,7 @@ class Taylor(_Settings):
 
     @classmethod
     def candidate_settings(cls) -> tuple[Taylor, ...]:
-        return tuple(cls(order) for order in (8, 14, 18))
+        return tuple(cls(order) for order in (8, 12, 16))
 
     @classmethod
     def suite_settings(cls) -> tuple[Taylor, ...]:
