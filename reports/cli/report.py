@@ -39,7 +39,7 @@ from .options import FilePath, epilog, split_list, split_names
     "--bodies",
     type=click.IntRange(0),
     metavar="N",
-    help="Random bodies in each of four fields.  [default: 3; 2 with --quick, 0 with --scenes]",
+    help="Random bodies in each of four fields.  [default: 3; 1 with --quick, 0 with --scenes]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the random bodies.")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")

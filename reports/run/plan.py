@@ -36,7 +36,7 @@ RENDERING = {"pictures": 6.0, "page": 3.0}
 """How long, s, what comes after the measurements takes, roughly."""
 QUICK = 0.3
 """How much of that a quick report takes."""
-BODIES, QUICK_BODIES = 3, 2
+BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a report, and of a quick one, unless it is told otherwise."""
 
 
