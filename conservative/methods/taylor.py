@@ -19,7 +19,7 @@ from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
-from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, start_along
+from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple
 from .run_kernel import prepare_run
 from .units import in_own_units
 
@@ -182,15 +182,13 @@ def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
 
 
 def start_about_symmetry(scene: Scene) -> tuple[PrincipalStart, Triple]:
-    """Return the start, and which components of L may be changed: not the third where that is the axis of symmetry."""
-    axis_B = scene.symmetry_axis_B
-    if axis_B is None:
+    """Return the start, and which components of L may be changed.
+
+    Where body and field share an axis of symmetry, the frame is that which does not spin, and the third component stays.
+    """
+    if scene.symmetry_axis_B is None:
         return principal_start(scene), (1.0, 1.0, 1.0)
-    J = np.roll(scene.body.moments, 2 - int(np.argmax(np.abs(axis_B @ scene.body.R_BP))))
-    J1, J3 = float(J[0] + J[1]) / 2, float(J[2])
-    start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
-    along = start.field and start.field._replace(x=0.0, y=0.0)  # a uniform one, along the axis but for round-off
-    return replace(start, field=along), (1.0, 1.0, 0.0)
+    return principal_start(scene, "non_spinning"), (1.0, 1.0, 0.0)
 
 
 def axes_of(scene: Scene) -> Array:
