@@ -40,7 +40,7 @@ from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
 from .case import Case, Failure, Success
-from .selection import Missing, at_tolerance, series, tolerance_setting
+from .selection import Missing, at_tolerance, series, takes_exact_steps, tolerance_setting
 from .speed import keep_end
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -151,7 +151,7 @@ def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
     """Return the settings of a line, coarse to fine; the one whose row says so of a method that cannot do the scene."""
     setting, few = tolerance_setting(method), FEW if study.quick else slice(None)
     grid = Grid(scene.t_end / SAMPLES, SAMPLES)
-    if method.unsupported(scene) or (method.order is None and setting is None):
+    if method.unsupported(scene) or takes_exact_steps(method):
         return [Case(study.name, scene, method, grid)]
     if setting is None:
         return [Case(study.name, scene, method, Grid(scene.t_end / n, n, n // SAMPLES)) for n in STEPS[few]]

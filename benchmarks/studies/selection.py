@@ -113,6 +113,11 @@ def tolerance_setting(method: Method) -> str | None:
     return next((field.name for field in fields(_value(method)) if field.name in TOLERANCES), None)
 
 
+def takes_exact_steps(method: Method) -> bool:
+    """Return whether steps have no truncation error: neither a step nor a tolerance trades accuracy for time."""
+    return method.order is None and tolerance_setting(method) is None
+
+
 def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
     """Return the method with another tolerance."""
     changed: Method = replace(_value(method), **{setting: tolerance})

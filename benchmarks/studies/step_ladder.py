@@ -9,7 +9,7 @@ import numpy as np
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 
-from .selection import tolerance_setting
+from .selection import takes_exact_steps
 
 SAMPLES = 12
 """Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
@@ -26,8 +26,7 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
 def intervals(method: Method) -> int:
     """Return the number of intervals between the samples of a method: the fewer, the longer a step can be."""
-    without_truncation = method.order is None and tolerance_setting(method) is None
-    return HIGH_SAMPLES if without_truncation or (method.order or 0) >= HIGH_ORDER else SAMPLES
+    return HIGH_SAMPLES if takes_exact_steps(method) or (method.order or 0) >= HIGH_ORDER else SAMPLES
 
 
 def samples(scene: Scene, method: Method) -> Grid:

@@ -16,6 +16,7 @@ from pathlib import Path
 import pandas as pd
 
 from conservative import registry
+from conservative.benchmarks.studies.selection import takes_exact_steps
 from conservative.method import Role
 
 from ..labels import with_names
@@ -32,7 +33,7 @@ OURS, EXACT = "ours", "ours, exact step"
 def groups(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Return the measured points of ours, of our exact steps, and of each engine under its name with its version."""
     ours = found[found["role"] == Role.OURS.value]
-    exact = ours["method"].map(lambda name: registry.method(name).order is None).astype(bool)
+    exact = ours["method"].map(lambda name: takes_exact_steps(registry.method(name))).astype(bool)
     engines = found[found["role"] == Role.ENGINE.value]
     members = {" ".join(map(str, key)): rows for key, rows in engines.groupby(["family", "version"], sort=False)}
     return {OURS: ours[~exact], EXACT: ours[exact], **members}
