@@ -56,13 +56,9 @@ def at_time(field, t):
     return field
 
 
-def _stay(field, t):
-    return field
-
-
-@overload(at_time, jit_options=SMALL)
-def _choose_to_stay(field, t):
-    return None if getattr(field, "instance_class", None) in at_time.registry else _stay
+overload(at_time, jit_options=SMALL)(
+    lambda field, t: None if getattr(field, "instance_class", None) in at_time.registry else lambda field, t: field
+)
 
 
 @singledispatch

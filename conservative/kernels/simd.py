@@ -9,8 +9,8 @@ from __future__ import annotations
 from . import COMPILED
 
 if COMPILED:
-    from .simd_llvm import LANES, four, fuse, join, lane, larger_size, put, splat, spread
+    from .simd_llvm import LANES, four, fuse, join, lane, put, splat, spread
 else:
-    from .simd_numpy import LANES, four, fuse, join, lane, larger_size, put, splat, spread  # type: ignore[assignment]
+    from .simd_numpy import LANES, four, fuse, join, lane, put, splat, spread  # type: ignore[assignment]
 
-__all__ = ["LANES", "four", "fuse", "join", "lane", "larger_size", "put", "splat", "spread"]
+__all__ = ["LANES", "four", "fuse", "join", "lane", "put", "splat", "spread"]

@@ -113,17 +113,6 @@ def fuse(typing, a, b, c):
 
 
 @intrinsic
-def larger_size(typing, a, b):
-    """max(|a|, b) in each place; not a number in a stays so."""
-
-    def build(context, builder, sig, args):
-        size = _call(builder, "llvm.fabs", args[0])
-        return builder.select(builder.fcmp_ordered("<=", size, args[1]), args[1], size)
-
-    return FOUR(FOUR, FOUR), build
-
-
-@intrinsic
 def lane(typing, a, index):
     """One of the four floats."""
     return types.float64(FOUR, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)

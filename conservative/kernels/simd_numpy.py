@@ -32,11 +32,6 @@ def fuse(a, b, c):
     return a * b + c
 
 
-def larger_size(a, b):
-    """max(|a|, b) in each place; not a number in a stays so."""
-    return np.where(np.abs(a) <= b, b, np.abs(a))
-
-
 def lane(a, index):
     """One of the four floats."""
     return float(a[index])

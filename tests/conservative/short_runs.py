@@ -29,7 +29,7 @@ BASES = ("finite_torque", "energy", "body_torque", "finite_derivative", "slope",
 """Functions that fields implement, and what registers them."""
 
 
-def in_field(name: str, potential: cv.Potential) -> cv.Scene:
+def in_field(name: str, potential: cv.Potential | cv.Turning) -> cv.Scene:
     """A body without symmetry in a field."""
     return cv.Scene(name, BODY, rotation_about((1, 0.2, -1), 0.7), (0.3, -2.0, 1.0), 2.0, potential)
 
@@ -37,6 +37,10 @@ def in_field(name: str, potential: cv.Potential) -> cv.Scene:
 def scenes() -> list[cv.Scene]:
     """A scene of each kind of field; free ones in axes of their own and not, at rest, and on polhodes about either axis."""
     quartic = cv.FunctionPotential(lambda R: (R[2] @ HOOK) ** 4, lambda R: np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK))
+    growing = cv.FunctionPotential(
+        lambda R, t: (1 + t) * R[2] @ HOOK, lambda R, t: (1 + t) * np.outer([0, 0, 1], HOOK), time_dependent=True
+    )
+    orbit = cv.Orbit(0.7, (0, 0, 1))
     return [
         cv.scenes.brick_flip(),
         cv.Scene("about the least axis", BODY, TURN, TURN @ [2.0, 0.1, 0.2], 2.0),
@@ -49,6 +53,8 @@ def scenes() -> list[cv.Scene]:
         in_field("attracted", cv.PointAttraction(2.0, (0.2, 0.1, 0.4), (1.5, 0.0, 0.3))),
         in_field("gradient", cv.GravityGradient(0.7, BODY.inertia, (1, 0, 1))),
         in_field("function", quartic),
+        in_field("growing", growing).rename("growing", dt=1e-3),  # nothing holds its energy where steps are long
+        in_field("satellite", orbit.gravity_gradient(BODY.inertia, (1, 0, 0))),
     ]
 
 
@@ -77,6 +83,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
+        yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_end=8 * scene.dt, t_eval=5)
 
 
 def numbers(trajectory: cv.Trajectory) -> np.ndarray:
