@@ -203,7 +203,7 @@ def _uniform(axes: Axes) -> Acceleration:
 
 def _written_out(field: FieldInAxes) -> Acceleration:
     parameters = tuple(field.parameters)
-    return lambda _, *q: field.acceleration(parameters, _third_row(*q))
+    return lambda _, *q: field.acceleration(parameters, _unit_row(*q))
 
 
 def _general(potential: AnyPotential, axes: Axes) -> Acceleration:
@@ -215,7 +215,12 @@ def _general(potential: AnyPotential, axes: Axes) -> Acceleration:
 
 
 def _third_row(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float, float]:
-    """Return the last row of the rotation matrix: of length one, also within a step that a loose tolerance makes too long."""
-    a, b, c = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
-    square = q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3
-    return a / square, b / square, c / square
+    """Return the last row of the rotation matrix."""
+    return 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
+
+
+def _unit_row(*q: float) -> tuple[float, float, float]:
+    """Return it of length one, also within a step that a loose tolerance makes too long: roots are taken of what follows."""
+    g1, g2, g3 = _third_row(*q)
+    square = sum(x * x for x in q)
+    return g1 / square, g2 / square, g3 / square

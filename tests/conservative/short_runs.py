@@ -83,7 +83,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
-        yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_end=8 * scene.dt, t_eval=5)
+        yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_eval=(0.3 * scene.dt, 7.7 * scene.dt))
 
 
 def numbers(trajectory: cv.Trajectory) -> np.ndarray:
