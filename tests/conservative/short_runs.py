@@ -25,7 +25,8 @@ TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
 OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in ("signals", "simd", "simd_llvm", "series_llvm")))
 """Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
-BASES = ("at_time", "finite_torque", "energy", "body_torque", "finite_derivative", "slope", "implements")
+BASES = ("at_time", "axial_constants", "axial_energy", "start_series", "finite_torque", "energy", "body_torque")
+BASES += ("finite_derivative", "slope", "implements")
 """Functions that fields implement, and what registers them."""
 
 
