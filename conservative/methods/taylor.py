@@ -77,7 +77,7 @@ class Taylor(_Settings):
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(1, "explicit")
-    colour: ClassVar[str] = "green"
+    colour: ClassVar[str] = "#7B61FF"
     kernel: ClassVar[str] = "taylor"
     time_dependent: ClassVar[bool] = True
 

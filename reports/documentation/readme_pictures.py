@@ -40,6 +40,7 @@ TIMED_SCENE, TIMED = (
         "reduced:order=6",
         "gauss",
         "projected",
+        "taylor",
         "heyoka:frame=base_vectors",
         "mujoco:Euler",
         "mujoco:RK4",
