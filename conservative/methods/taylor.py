@@ -121,7 +121,7 @@ class Taylor(_Settings):
 
     @classmethod
     def variants(cls) -> tuple[Taylor, ...]:
-        return (cls(8), cls(16), cls(tolerance=1e-9))
+        return (*cls.candidate_settings(), cls(tolerance=1e-9))
 
     @classmethod
     def candidate_settings(cls) -> tuple[Taylor, ...]:

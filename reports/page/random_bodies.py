@@ -21,5 +21,5 @@ def figure(view: RandomView, picture: Any) -> PageFigure:
     """Return the figure of the page, made of the same picture."""
     title = "Random bodies: the cheapest engine's time over ours"
     band = "Line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster."
-    summary = f"{view.bodies} bodies in each field. {band}"
+    summary = f"Bodies in each field: {view.bodies}. {band}"
     return PageFigure(NAME, title, summary, tuple(vega_embed.embed(picture, (), 220)), ())

@@ -42,7 +42,7 @@ def folder(plan, tmp_path_factory):
 def test_random_bodies_come_before_the_scenes(folder, file, then):
     text = (folder / file).read_text(encoding="utf-8")
     assert 0 < text.index(SECTION) < text.index(then)
-    assert "2 bodies in each field, from seed 7" in " ".join(text.split())
+    assert "Bodies in each field: 2, from seed 7" in " ".join(text.split())
     assert "over 2 bodies the cheapest engine takes" in text
     assert "0.50" in text
 
