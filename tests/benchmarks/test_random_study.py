@@ -71,6 +71,11 @@ def test_all_settings_are_read_at_the_same_instants():
     assert all(np.allclose(t, times[0], rtol=1e-12, atol=0) for t in times)
 
 
+def test_ours_with_a_tolerance_are_among_the_settings():
+    assert [each.tolerance for each in random.settings(cv.Taylor())] == [None, None, None, 1e-9]
+    assert not random.settings(cv.MoserVeselov())
+
+
 def test_both_sides_have_as_many_settings():
     study = Study("random", (BODY,), METHODS)
     assert [len(random.cases(study, BODY, each)) for each in METHODS] == [17, 17]

@@ -30,6 +30,11 @@ def test_each_cell_is_the_cheapest_of_its_group():
     assert body[2][2:] == ["–", "**2** lame", "–"]
 
 
+def test_a_step_that_a_tolerance_divides_is_not_exact():
+    adaptive = point("taylor:tolerance=1e-06", "ours", 1e-10, 1e-6)
+    assert written(adaptive, EXACT)[1][2:] == ["**1** taylor tolerance=1e-06", "2 lame"]
+
+
 def test_without_an_engine_there_is_no_column_of_one():
     assert written(EXACT)[0] == ["scene", "error, rad", "ours", "ours, exact step"]
 
