@@ -213,3 +213,16 @@ def test_the_name_says_the_tolerance() -> None:
     method = cv.Taylor(tolerance=1e-10)
     assert method.name == "taylor:tolerance=1e-10"
     assert registry.method(method.name) == method
+
+
+PARALLEL = [("lagrange_top", 8, 0.04), ("lagrange_top", 6, 0.01), ("simo_wong_top", 6, 0.16)]
+
+
+@pytest.mark.parametrize(("name", "order", "dt"), PARALLEL)
+def test_steps_are_corrected_until_nothing_is_left_near_steady_precessions(name: str, order: int, dt: float) -> None:
+    """Gradients are nearly parallel there, and a correction leaves a share of the defect: judged by its square, 1e-13 or more."""
+    from conservative import registry
+
+    found = cv.Taylor(order).solve(registry.scene(name), cv.Grid(dt, 60))
+    assert found.ok
+    assert drift(found) < 2e-14  # measured 5e-15
