@@ -220,7 +220,7 @@ PARALLEL = [("lagrange_top", 8, 0.04), ("lagrange_top", 6, 0.01), ("simo_wong_to
 
 @pytest.mark.parametrize(("name", "order", "dt"), PARALLEL)
 def test_steps_are_corrected_until_nothing_is_left_near_steady_precessions(name: str, order: int, dt: float) -> None:
-    """Gradients are nearly parallel there, and a correction leaves a share of the defect: judged by its square, 1e-13 or more."""
+    """Gradients are nearly parallel there, so that a correction leaves a share of the defect: unnoticed, 1e-13 or more."""
     from conservative import registry
 
     found = cv.Taylor(order).solve(registry.scene(name), cv.Grid(dt, 60))
