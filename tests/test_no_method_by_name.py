@@ -44,7 +44,7 @@ ALLOWED = {
     "benchmarks/verification/third_truth.py": ("exact orekit precise", "the solutions that are compared, and who decides"),
     "benchmarks/verification/worker_kills.py": ("exudyn", "default of an option"),
     "reports/documentation/readme_pictures.py": (
-        "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy",
+        "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy taylor",
         "what the pages picture",
     ),
     "reports/run/provenance.py": ("heyoka mujoco scipy", "packages whose versions a report names"),
