@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .errors import PotentialFailed as PotentialFailed
     from .errors import Unsupported as Unsupported
     from .errors import WrongBranch as WrongBranch
-    from .integration import integrate as integrate
+    from .integration.one import integrate as integrate
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -102,7 +102,7 @@ _PLACES = {
     "UniformGravity": "potentials.uniform_gravity",
     "Unsupported": "errors",
     "WrongBranch": "errors",
-    "integrate": "integration",
+    "integrate": "integration.one",
 }
 
 __all__ = [

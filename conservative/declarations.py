@@ -9,6 +9,8 @@ from enum import StrEnum
 from functools import lru_cache, wraps
 from typing import Any
 
+from .version import VERSION
+
 
 class Role(StrEnum):
     """Which side a method is on."""
@@ -150,3 +152,17 @@ def refuse_time(unsupported: Callable[[Any, Any], str | None]) -> Callable[[Any,
         return unsupported(method, scene)
 
     return reason
+
+
+@lru_cache(maxsize=256)
+def maker_of(kind: type) -> str:
+    """Return name and version of the package that a class is from."""
+    package = kind.__module__.partition(".")[0]
+    if package == __package__:
+        return f"{package}=={VERSION}"
+    from importlib import metadata
+
+    try:
+        return f"{package}=={metadata.version(package)}"
+    except metadata.PackageNotFoundError:
+        return package

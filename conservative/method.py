@@ -6,19 +6,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .attitude import Array
 from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory
-from .declarations import Candidacy, Claims, Cost, refuse_time, settings_text
+from .declarations import Candidacy, Claims, Cost, maker_of, refuse_time, settings_text
 from .declarations import Role as Role
 from .errors import BadInput
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, accept
-from .version import VERSION
 
 Run = Callable[[], Trajectory]
 
@@ -145,7 +143,7 @@ class Method(ABC):
 
         By default that is the package the class is from, with its version where one of that name is installed.
         """
-        return f"{_maker(type(self))}/{self.name}"
+        return f"{maker_of(type(self))}/{self.name}"
 
     @property
     @abstractmethod
@@ -187,6 +185,14 @@ class Method(ABC):
         changes. A run may be called many times and starts afresh each time. Runs that were prepared apart may overlap, in
         threads; nobody calls one run twice at a time.
         """
+
+    def prepare_many(self, bodies: Any, grid: Grid) -> Any:
+        """Return the run of `Bodies` (`conservative.methods.many`), which gives a `Block`; None where each has to run alone.
+
+        Runs that were prepared apart overlap in threads, and give the same numbers whatever else runs and whoever the
+        neighbours are.
+        """
+        return None
 
     def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
         """Return what a run of this method gave if it may be called ok, else what is good of it, with the failure.
@@ -234,17 +240,3 @@ class Method(ABC):
             dt or t_end is not a finite number above 0, dt is larger than t_end, or sample_every is not an integer of 1 or more.
         """
         return self.solve(scene, grid_for(scene, dt, t_end, sample_every))
-
-
-@lru_cache(maxsize=256)
-def _maker(kind: type) -> str:
-    """Return name and version of the package that a class is from."""
-    package = kind.__module__.partition(".")[0]
-    if package == __package__:
-        return f"{package}=={VERSION}"
-    from importlib import metadata
-
-    try:
-        return f"{package}=={metadata.version(package)}"
-    except metadata.PackageNotFoundError:
-        return package

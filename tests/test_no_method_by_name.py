@@ -16,7 +16,7 @@ ALLOWED = {
     "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped taylor", "the public names"),
     "conservative/deferred_imports.py": ("reduced", "the default of every option that names a method"),
     "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
-    "conservative/integration.py": ("reduced", "the default of `integrate`"),
+    "conservative/integration/one.py": ("reduced", "the default of `integrate`"),
     "conservative/methods/moser_veselov.py": ("exact", "one of its orders"),
     "conservative/methods/reduced.py": ("convected mujoco", "goals of its speed, and the paper's form that it agrees with"),
     "conservative/methods/substepped.py": ("reduced", "the default that it divides"),

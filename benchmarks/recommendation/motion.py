@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
-from conservative.integration import integrate
+from conservative.integration.one import integrate
 from conservative.method import Grid, Method
 from conservative.methods.units import bound_rate
 from conservative.references.exact.method import Exact

@@ -15,7 +15,7 @@ from conservative.benchmarks.studies.speed import keep_end, lengthen
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import Point
 from conservative.deferred_imports import kernels
-from conservative.integration import integrate
+from conservative.integration.one import integrate
 from conservative.method import Method, Role, grid_for
 from conservative.registry import list_families
 from conservative.registry import method as named

@@ -17,7 +17,7 @@ import click
 
 from conservative import registry
 from conservative.deferred_imports import kernels
-from conservative.integration import integrate
+from conservative.integration.one import integrate
 from conservative.method import Grid, Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

@@ -26,7 +26,7 @@ from conservative import registry
 from conservative.attitude import Array, rotation_about
 from conservative.body import RigidBody
 from conservative.errors import MissingEngine
-from conservative.integration import integrate
+from conservative.integration.one import integrate
 from conservative.method import Method, Role
 from conservative.potentials.python_function import FunctionPotential
 from conservative.scene import Scene

@@ -17,7 +17,7 @@ from conservative.attitude import orthonormality
 from conservative.benchmarks.measures.timing import wall_time
 from conservative.errors import BadInput
 from conservative.files import text_file
-from conservative.integration import default_method, integrate, require_support
+from conservative.integration.one import default_method, integrate, require_support
 from conservative.invariants import Invariant, sizes
 from conservative.method import Grid, Method, grid_for
 from conservative.presentation import COLUMNS

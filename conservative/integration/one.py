@@ -7,18 +7,18 @@ from typing import Literal, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
-from . import registry
-from .attitude import Array
-from .check import MOST_STEPS, choice, describe, positive_integer, positive_number
-from .errors import BadInput, Unsupported
-from .method import Method, grid_for
-from .methods.automatic import integrate_to_error
-from .methods.between import Samples, grid_before, read_times, sample_between
-from .methods.reduced import Reduced
-from .methods.search import candidates
-from .outcome import Progress
-from .scene import Scene
-from .trajectory import Trajectory
+from .. import registry
+from ..attitude import Array
+from ..check import MOST_STEPS, choice, describe, positive_integer, positive_number
+from ..errors import BadInput, Unsupported
+from ..method import Method, grid_for
+from ..methods.automatic import integrate_to_error
+from ..methods.between import Samples, grid_before, read_times, sample_between
+from ..methods.reduced import Reduced
+from ..methods.search import candidates
+from ..outcome import Progress
+from ..scene import Scene
+from ..trajectory import Trajectory
 
 DEFAULT_DT = 0.01
 """Step, s, where nobody names one: the paper's."""
