@@ -9,33 +9,81 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from . import kernel, small
 from .lanes_llvm import choose, every, fill_like, lane_of, load, save, true_in, with_lane
 from .reduced import (
     FEW, NEAR, NEAR_ZERO, REST, SMOOTH, add_momentum, continue_branch, explicit_guess, extrapolate, final_correction,
     inverse_tangent, residual, turn_attitude,
 )
-from .vector import apply, cross, dot, subtract
+from .vector import accumulate, apply, cross, dot, scale, subtract, times
 
 
 @small
-def solve(h, J, field, q, L, carry, guess, near, tolerance):
-    """As `reduced.newton_solve`, with a mask of the lanes to trust; not to trust are those of which it is false."""
-    a, iteration = guess, 0
-    while True:
-        rows = inverse_tangent(h, J, field, q, a)
-        correction = apply(rows, residual(h, J, field, q, L, a))
-        a = subtract(a, correction)
-        square = dot(correction, correction)
-        aa = dot(a, a) + REST
-        near_enough = square <= tolerance * aa
-        iteration += 1
-        if iteration == FEW or every(near_enough):
-            break
-    away = subtract(a, guess)
-    trusted = near_enough & (dot(away, away) <= near * aa + NEAR_ZERO) & (dot(rows[0], cross(rows[1], rows[2])) > 0.0)
-    a, gain = final_correction(h, J, field, q, L, carry, rows, a)
-    return a, gain, iteration + 1, trusted
+def choose_vector(mask, a, b):
+    """a or b for each body."""
+    return (choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2]))
+
+
+@small
+def tangent_and_determinant(J, a):
+    """As `inverse_tangent` of a free body, with one over the determinant."""
+    Ja = times(J, a)
+    k0 = (J[0], a[2] * J[0] - Ja[2], Ja[1] - a[1] * J[0])
+    k1 = (Ja[2] - a[2] * J[1], J[1], a[0] * J[1] - Ja[0])
+    k2 = (a[1] * J[2] - Ja[1], Ja[0] - a[0] * J[2], J[2])
+    k12 = cross(k1, k2)
+    over = 1.0 / dot(k0, k12)
+    return (scale(over, k12), scale(over, cross(k2, k0)), scale(over, cross(k0, k1))), over
+
+
+@small
+def solve(h, J, q, L, carry, guess, near, tolerance):
+    """As `reduced.newton_solve`, with a mask of the lanes to trust.
+
+    Almost always one correction is enough for all, and there is no other branch. A lane that is done is left as it is while
+    others go on: its result does not depend on its neighbours. After one correction the answer is as near to the guess as the
+    correction is small.
+    """
+    rows, over = tangent_and_determinant(J, guess)
+    correction = apply(rows, residual(h, J, None, q, L, guess))
+    a = subtract(guess, correction)
+    enough = dot(correction, correction) <= tolerance * (dot(a, a) + REST)
+    iterations, close = 1, enough
+    while iterations < FEW and not every(enough):
+        new_rows, new_over = tangent_and_determinant(J, a)
+        correction = apply(new_rows, residual(h, J, None, q, L, a))
+        a = choose_vector(enough, a, subtract(a, correction))
+        rows = (
+            choose_vector(enough, rows[0], new_rows[0]),
+            choose_vector(enough, rows[1], new_rows[1]),
+            choose_vector(enough, rows[2], new_rows[2]),
+        )
+        over = choose(enough, over, new_over)
+        aa, away = dot(a, a) + REST, subtract(a, guess)
+        enough = enough | (dot(correction, correction) <= tolerance * aa)
+        close = dot(away, away) <= near * aa + NEAR_ZERO
+        iterations += 1
+    a, gain = final_correction(h, J, None, q, L, carry, rows, a)
+    return a, gain, iterations + 1, enough & close & (over > 0.0)
+
+
+@small
+def turn(a, q, carry):
+    """As `turn_attitude`, without products by zero."""
+    square = dot(a, a)
+    root = math.sqrt(1.0 + square)
+    c = -square / (root * (1.0 + root))
+    p0 = -(q[1] * a[0] + q[2] * a[1] + q[3] * a[2])
+    p1 = q[0] * a[0] + (q[2] * a[2] - q[3] * a[1])
+    p2 = q[0] * a[1] + (q[3] * a[0] - q[1] * a[2])
+    p3 = q[0] * a[2] + (q[1] * a[1] - q[2] * a[0])
+    w, cw = accumulate(q[0], carry[0], p0 + c * (q[0] + p0))
+    x, cx = accumulate(q[1], carry[1], p1 + c * (q[1] + p1))
+    y, cy = accumulate(q[2], carry[2], p2 + c * (q[2] + p2))
+    z, cz = accumulate(q[3], carry[3], p3 + c * (q[3] + p3))
+    return (w, x, y, z), (cw, cx, cy, cz)
 
 
 @small
@@ -51,9 +99,16 @@ def replace(v, index, x):
 
 
 @small
-def choose_vector(mask, a, b):
-    """a or b for each body."""
-    return (choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2]))
+def extrapolate_ring(ring, first, width, newest):
+    """As `extrapolate` for all components: the second newest (3 vectors) is at `first`, older ones follow."""
+    step = 3 * width
+    b, c, d = load3(ring, width, first, width), load3(ring, width, first + step, width), load3(ring, width, first + 2 * step, width)
+    e, f = load3(ring, width, first + 3 * step, width), load3(ring, width, first + 4 * step, width)
+    return (
+        ((20.0 * c[0] - 15.0 * (b[0] + d[0])) + (6.0 * e[0] - f[0])) + 6.0 * newest[0],
+        ((20.0 * c[1] - 15.0 * (b[1] + d[1])) + (6.0 * e[1] - f[1])) + 6.0 * newest[1],
+        ((20.0 * c[2] - 15.0 * (b[2] + d[2])) + (6.0 * e[2] - f[2])) + 6.0 * newest[2],
+    )
 
 
 @small
@@ -86,6 +141,7 @@ def _make_march(width):
         tolerance = tolerance ** (2.0 / 3.0)
         flat, state_flat, out_flat = moments.reshape(-1), states.reshape(-1), out.reshape(-1)
         samples, alone, corrections = out.shape[1], 0, 0
+        ring = np.zeros(30 * width)
         for block in range(n // width):
             i = block * width
             J, J_inverse = load3(flat, n, i, width), load3(flat, n, i + 3 * n, width)
@@ -100,28 +156,32 @@ def _make_march(width):
             for j in range(3):
                 save(out_flat, to + (4 + j) * width, L[j])
             known = zero
-            past = (L_carry, L_carry, L_carry, L_carry, L_carry, L_carry)
+            newest, place = L_carry, 0
             until_sample = every_step
             for step in range(1, n_steps + 1):
                 enough = known >= 6.0
                 if every(enough):
-                    a = (extrapolate(0, past), extrapolate(1, past), extrapolate(2, past))
+                    a = extrapolate_ring(ring, place * 3 * width, width, newest)
                 else:
                     a = choose_vector(
                         enough,
-                        (extrapolate(0, past), extrapolate(1, past), extrapolate(2, past)),
+                        extrapolate_ring(ring, place * 3 * width, width, newest),
                         explicit_guess(h, J_inverse, None, q, L),
                     )
-                a, gain, iterations, trusted = solve(h, J, None, q, L, L_carry, a, NEAR, tolerance)
+                a, gain, iterations, trusted = solve(h, J, q, L, L_carry, a, NEAR, tolerance)
                 corrections += iterations
                 if not every(trusted):
                     alone += 1
                     a, gain = finish_alone(h, J, J_inverse, q, L, L_carry, tolerance, a, gain, trusted)
-                change = subtract(a, past[0])
+                change = subtract(a, newest)
+                place = place - 1 if place > 0 else 4
+                for j in range(3):
+                    save(ring, (3 * place + j) * width, newest[j])
+                    save(ring, (3 * place + 15 + j) * width, newest[j])
+                newest = a
                 known = choose(dot(change, change) <= SMOOTH * dot(a, a), known + 1.0, zero)
-                past = (a, past[0], past[1], past[2], past[3], past[4])
                 L, L_carry = add_momentum(L, L_carry, gain)
-                q, q_carry = turn_attitude(a, q, q_carry)
+                q, q_carry = turn(a, q, q_carry)
                 until_sample -= 1
                 if until_sample == 0 or step == n_steps:
                     until_sample = every_step
