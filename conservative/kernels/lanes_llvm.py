@@ -6,6 +6,9 @@ between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max` are 
 `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
 body and lanes.
 
+A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that results
+do not depend on the width: for a wider vector LLVM fuses other products with sums.
+
 `load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks.
 """
 
@@ -24,6 +27,10 @@ from . import SMALL
 _DOUBLE, _BIT, _INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
 
 
+REGISTER = 4
+"""Floats in a register; a width is a multiple of it."""
+
+
 class Lanes(types.Type):
     """The type of `width` floats, one for each body."""
 
@@ -40,25 +47,44 @@ class Mask(types.Type):
         super().__init__(name=f"Mask({width})")
 
 
-def _vector(kind):
-    return ir.VectorType(_DOUBLE, kind.width)
+def _number(kind, of=_DOUBLE):
+    return ir.LiteralStructType([ir.VectorType(of, REGISTER)] * (kind.width // REGISTER))
+
+
+def _parts(builder, *values):
+    """For each register, what it holds of all values."""
+    count = len(values[0].type.elements)
+    return [tuple(builder.extract_value(v, i) for v in values) for i in range(count)]
+
+
+def _pack(builder, parts):
+    whole = ir.Constant(ir.LiteralStructType([part.type for part in parts]), ir.Undefined)
+    for i, part in enumerate(parts):
+        whole = builder.insert_value(whole, part, i)
+    return whole
+
+
+def _each(builder, build, *values):
+    """What `build` makes of every register."""
+    return _pack(builder, [build(builder, *part) for part in _parts(builder, *values)])
 
 
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager, fe_type) -> None:
-        super().__init__(manager, fe_type, _vector(fe_type))
+        super().__init__(manager, fe_type, _number(fe_type))
 
 
 @register_model(Mask)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager, fe_type) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(_BIT, fe_type.width))
+        super().__init__(manager, fe_type, _number(fe_type, _BIT))
 
 
 def _splat(builder, x, width):
-    first = builder.insert_element(ir.Constant(ir.VectorType(x.type, width), ir.Undefined), x, ir.Constant(_INDEX, 0))
-    return builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(_INDEX, width), [0] * width))
+    first = builder.insert_element(ir.Constant(ir.VectorType(x.type, REGISTER), ir.Undefined), x, ir.Constant(_INDEX, 0))
+    part = builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(_INDEX, REGISTER), [0] * REGISTER))
+    return _pack(builder, [part] * (width // REGISTER))
 
 
 def _common(args):
@@ -82,7 +108,7 @@ def _binary(symbol, build, result=lambda lanes: lanes) -> None:
 
     def lower(context, builder, sig, args):
         to = _common(sig.args)
-        return build(builder, *(_as_lanes(context, builder, k, a, to) for k, a in zip(sig.args, args, strict=True)))
+        return _each(builder, build, *(_as_lanes(context, builder, k, a, to) for k, a in zip(sig.args, args, strict=True)))
 
     infer_global(symbol)(Template)
     for left, right in ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes)):
@@ -95,7 +121,7 @@ def _unary(symbol, build, kind=Lanes) -> None:
             return signature(args[0], args[0]) if len(args) == 1 and isinstance(args[0], kind) else None
 
     infer_global(symbol)(Template)
-    lower_builtin(symbol, kind)(lambda context, builder, sig, args: build(builder, args[0]))
+    lower_builtin(symbol, kind)(lambda context, builder, sig, args: _each(builder, build, args[0]))
 
 
 def _call(builder, name, *args):
@@ -127,7 +153,7 @@ def _logical(symbol, build) -> None:
             return signature(args[0], *args) if fits else None
 
     infer_global(symbol)(Template)
-    lower_builtin(symbol, Mask, Mask)(lambda context, builder, sig, args: build(builder, *args))
+    lower_builtin(symbol, Mask, Mask)(lambda context, builder, sig, args: _each(builder, build, *args))
 
 
 _logical(operator.and_, lambda b, x, y: b.and_(x, y))
@@ -140,7 +166,7 @@ def _choose_lanes(typing, mask, a, b):
 
     def build(context, builder, sig, args):
         one, other = (_as_lanes(context, builder, k, x, lanes) for k, x in zip(sig.args[1:], args[1:], strict=True))
-        return builder.select(args[0], one, other)
+        return _each(builder, lambda b, m, x, y: b.select(m, x, y), args[0], one, other)
 
     return lanes(mask, a, b), build
 
@@ -157,8 +183,11 @@ def _choose(mask, a, b):
     return lambda mask, a, b: a if mask else b
 
 
-def _reduced(builder, mask, name):
+def _reduced(builder, whole, name):
     """llvm.vector.reduce.and or .or"""
+    mask, *rest = (part for (part,) in _parts(builder, whole))
+    for part in rest:
+        mask = getattr(builder, f"{name}_")(mask, part)
     kind = mask.type
     function = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(_BIT, [kind]), f"llvm.vector.reduce.{name}.v{kind.count}i1"
@@ -214,10 +243,21 @@ def _fill_like(x, like):
     return (lambda x, like: _splat_like(x, like)) if isinstance(like, Lanes) else (lambda x, like: x)
 
 
+def _stack(builder, value):
+    """The address of a copy in memory, and how its element at an index is addressed."""
+    memory = cgutils.alloca_once_value(builder, value)
+    return memory, builder.bitcast(memory, _DOUBLE.as_pointer())
+
+
 @intrinsic
 def lane_of(typing, a, index):
     """One of the floats."""
-    return types.float64(a, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)
+
+    def build(context, builder, sig, args):
+        _, data = _stack(builder, args[0])
+        return builder.load(builder.gep(data, [args[1]]))
+
+    return types.float64(a, types.intp), build
 
 
 @intrinsic
@@ -225,20 +265,17 @@ def with_lane(typing, a, index, x):
     """The same with x in one lane."""
 
     def build(context, builder, sig, args):
-        return builder.insert_element(args[0], args[2], args[1])
+        memory, data = _stack(builder, args[0])
+        builder.store(args[2], builder.gep(data, [args[1]]))
+        return builder.load(memory)
 
     return a(a, types.intp, types.float64), build
 
 
-@intrinsic
-def true_in(typing, mask, index):
-    """One of the truth values."""
-    return types.boolean(mask, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)
-
-
-def _address(context, builder, array_type, array, index, kind):
+def _address(context, builder, array_type, array, index, part):
     data = context.make_array(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), _vector(kind).as_pointer())
+    place = builder.add(index, ir.Constant(index.type, part * REGISTER))
+    return builder.bitcast(builder.gep(data, [place]), ir.VectorType(_DOUBLE, REGISTER).as_pointer())
 
 
 @intrinsic(prefer_literal=True)
@@ -247,7 +284,9 @@ def load(typing, array, index, width):
     kind = Lanes(width.literal_value)
 
     def build(context, builder, sig, args):
-        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], kind), align=8)
+        parts = range(kind.width // REGISTER)
+        at = [_address(context, builder, sig.args[0], args[0], args[1], i) for i in parts]
+        return _pack(builder, [builder.load(pointer, align=8) for pointer in at])
 
     return kind(array, types.intp, width), build
 
@@ -257,7 +296,8 @@ def save(typing, array, index, value):
     """array[index : index + width] = value"""
 
     def build(context, builder, sig, args):
-        builder.store(args[2], _address(context, builder, sig.args[0], *args[:2], value), align=8)
+        for i, (part,) in enumerate(_parts(builder, args[2])):
+            builder.store(part, _address(context, builder, sig.args[0], *args[:2], i), align=8)
         return context.get_dummy_value()
 
     return types.none(array, types.intp, value), build

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from . import kernel, small
-from .lanes_llvm import choose, every, fill_like, lane_of, load, save, true_in, with_lane
+from .lanes_llvm import choose, every, fill_like, lane_of, load, save, with_lane
 from .reduced import (
     FEW, NEAR, NEAR_ZERO, REST, SMOOTH, add_momentum, continue_branch, explicit_guess, extrapolate, final_correction,
     inverse_tangent, residual, turn_attitude,
@@ -121,8 +121,9 @@ def _make_march(width):
     @kernel
     def finish_alone(h, J, J_inverse, q, L, carry, tolerance, a, gain, trusted):
         """Solve for the lanes that are not trusted, one by one."""
+        flags = choose(trusted, fill_like(1.0, a[0]), fill_like(0.0, a[0]))
         for i in range(width):
-            if not true_in(trusted, i):
+            if lane_of(flags, i) == 0.0:
                 q1 = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
                 found = continue_branch(
                     h, pick(J, i), pick(J_inverse, i), None, q1, pick(L, i), pick(carry, i), tolerance
