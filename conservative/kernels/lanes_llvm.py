@@ -233,6 +233,21 @@ def _splat_like(typing, x, like):
     return like(x, like), build
 
 
+@intrinsic
+def fuse(typing, a, b, c):
+    """a b + c with one rounding, of floats or lanes; for sums of two products, of which the compiler may fuse either."""
+    lanes = _common([x for x in (a, b, c) if isinstance(x, Lanes)])
+    kind = types.float64 if lanes is None else lanes
+
+    def build(context, builder, sig, args):
+        if lanes is None:
+            return builder.fma(*args)
+        values = (_as_lanes(context, builder, k, x, lanes) for k, x in zip(sig.args, args, strict=True))
+        return _each(builder, lambda b, x, y, z: _call(b, "fma", x, y, z), *values)
+
+    return kind(a, b, c), build
+
+
 def fill_like(x, like):
     """The number x in every lane, in the type of `like`."""
     return x

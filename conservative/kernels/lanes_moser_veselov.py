@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from . import kernel, small
-from .lanes_llvm import lane_of, load, save
+from .lanes_llvm import fuse, load, save
 from .moser_veselov import RESCALE, directions
 from .vector import product
 
@@ -64,20 +64,20 @@ def advance(k, at):
     """One step; numbers are floats or lanes."""
     s, c, d, z_re, z_im = at
     r = 1.0 / (1.0 - k.mS1 * (s * s))
-    s1, c1 = (s * k.CD1 + k.S1 * (c * d)) * r, (c * k.C1 - k.SD1 * (s * d)) * r
-    f = 1.5 - 0.5 * (s1 * s1 + c1 * c1)
+    s1, c1 = fuse(s, k.CD1, k.S1 * (c * d)) * r, fuse(c, k.C1, -(k.SD1 * (s * d))) * r
+    f = 1.5 - 0.5 * fuse(s1, s1, c1 * c1)
     s1, c1 = s1 * f, c1 * f
     d1 = math.sqrt(k.mc + k.m * (c1 * c1))
     q0, q1, q2, q3 = k.y0 + k.y0s * (s * s1), k.y1 * (c + c1), k.y2 * (s + s1), k.y3 * (d + d1)
     x, y, up = k.a1 * c, k.a2 * s, 1.0 + k.a3 * d
-    re, im = q0 * up - y * q1 + x * q2, q3 * up + y * q2 + x * q1
-    return State(s1, c1, d1, z_re * re - z_im * im, z_re * im + z_im * re)
+    re, im = fuse(q0, up, fuse(x, q2, -(y * q1))), fuse(q3, up, fuse(y, q2, x * q1))
+    return State(s1, c1, d1, fuse(z_re, re, -(z_im * im)), fuse(z_re, im, z_im * re))
 
 
 @small
 def rescale(at):
     """The same attitude with |z| = 1."""
-    n = 1.0 / math.sqrt(at.z_re * at.z_re + at.z_im * at.z_im)
+    n = 1.0 / math.sqrt(fuse(at.z_re, at.z_re, at.z_im * at.z_im))
     return State(at.s, at.c, at.d, at.z_re * n, at.z_im * n)
 
 
