@@ -118,7 +118,8 @@ def make_march(width, series=series_step, order=0):
         """constants (11, n): J, 1/J, moment, two scales; states (9, n): g, a, w; out (9, n) gets the states at the end."""
         n = constants.shape[1]
         flat, state_flat, out_flat = constants.reshape(-1), states.reshape(-1), out.reshape(-1)
-        c = np.empty(9 * 25 * width)
+        c = np.empty(9 * 25 * width + 8)
+        c = c[(-c.ctypes.data // 8) % 8 :]
         again = 0
         for block in range(n // width):
             b = block * width
