@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from . import kernel, small
 from .lanes_llvm import fuse, load, save
-from .moser_veselov import RESCALE, directions
+from .moser_veselov import RESCALE
 from .vector import product
 
 
@@ -48,13 +48,12 @@ class State(NamedTuple):
 
 
 @small
-def whole_shift(p, step):
-    """The constants of a step, by the addition theorem from two halves."""
+def whole_shift(p, step, a):
+    """The constants of a step, by the addition theorem from two halves; `a` are the amplitudes of L/l."""
     S, C, D, m, mc = step.S, step.C, step.D, p.m, p.mc
     below = 1.0 / (1.0 - m * S * S * S * S)
     S1, C1, D1 = 2.0 * S * C * D * below, (C * C - S * S * D * D) * below, (D * D - m * S * S * C * C) * below
     y0 = step.r0 * below
-    a = directions(p)
     y = (y0, y0 * m * S * S, step.r1 / (2.0 * C), step.r2 / (2.0 * C * D), step.r3 / (2.0 * D))
     return Shift(C1, S1, C1 * D1, S1 * D1, m * S1 * S1, m, mc, y[0], y[1], y[2], y[3], y[4], a[0], a[1], a[2])
 
