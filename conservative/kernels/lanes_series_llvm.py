@@ -15,7 +15,8 @@ from .series_llvm import _VolatileLoad
 
 LOWEST, HIGHEST = 4, 20
 _VECTOR, _INDEX = ir.VectorType(ir.DoubleType(), REGISTER), ir.IntType(32)
-SIMPLE = False
+LOOPS_FROM = 6
+"""Orders from here on sum their old coefficients in a loop: straight code for all does not fit into the processor's caches."""
 
 
 class _Memory:
@@ -34,12 +35,15 @@ class _Memory:
         for k, v in enumerate(values):
             self._builder.store(v, self._at(9 * n + k), align=32)
 
+    def load_at(self, byte, k):
+        """Number k of the order that begins at a variable byte."""
+        base = self._builder.bitcast(self._memory, ir.IntType(8).as_pointer())
+        at = self._builder.gep(base, [self._builder.add(byte, ir.Constant(byte.type, 32 * k))])
+        return self._builder.load(self._builder.bitcast(at, _VECTOR.as_pointer()), align=32)
+
     def load(self, n, k):
-        if SIMPLE:
-            found = self._builder.load(self._at(9 * n + k), align=32)
-        else:
-            found = _VolatileLoad(self._builder.block, self._at(9 * n + k), "")
-            self._builder._insert(found)
+        found = _VolatileLoad(self._builder.block, self._at(9 * n + k), "")
+        self._builder._insert(found)
         return found
 
 
@@ -72,11 +76,55 @@ class _Emitter:
             s[k] = self.add(s[k], v[i], w[j])
 
 
+def _sum_old(e, memory, n):
+    """The nine sums over i = 1 ... n-1, in a loop whose end the processor learns, since each order has its own."""
+    b, step, index = e.b, 9 * 32, ir.IntType(64)
+    before, body = b.block, b.function.append_basic_block(f"loop_{n}")
+    after = b.function.append_basic_block(f"after_{n}")
+    b.branch(body)
+    b.position_at_end(body)
+    at = b.phi(index)
+    sums = [b.phi(_VECTOR) for _ in range(9)]
+    at.add_incoming(ir.Constant(index, step), before)
+    for phi in sums:
+        phi.add_incoming(ir.Constant(_VECTOR, [0.0] * REGISTER), before)
+    other = b.sub(ir.Constant(index, n * step), at)
+    w = [memory.load_at(other, 6 + k) for k in range(3)]
+    sg, sa, sw = sums[:3], sums[3:6], sums[6:]
+    for s, first, how in ((sg, 0, e.cross), (sa, 3, e.cross), (sw, 6, e.mixed)):
+        how(s, [memory.load_at(at, first + k) for k in range(3)], w)
+    following = b.add(at, ir.Constant(index, step))
+    at.add_incoming(following, body)
+    for phi, value in zip(sums, (*sg, *sa, *sw), strict=True):
+        phi.add_incoming(value, body)
+    branch = b.cbranch(b.icmp_unsigned("<", following, ir.Constant(index, n * step)), body, after)
+    module = b.module
+    keep = module.add_metadata([ir.MetaDataString(module, "llvm.loop.unroll.disable")])
+    loop = _SelfReference(module, [keep])
+    branch.set_metadata("llvm.loop", loop)
+    b.position_at_end(after)
+    return sg, sa, sw
+
+
+class _SelfReference(ir.MDValue):
+    """Distinct metadata whose first operand is itself, as LLVM's loops have it."""
+
+    def __init__(self, module, rest):
+        super().__init__(module, rest, name=str(len(module.metadata)))
+
+    def descr(self, buf):
+        operands = ", ".join([f"!{self.name}", *(op.get_reference() for op in self.operands)])
+        buf += (f"distinct !{{ {operands} }}", "\n")
+
+
 def _order(e, memory, n, f, newest, K, M):
     """The coefficients of order n + 1; f is h/(n+1), `newest` those of order n, M holds both factors of J^-1 (g x m)."""
     b = e.b
     sg, sa, sw = [None] * 3, [None] * 3, [None] * 3
-    for i in sorted(range(n + 1), key=lambda i: (abs(2 * i - n), i)):
+    rest = range(n + 1)
+    if n >= LOOPS_FROM:
+        (sg, sa, sw), rest = _sum_old(e, memory, n), (n, 0)
+    for i in sorted(rest, key=lambda i: (abs(2 * i - n), -i)):
         first = i == n
         w = newest[6:] if i == 0 else [memory.load(n - i, 6 + k) for k in range(3)]
         x = newest if first else None
