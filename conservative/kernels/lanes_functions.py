@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from . import kernel, small
+from . import small
 from .lanes_llvm import choose, every, fill_like, fuse, load, save
 
 ROUND = 6755399441055744.0  # 1.5 2^52: added and taken away again, it rounds to the nearest integer
@@ -24,13 +22,29 @@ def sine_and_cosine(x):
     r = fuse(-n, PI_3, fuse(-n, PI_2, fuse(-n, PI_1, x)))
     z = r * r
     s = fuse(
-        fuse(fuse(fuse(fuse(z, 1.58969099521155010221e-10, -2.50507602534068634195e-8), z, 2.75573137070700676789e-6), z, -1.98412698298579493134e-4), z, 8.33333333332248946124e-3),
+        fuse(
+            fuse(
+                fuse(fuse(z, 1.58969099521155010221e-10, -2.50507602534068634195e-8), z, 2.75573137070700676789e-6),
+                z,
+                -1.98412698298579493134e-4,
+            ),
+            z,
+            8.33333333332248946124e-3,
+        ),
         z,
         -1.66666666666666324348e-1,
     )
     s = fuse(z * r, s, r)
     c = fuse(
-        fuse(fuse(fuse(fuse(z, -1.13596475577881948265e-11, 2.08757232129817482790e-9), z, -2.75573143513906633035e-7), z, 2.48015872894767294178e-5), z, -1.38888888888741095749e-3),
+        fuse(
+            fuse(
+                fuse(fuse(z, -1.13596475577881948265e-11, 2.08757232129817482790e-9), z, -2.75573143513906633035e-7),
+                z,
+                2.48015872894767294178e-5,
+            ),
+            z,
+            -1.38888888888741095749e-3,
+        ),
         z,
         4.16666666666666019037e-2,
     )

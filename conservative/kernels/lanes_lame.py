@@ -119,8 +119,26 @@ def prepare(J, kappa, q, L, h, constants):
         rate = scale_of(g2, g3, B)
         half = 0.5 * spin_[0] * h / parts
         c = (
-            E_[0], z_[0], kappa / J, rate, nu_[0], x0_[0], spin_[0], p_h, dp_h, f[0, 0], f[0, 1], f[1, 0], f[1, 1], f[2, 0],
-            f[2, 1], p_h + B[0, 0], p_h + B[1, 0], p_h + B[2, 0], math.cos(half), math.sin(half),
+            E_[0],
+            z_[0],
+            kappa / J,
+            rate,
+            nu_[0],
+            x0_[0],
+            spin_[0],
+            p_h,
+            dp_h,
+            f[0, 0],
+            f[0, 1],
+            f[1, 0],
+            f[1, 1],
+            f[2, 0],
+            f[2, 1],
+            p_h + B[0, 0],
+            p_h + B[1, 0],
+            p_h + B[2, 0],
+            math.cos(half),
+            math.sin(half),
         )
         for j in range(20):
             constants[j, i] = c[j]
@@ -135,11 +153,26 @@ def _make_march(width):
         k, s, o = constants.reshape(-1), states.reshape(-1), out.reshape(-1)
         for i in range(0, n, width):
             c = Part(
-                load(k, i, width), load(k, i + n, width), load(k, i + 2 * n, width), load(k, i + 3 * n, width),
-                load(k, i + 4 * n, width), load(k, i + 5 * n, width), load(k, i + 6 * n, width), load(k, i + 7 * n, width),
-                load(k, i + 8 * n, width), load(k, i + 9 * n, width), load(k, i + 10 * n, width), load(k, i + 11 * n, width),
-                load(k, i + 12 * n, width), load(k, i + 13 * n, width), load(k, i + 14 * n, width), load(k, i + 15 * n, width),
-                load(k, i + 16 * n, width), load(k, i + 17 * n, width), load(k, i + 18 * n, width), load(k, i + 19 * n, width),
+                load(k, i, width),
+                load(k, i + n, width),
+                load(k, i + 2 * n, width),
+                load(k, i + 3 * n, width),
+                load(k, i + 4 * n, width),
+                load(k, i + 5 * n, width),
+                load(k, i + 6 * n, width),
+                load(k, i + 7 * n, width),
+                load(k, i + 8 * n, width),
+                load(k, i + 9 * n, width),
+                load(k, i + 10 * n, width),
+                load(k, i + 11 * n, width),
+                load(k, i + 12 * n, width),
+                load(k, i + 13 * n, width),
+                load(k, i + 14 * n, width),
+                load(k, i + 15 * n, width),
+                load(k, i + 16 * n, width),
+                load(k, i + 17 * n, width),
+                load(k, i + 18 * n, width),
+                load(k, i + 19 * n, width),
             )
             q = (load(s, i, width), load(s, i + n, width), load(s, i + 2 * n, width), load(s, i + 3 * n, width))
             gamma = (load(s, i + 4 * n, width), load(s, i + 5 * n, width), load(s, i + 6 * n, width))

@@ -6,8 +6,8 @@ between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max` are 
 `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
 body and lanes.
 
-A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that results
-do not depend on the width: for a wider vector LLVM fuses other products with sums.
+A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that
+results do not depend on the width: in a wider vector LLVM fuses other products with sums.
 
 `load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks.
 """
@@ -162,7 +162,7 @@ _logical(operator.or_, lambda b, x, y: b.or_(x, y))
 
 @intrinsic
 def _choose_lanes(typing, mask, a, b):
-    lanes = _common([x for x in (a, b)]) or Lanes(mask.width)
+    lanes = _common((a, b)) or Lanes(mask.width)
 
     def build(context, builder, sig, args):
         one, other = (_as_lanes(context, builder, k, x, lanes) for k, x in zip(sig.args[1:], args[1:], strict=True))

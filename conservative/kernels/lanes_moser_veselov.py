@@ -134,15 +134,28 @@ def _make_march(width):
         for block in range(n // width):
             i = block * width
             k = Shift(
-                load(flat, i, width), load(flat, n + i, width), load(flat, 2 * n + i, width), load(flat, 3 * n + i, width),
-                load(flat, 4 * n + i, width), load(flat, 5 * n + i, width), load(flat, 6 * n + i, width),
-                load(flat, 7 * n + i, width), load(flat, 8 * n + i, width), load(flat, 9 * n + i, width),
-                load(flat, 10 * n + i, width), load(flat, 11 * n + i, width), load(flat, 12 * n + i, width),
-                load(flat, 13 * n + i, width), load(flat, 14 * n + i, width),
+                load(flat, i, width),
+                load(flat, n + i, width),
+                load(flat, 2 * n + i, width),
+                load(flat, 3 * n + i, width),
+                load(flat, 4 * n + i, width),
+                load(flat, 5 * n + i, width),
+                load(flat, 6 * n + i, width),
+                load(flat, 7 * n + i, width),
+                load(flat, 8 * n + i, width),
+                load(flat, 9 * n + i, width),
+                load(flat, 10 * n + i, width),
+                load(flat, 11 * n + i, width),
+                load(flat, 12 * n + i, width),
+                load(flat, 13 * n + i, width),
+                load(flat, 14 * n + i, width),
             )
             at = State(
-                load(state_flat, i, width), load(state_flat, n + i, width), load(state_flat, 2 * n + i, width),
-                load(state_flat, 3 * n + i, width), load(state_flat, 4 * n + i, width),
+                load(state_flat, i, width),
+                load(state_flat, n + i, width),
+                load(state_flat, 2 * n + i, width),
+                load(state_flat, 3 * n + i, width),
+                load(state_flat, 4 * n + i, width),
             )
             to = block * samples * 5 * width
             for j in range(5):

@@ -14,8 +14,16 @@ import numpy as np
 from . import kernel, small
 from .lanes_llvm import choose, every, fill_like, lane_of, load, save, with_lane
 from .reduced import (
-    FEW, NEAR, NEAR_ZERO, REST, SMOOTH, add_momentum, continue_branch, explicit_guess, extrapolate, final_correction,
-    inverse_tangent, residual, turn_attitude,
+    FEW,
+    NEAR,
+    NEAR_ZERO,
+    REST,
+    SMOOTH,
+    add_momentum,
+    continue_branch,
+    explicit_guess,
+    final_correction,
+    residual,
 )
 from .vector import accumulate, apply, cross, dot, scale, subtract, times
 
@@ -102,7 +110,11 @@ def replace(v, index, x):
 def extrapolate_ring(ring, first, width, newest):
     """As `extrapolate` for all components: the second newest (3 vectors) is at `first`, older ones follow."""
     step = 3 * width
-    b, c, d = load3(ring, width, first, width), load3(ring, width, first + step, width), load3(ring, width, first + 2 * step, width)
+    b, c, d = (
+        load3(ring, width, first, width),
+        load3(ring, width, first + step, width),
+        load3(ring, width, first + 2 * step, width),
+    )
     e, f = load3(ring, width, first + 3 * step, width), load3(ring, width, first + 4 * step, width)
     return (
         ((20.0 * c[0] - 15.0 * (b[0] + d[0])) + (6.0 * e[0] - f[0])) + 6.0 * newest[0],
@@ -125,9 +137,7 @@ def _make_march(width):
         for i in range(width):
             if lane_of(flags, i) == 0.0:
                 q1 = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
-                found = continue_branch(
-                    h, pick(J, i), pick(J_inverse, i), None, q1, pick(L, i), pick(carry, i), tolerance
-                )
+                found = continue_branch(h, pick(J, i), pick(J_inverse, i), None, q1, pick(L, i), pick(carry, i), tolerance)
                 if found[4]:
                     a, gain = replace(a, i, found[0]), replace(gain, i, found[1])
                 else:

@@ -43,15 +43,22 @@ def free_samples(out, amplitudes, rates, left, R_BS, R_WB, w_WB_B):
         for sample in range(samples):
             x = (block * samples + sample) * 5 * WIDTH
             at = State(
-                load(flat, x, WIDTH), load(flat, x + WIDTH, WIDTH), load(flat, x + 2 * WIDTH, WIDTH),
-                load(flat, x + 3 * WIDTH, WIDTH), load(flat, x + 4 * WIDTH, WIDTH),
+                load(flat, x, WIDTH),
+                load(flat, x + WIDTH, WIDTH),
+                load(flat, x + 2 * WIDTH, WIDTH),
+                load(flat, x + 3 * WIDTH, WIDTH),
+                load(flat, x + 4 * WIDTH, WIDTH),
             )
             X, Y, up = a[0] * at.c, a[1] * at.s, 1.0 + a[2] * at.d
             own = (at.z_re * up, at.z_re * Y + at.z_im * X, at.z_im * Y - at.z_re * X, at.z_im * up)
             R = rotation(product(turn, own))
             w = (v[0] * at.c, v[1] * at.s, v[2] * at.d)
             for k in range(3):
-                row = (load(bf, i + 3 * k * n, WIDTH), load(bf, i + (3 * k + 1) * n, WIDTH), load(bf, i + (3 * k + 2) * n, WIDTH))
+                row = (
+                    load(bf, i + 3 * k * n, WIDTH),
+                    load(bf, i + (3 * k + 1) * n, WIDTH),
+                    load(bf, i + (3 * k + 2) * n, WIDTH),
+                )
                 save(room, k * WIDTH, dot(R[0], row))
                 save(room, (3 + k) * WIDTH, dot(R[1], row))
                 save(room, (6 + k) * WIDTH, dot(R[2], row))

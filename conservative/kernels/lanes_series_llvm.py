@@ -10,7 +10,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from .lanes_llvm import REGISTER, Lanes, _pack, _parts, _splat
+from .lanes_llvm import REGISTER, _pack, _parts, _splat
 from .series_llvm import _VolatileLoad
 
 LOWEST, HIGHEST = 4, 20

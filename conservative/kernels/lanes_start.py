@@ -95,7 +95,14 @@ def prepare(J, L, q, h, constants, states, left):
     """Fill constants (15, n), states (5, n) and left (4, n) from J (3, n), L (3, n) and q (4, n)."""
     n = J.shape[1]
     larger, smaller = np.empty(LEVELS * WIDTH), np.empty(LEVELS * WIDTH)
-    Jf, Lf, qf, kf, sf, lf = J.reshape(-1), L.reshape(-1), q.reshape(-1), constants.reshape(-1), states.reshape(-1), left.reshape(-1)
+    Jf, Lf, qf, kf, sf, lf = (
+        J.reshape(-1),
+        L.reshape(-1),
+        q.reshape(-1),
+        constants.reshape(-1),
+        states.reshape(-1),
+        left.reshape(-1),
+    )
     for i in range(0, n, WIDTH):
         J_own, L_own, q_own = axes(
             (load(Jf, i, WIDTH), load(Jf, i + n, WIDTH), load(Jf, i + 2 * n, WIDTH)),

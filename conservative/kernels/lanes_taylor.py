@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from . import kernel, small
-from .lanes_llvm import choose, every, fill_like, fuse, load, save, some
+from .lanes_llvm import choose, fill_like, fuse, load, save, some
 from .lanes_series_llvm import lane_orders
-from .taylor import DEPENDENT, ENOUGH, FAR, TINY, shortest_move, values
+from .taylor import ENOUGH, FAR, shortest_move, values
 from .vector import add, cross, dot, scale, subtract, times
 
 
@@ -86,9 +86,7 @@ def series_step(p, h, K, J_inverse, moment, c, g, a, w, width):
 def unrolled_step(p, h, K, J_inverse, moment, c, g, a, w, width):
     """As `series_step`, without loops."""
     i, m = J_inverse, moment
-    d = lane_orders(
-        p, h, g, a, w, K, (i[0] * m[2], i[1] * m[0], i[2] * m[1]), (i[0] * m[1], i[1] * m[2], i[2] * m[0])
-    )
+    d = lane_orders(p, h, g, a, w, K, (i[0] * m[2], i[1] * m[0], i[2] * m[1]), (i[0] * m[1], i[1] * m[2], i[2] * m[0]))
     return (d[0], d[1], d[2]), (d[3], d[4], d[5]), (d[6], d[7], d[8])
 
 
@@ -132,9 +130,7 @@ def make_march(width, series=series_step, order=0):
             kept = values(J, moment, g, w)
             for _ in range(n_steps):
                 dg, da, dw = series(p, h, K, J_inverse, moment, c, g, a, w, width)
-                g, a, w, defect = correct(
-                    J, J_inverse, moment, kept, scales, add(g, dg), add(a, da), add(w, dw)
-                )
+                g, a, w, defect = correct(J, J_inverse, moment, kept, scales, add(g, dg), add(a, da), add(w, dw))
                 left = (defect > ENOUGH) & (defect < FAR)
                 if some(left):
                     again += 1

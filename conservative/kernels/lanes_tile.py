@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import kernel, small
-from .lanes_llvm import choose, fill_like, load, save, some
+from .lanes_llvm import fill_like, load, save, some
 from .lanes_taylor import add_cross, add_mixed, choose_vector, correct, load3, save3
 from .taylor import ENOUGH, FAR, values
 from .vector import add, cross, scale, times
@@ -80,6 +80,8 @@ def aligned(size):
 
 
 def make_march(tile):
+    """Return the kernel for so many registers of bodies at a time."""
+
     @kernel
     def march_tiles(p, h, n_steps, constants, states, out):
         """As `lanes_taylor.make_march`; the number of bodies is a multiple of 4 times the tile."""
