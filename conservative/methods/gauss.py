@@ -56,7 +56,7 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit")
+    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit", longest=1.5)
     claims: ClassVar[Claims] = Claims(README)
     colour: ClassVar[str] = "indigo"
     kernel: ClassVar[str] = "gauss"
@@ -80,7 +80,7 @@ class Gauss(Method):
 
     @property
     def cost(self) -> Cost:
-        return Cost(step=50.0, correction=12.0 * self.stages)
+        return Cost(step=50.0, correction=12.0 * self.stages, corrections=12.0)
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
@@ -141,6 +141,7 @@ def closed_system(start: PrincipalStart) -> Any:
         unit,
         triple(unit * np.array(start.J_inverse)),
         triple(moment / unit),
+        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # momentum about the axis of symmetry is kept as it is
         triple(L / unit),
         triple(R_WP[2] if falls else L / size),
         quadruple(R_WV.T @ R_WP),

@@ -62,6 +62,8 @@ METHODS: tuple[Method, ...] = (
     cv.MoserVeselov(),
     cv.MoserVeselov(6),
     cv.Projected(),
+    cv.Taylor(),
+    cv.Taylor(5),
 )
 
 
