@@ -11,8 +11,31 @@ import numpy as np
 from . import kernel, small
 from .lanes_llvm import choose, fill_like, fuse, load, save, some
 from .lanes_series_llvm import lane_orders
-from .taylor import ENOUGH, FAR, shortest_move, values
 from .vector import add, cross, dot, scale, subtract, times
+
+DEPENDENT, TINY = 1e-8, 1e-300
+"""Regularisation: relative, of the gradients' Gram determinant, and added to squares that can be 0."""
+ENOUGH, FAR = 2.0**-26, 0.1
+"""Relative defect after which one correction is enough, and the largest that is corrected."""
+
+
+@small
+def shortest_move(w, L, moment, size, e, m, g):
+    """Return (dL, turn of the body) that changes energy by e and vertical momentum by m, to first order, and moves least."""
+    T, turn, square = cross(g, moment), cross(L, g), size * size
+    ee = square * dot(w, w) + dot(T, T) + TINY
+    mm = square + dot(turn, turn)
+    em = square * dot(w, g) - dot(T, turn)
+    over = 1.0 / ((1.0 + DEPENDENT) * (ee * mm) - em * em)
+    x, y = over * (mm * e - em * m), over * (ee * m - em * e)
+    return scale(square, add(scale(x, w), scale(y, g))), add(scale(-x, T), scale(y, turn))
+
+
+@small
+def values(J, moment, g, w):
+    """Energy, J, and vertical momentum, kg m^2/s."""
+    L = times(J, w)
+    return 0.5 * dot(L, w) + dot(moment, g), dot(L, g)
 
 
 @small
