@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import kernel, small
+from .lanes_emitter import emitted_orders
 from .lanes_llvm import choose, fill_like, fuse, load, save, some
 from .lanes_series_llvm import lane_orders
 from .vector import add, cross, dot, scale, subtract, times
@@ -114,6 +115,14 @@ def unrolled_step(p, h, K, J_inverse, moment, c, g, a, w, width):
 
 
 @small
+def emitted_step(p, h, K, J_inverse, moment, c, g, a, w, width):
+    """As `series_step`, by the recurrences of `series`."""
+    i, m = J_inverse, moment
+    d = emitted_orders(p, h, g, a, w, K, (i[0] * m[1], i[1] * m[2], i[2] * m[0]), (i[0] * m[2], i[1] * m[0], i[2] * m[1]))
+    return (d[0], d[1], d[2]), (d[3], d[4], d[5]), (d[6], d[7], d[8])
+
+
+@small
 def correct(J, J_inverse, moment, kept, scales, g, a, w):
     """As `taylor.correct`, whose `max` is one of floats."""
     L, n = times(J, w), 1.5 - 0.5 * dot(g, g)
@@ -175,3 +184,6 @@ def make_march(width, series=series_step, order=0):
 march_four, march_eight = make_march(4), make_march(8)
 unrolled_four, unrolled_eight = make_march(4, unrolled_step), make_march(8, unrolled_step)
 MORE = {"u4": unrolled_four, "u8": unrolled_eight}
+
+emitted_four = make_march(4, emitted_step)
+MORE["e4"] = emitted_four
