@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from . import small
-from .lanes_llvm import choose, every, fill_like, fuse, load, save
+from .lanes import choose, every, fill_like, fuse, load, save
 
 ROUND = 6755399441055744.0  # 1.5 2^52: added and taken away again, it rounds to the nearest integer
 PI_1, PI_2, PI_3 = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33

@@ -9,7 +9,8 @@ body and lanes.
 A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that
 results do not depend on the width: in a wider vector LLVM fuses other products with sums.
 
-`load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks.
+`load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks;
+`load_rows` and `save_rows` do the same for several numbers, each `stride` floats after the last.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
 from . import SMALL
+from .lanes_plain import choose, every, fill_like, some
 
 _DOUBLE, _BIT, _INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
 
 
 REGISTER = 4
-"""Floats in a register; a width is a multiple of it."""
+"""Floats in a register; a width is a multiple of it. It is 4 on every processor: where registers are shorter LLVM takes several
+for each, and where they are longer results would depend on the processor, for the reason above."""
 
 
 class Lanes(types.Type):
@@ -171,11 +174,6 @@ def _choose_lanes(typing, mask, a, b):
     return lanes(mask, a, b), build
 
 
-def choose(mask, a, b):
-    """a where the mask is true, b elsewhere."""
-    return a if mask else b
-
-
 @overload(choose, inline="never", jit_options=SMALL)
 def _choose(mask, a, b):
     if isinstance(mask, Mask):
@@ -203,16 +201,6 @@ def _every_lane(typing, mask):
 @intrinsic
 def _some_lane(typing, mask):
     return types.boolean(mask), lambda context, builder, sig, args: _reduced(builder, args[0], "or")
-
-
-def every(mask):
-    """Whether all lanes are true."""
-    return bool(mask)
-
-
-def some(mask):
-    """Whether any lane is true."""
-    return bool(mask)
 
 
 @overload(every, jit_options=SMALL)
@@ -246,11 +234,6 @@ def fuse(typing, a, b, c):
         return _each(builder, lambda b, x, y, z: _call(b, "fma", x, y, z), *values)
 
     return kind(a, b, c), build
-
-
-def fill_like(x, like):
-    """The number x in every lane, in the type of `like`."""
-    return x
 
 
 @overload(fill_like, jit_options=SMALL)
@@ -316,3 +299,35 @@ def save(typing, array, index, value):
         return context.get_dummy_value()
 
     return types.none(array, types.intp, value), build
+
+
+@intrinsic(prefer_literal=True)
+def load_rows(typing, array, index, stride, count, width):
+    """The tuple of `count` numbers at index, index + stride and so on; count and width are numbers in the source."""
+    kind = Lanes(width.literal_value)
+    rows = types.UniTuple(kind, count.literal_value)
+
+    def build(context, builder, sig, args):
+        found, at = [], args[1]
+        for _ in range(rows.count):
+            places = [_address(context, builder, sig.args[0], args[0], at, i) for i in range(kind.width // REGISTER)]
+            found.append(_pack(builder, [builder.load(pointer, align=8) for pointer in places]))
+            at = builder.add(at, args[2])
+        return context.make_tuple(builder, rows, found)
+
+    return rows(array, types.intp, types.intp, count, width), build
+
+
+@intrinsic
+def save_rows(typing, array, index, stride, values):
+    """Store a tuple of numbers at index, index + stride and so on."""
+
+    def build(context, builder, sig, args):
+        at = args[1]
+        for number in cgutils.unpack_tuple(builder, args[3]):
+            for i, (part,) in enumerate(_parts(builder, number)):
+                builder.store(part, _address(context, builder, sig.args[0], args[0], at, i), align=8)
+            at = builder.add(at, args[2])
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, types.intp, values), build

@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from . import kernel, small
-from .lanes_llvm import fuse, load, save
+from .lanes import fuse, load, save
 from .moser_veselov import RESCALE
 from .vector import product
 

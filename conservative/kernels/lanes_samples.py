@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import entry, small
-from .lanes_llvm import load, save
+from .lanes import load, save
 from .lanes_moser_veselov import State
 from .vector import dot, product
 

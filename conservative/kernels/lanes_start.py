@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from . import kernel, small
+from .lanes import choose, fill_like, fuse, load, save
 from .lanes_functions import LEVELS, jacobi, means, sine_and_cosine
-from .lanes_llvm import choose, fill_like, fuse, load, save
 from .lanes_moser_veselov import initial_left, whole_shift
 from .moser_veselov import NODES, WEIGHTS, Polhode, Step
 from .vector import product
