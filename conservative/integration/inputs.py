@@ -31,6 +31,8 @@ def read_bodies(
     BadInput
         An argument has another shape, or a body is one that `Scene` or its parts refuse.
     """
+    if R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None:
+        return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
     given: dict[str, Array] = {}
     for name, value, shapes in (
         ("R_WB0", _matrices_of(R_WB0), ((3, 3),)),

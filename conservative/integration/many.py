@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import closing
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Protocol, TypedDict, Unpack
 
@@ -13,7 +14,6 @@ from numpy.typing import ArrayLike
 from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, positive_number
 from ..errors import BadInput
 from ..method import Grid, Method, grid_for
-from ..methods.automatic import grid_of
 from ..methods.between import Samples
 from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
@@ -21,10 +21,12 @@ from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
 from .blocks import BlockResult, list_blocks, run_blocks, start_threads
 from .drifts import list_drifts
-from .ensemble import Ensemble, Memory
+from .ensemble import Ensemble, Memory, ensemble_of_one
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
-from .shared_choice import Goal, choose_for_all
+from .shared_choice import Goal, choose_for_all, pick_hardest
+
+Tell = Callable[[ProgressOfMany], object]
 
 
 class Details(TypedDict, total=False):
@@ -34,7 +36,7 @@ class Details(TypedDict, total=False):
     sample_every: int
     error: float | None
     threads: int | None
-    progress: Callable[[ProgressOfMany], object] | None
+    progress: Tell | None
 
 
 def integrate_many(
@@ -94,17 +96,17 @@ def integrate_many(
     unknown = sorted(set(details) - set(Details.__annotations__))
     if unknown:
         raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
-    progress, threads = _read_progress(details.get("progress")), _read_threads(details.get("threads"))
+    progress = _read_progress(details.get("progress"))
     bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
+    alone = len(bodies) == 1
     try:
-        method, grid, choice = _plan(bodies, dt, t_end, details)
-        _require_memory(bodies, grid)
-        return run_all(method, bodies, grid, threads, progress, choice)
+        plan = make_plan(bodies, dt, t_end, details)
+        return run_one(plan, progress) if alone else run_all(plan, _read_threads(details.get("threads")), progress)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
 
-def _read_progress(value: Any) -> Callable[[ProgressOfMany], object] | None:
+def _read_progress(value: Any) -> Tell | None:
     if value is not None and not callable(value):
         raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
     return value
@@ -116,46 +118,90 @@ def _read_threads(value: object) -> int:
     return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
 
 
-def _plan(bodies: Bodies, dt: float | None, t_end: float | None, details: Details) -> tuple[Method, Grid, ChoiceForMany | None]:
-    """Return the method and the grid of steps, s, as they are given or chosen for an error."""
-    first, error, every = bodies.take(0), details.get("error"), details.get("sample_every", 1)
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is run: `first` is the scene of body number 0, and `choice` what was chosen for an error, if one was asked for."""
+
+    bodies: Bodies
+    first: Scene
+    method: Method
+    grid: Grid
+    choice: ChoiceForMany | None
+
+
+def make_plan(bodies: Bodies, dt: float | None, t_end: float | None, details: Details) -> Plan:
+    """Return what is run, with a method and steps, s, as they are given or chosen for an error.
+
+    Raises
+    ------
+    BadInput
+        An argument cannot be used, the samples do not fit in memory, or the method has no step of that length for a body.
+    Unsupported
+        The method cannot do the scene.
+    """
+    first, error, every = bodies.first, details.get("error"), details.get("sample_every", 1)
     if error is None:
         method = read_method(details.get("method"), first)
-        grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
+        grid, choice = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every), None
         require_support(method, first)
-        return method, grid, None
-    positive_number("error", error, "a finite attitude error above 0, rad")
-    if details.get("method") is not None:
-        raise BadInput("method", describe(details["method"]), "None together with error, which chooses the method")
+        require_steps(method, bodies, grid)
+    else:
+        choice = _choose(bodies, error, (dt, t_end, every), details.get("method"))
+        method, grid = choice.method, choice.grid
+    _require_memory(bodies, grid)
+    return Plan(bodies, first, method, grid, choice)
+
+
+def _choose(bodies: Bodies, error: object, steps: tuple[Any, ...], method: object) -> ChoiceForMany:
+    """Return what is chosen for an error, rad; steps are dt and t_end, s, and sample_every."""
+    (dt, t_end, every), first = steps, bodies.first
+    wanted = positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
     end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", every))
-    choice = choose_for_all(bodies, Goal(error, end, samples))
-    return choice.method, grid_of(choice.dt, end, samples), choice
+    return choose_for_all(bodies, Goal(wanted, end, samples))
+
+
+def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
+    """Raise `BadInput` where the method has no step of that length for one of the bodies that turn fastest.
+
+    A body of which only its own run shows it is `NotRun`.
+    """
+    if len(bodies) == 1:
+        return
+    for i in pick_hardest(bodies):
+        scene = bodies.take(i)
+        try:
+            if method.unsupported(scene) is None:
+                method.prepare(scene, grid)
+        except BadInput as refusal:
+            raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None
 
 
 def _require_memory(bodies: Bodies, grid: Grid) -> None:
-    """Raise `BadInput` if the samples of all bodies do not fit in memory."""
     most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
     if samples > most:
         got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
         raise BadInput("sample_every", got, f"a larger one: up to {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each")
 
 
-def run_all(
-    method: Method,
-    bodies: Bodies,
-    grid: Grid,
-    threads: int,
-    progress: Callable[[ProgressOfMany], object] | None,
-    choice: ChoiceForMany | None,
-) -> Ensemble:
-    """Return what all blocks give, in memory. Steps of the grid are in s."""
+def run_one(plan: Plan, progress: Tell | None) -> Ensemble:
+    """Return what a single body gives, at next to no cost beside that of `integrate`."""
+    found = plan.method.solve(plan.first, plan.grid)
+    if progress is not None:
+        progress(ProgressOfMany(0.0, 1, 1))
+    return ensemble_of_one(plan.bodies, plan.grid, found, plan.choice)
+
+
+def run_all(plan: Plan, threads: int, progress: Tell | None) -> Ensemble:
+    """Return what all blocks give, in memory."""
+    method, bodies, grid = plan.method, plan.bodies, plan.grid
     sink = Memory(bodies, grid, list_drifts(bodies))
     threads = min(threads, len(list_blocks(len(bodies), grid)))
     with start_threads(threads) as executor:
-        results = run_blocks(method, bodies, grid, executor, 2 * threads, sink.done)
-        fill(sink, results, len(bodies), progress)
-    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures, choice)
+        fill(sink, run_blocks(method, bodies, grid, executor, 2 * threads, sink.done), len(bodies), progress)
+    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures, plan.choice)
 
 
 class Sink(Protocol):
@@ -169,12 +215,7 @@ class Sink(Protocol):
         """Keep the result of the block that begins with body number `first`."""
 
 
-def fill(
-    sink: Sink,
-    results: Generator[tuple[int, BlockResult], None, None],
-    total: int,
-    progress: Callable[[ProgressOfMany], object] | None,
-) -> None:
+def fill(sink: Sink, results: Generator[tuple[int, BlockResult], None, None], total: int, progress: Tell | None) -> None:
     """Hand all results to a sink, and tell after each of them how many of all bodies are done."""
     begun, done = perf_counter(), 0
     with closing(results):
