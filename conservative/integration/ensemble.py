@@ -14,6 +14,7 @@ from ..check import choice as require_choice
 from ..errors import IntegrationFailed
 from ..method import Grid
 from ..methods.many import Bodies
+from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
 from . import tables
@@ -162,14 +163,15 @@ class DriftsOnDemand(Mapping[str, Array]):
 
 def ensemble_of_one(bodies: Bodies, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
     """Return the ensemble of one body whose trajectory is known."""
-    R_WB, w_WB_B = found.R_WB[None], found.w_WB_B[None]
+    R_WB, w_WB_B, failures = found.R_WB[None], found.w_WB_B[None], {}
     if found.failure is not None:
         missing = ((0, 0), (0, grid.n_samples - len(found)))
         R_WB = np.pad(R_WB, (*missing, (0, 0), (0, 0)), constant_values=np.nan)
         w_WB_B = np.pad(w_WB_B, (*missing, (0, 0)), constant_values=np.nan)
-    failures = {} if found.failure is None else {0: found.failure}
-    drifts = DriftsOnDemand(bodies, grid, R_WB, w_WB_B)
-    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, found.label, failures, choice)
+        failures[0] = found.failure
+    samples = {"bodies": bodies, "grid": grid, "R_WB": R_WB, "w_WB_B": w_WB_B}
+    drifts, rest = build_whole(DriftsOnDemand, samples), {"label": found.label, "failures": failures, "choice": choice}
+    return build_whole(Ensemble, {**samples, "drifts": drifts, **rest})
 
 
 class Memory:

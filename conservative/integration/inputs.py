@@ -19,6 +19,11 @@ from ..scene import Scene
 RATES = "three finite rates (3,), rad/s"
 
 
+def only_body(scene: Scene) -> Bodies:
+    """Return the body of a scene as one of one."""
+    return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
+
+
 def read_bodies(
     scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
 ) -> Bodies:
@@ -31,8 +36,6 @@ def read_bodies(
     BadInput
         An argument has another shape, or a body is one that `Scene` or its parts refuse.
     """
-    if R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None:
-        return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
     given: dict[str, Array] = {}
     for name, value, shapes in (
         ("R_WB0", _matrices_of(R_WB0), ((3, 3),)),

@@ -22,7 +22,7 @@ from .blocks import SAMPLE_BYTES as KEPT_BYTES
 from .blocks import BlockResult, list_blocks, run_blocks, start_threads
 from .drifts import list_drifts
 from .ensemble import Ensemble, Memory, ensemble_of_one
-from .inputs import read_bodies
+from .inputs import only_body, read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
 from .shared_choice import Goal, choose_for_all, pick_hardest
 
@@ -37,6 +37,9 @@ class Details(TypedDict, total=False):
     error: float | None
     threads: int | None
     progress: Tell | None
+
+
+_DETAILS = Details.__annotations__.keys()
 
 
 def integrate_many(
@@ -93,15 +96,16 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    unknown = sorted(set(details) - set(Details.__annotations__))
-    if unknown:
-        raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
+    if not details.keys() <= _DETAILS:
+        raise TypeError(f"integrate_many() got an unexpected keyword argument {min(details.keys() - _DETAILS)!r}")
     progress = _read_progress(details.get("progress"))
-    bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
-    alone = len(bodies) == 1
+    alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
+    bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
-        plan = make_plan(bodies, dt, t_end, details)
-        return run_one(plan, progress) if alone else run_all(plan, _read_threads(details.get("threads")), progress)
+        method, grid, choice = make_plan(bodies, dt, t_end, details)
+        if len(bodies) == 1:
+            return run_one(method, bodies, grid, choice, progress)
+        return run_all(Plan(method, bodies, grid, choice), _read_threads(details.get("threads")), progress)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
@@ -118,19 +122,10 @@ def _read_threads(value: object) -> int:
     return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """What is run: `first` is the scene of body number 0, and `choice` what was chosen for an error, if one was asked for."""
-
-    bodies: Bodies
-    first: Scene
-    method: Method
-    grid: Grid
-    choice: ChoiceForMany | None
-
-
-def make_plan(bodies: Bodies, dt: float | None, t_end: float | None, details: Details) -> Plan:
-    """Return what is run, with a method and steps, s, as they are given or chosen for an error.
+def make_plan(
+    bodies: Bodies, dt: float | None, t_end: float | None, details: Details
+) -> tuple[Method, Grid, ChoiceForMany | None]:
+    """Return the method and the grid of steps, s, as they are given, or as they were chosen for an error.
 
     Raises
     ------
@@ -139,17 +134,18 @@ def make_plan(bodies: Bodies, dt: float | None, t_end: float | None, details: De
     Unsupported
         The method cannot do the scene.
     """
-    first, error, every = bodies.first, details.get("error"), details.get("sample_every", 1)
-    if error is None:
-        method = read_method(details.get("method"), first)
-        grid, choice = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every), None
-        require_support(method, first)
-        require_steps(method, bodies, grid)
-    else:
+    first, every, error = bodies.first, details.get("sample_every", 1), details.get("error")
+    if error is not None:
         choice = _choose(bodies, error, (dt, t_end, every), details.get("method"))
-        method, grid = choice.method, choice.grid
-    _require_memory(bodies, grid)
-    return Plan(bodies, first, method, grid, choice)
+        _require_memory(bodies, choice.grid)
+        return choice.method, choice.grid, choice
+    method = read_method(details.get("method"), first)
+    grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
+    require_support(method, first)
+    if len(bodies) > 1:  # of one, the run says the same
+        _require_memory(bodies, grid)
+        require_steps(method, bodies, grid)
+    return method, grid, None
 
 
 def _choose(bodies: Bodies, error: object, steps: tuple[Any, ...], method: object) -> ChoiceForMany:
@@ -168,8 +164,6 @@ def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
 
     A body of which only its own run shows it is `NotRun`.
     """
-    if len(bodies) == 1:
-        return
     for i in pick_hardest(bodies):
         scene = bodies.take(i)
         try:
@@ -186,12 +180,22 @@ def _require_memory(bodies: Bodies, grid: Grid) -> None:
         raise BadInput("sample_every", got, f"a larger one: up to {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each")
 
 
-def run_one(plan: Plan, progress: Tell | None) -> Ensemble:
+def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:
     """Return what a single body gives, at next to no cost beside that of `integrate`."""
-    found = plan.method.solve(plan.first, plan.grid)
+    found = ensemble_of_one(bodies, grid, method.solve(bodies.first, grid), choice)
     if progress is not None:
         progress(ProgressOfMany(0.0, 1, 1))
-    return ensemble_of_one(plan.bodies, plan.grid, found, plan.choice)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is run, and what was chosen for an error, if one was asked for."""
+
+    method: Method
+    bodies: Bodies
+    grid: Grid
+    choice: ChoiceForMany | None
 
 
 def run_all(plan: Plan, threads: int, progress: Tell | None) -> Ensemble:
