@@ -70,12 +70,13 @@ def start_executor(client: Client) -> Iterator[ClusterExecutor]:
     """
     require_extra("client", "cluster")
     from distributed import KilledWorker
+    from distributed.comm import CommClosedError
 
     _require_client(client)
-    require_versions(client)
     try:
+        require_versions(client)
         yield ClusterExecutor(client)
-    except (KilledWorker, CancelledError) as error:
+    except (CommClosedError, KilledWorker, CancelledError) as error:
         raise BadInput("client", f"a cluster that was lost ({type(error).__name__}: {error})", _LOST) from error
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..check import describe
+from ..attitude import Array
+from ..check import describe, read_only
 from ..errors import BadInput, require_extra
 from ..method import Grid
 from ..methods.many import Bodies
@@ -24,8 +25,8 @@ _WHOLE = "one that is whole: integrate_many with the same arguments and resume=T
 def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
     """Return the ensemble that `integrate_many(..., path=...)` or `Ensemble.to_zarr` has written.
 
-    Samples stay on the disk: `ensemble.R_WB`, `ensemble.w_WB_B`, and what the bodies began with, are arrays of Zarr, of which
-    `ensemble.R_WB[:1000, -1]` reads 1000 last attitudes and nothing else. Drifts and outcomes are read at once.
+    Samples stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, of which `ensemble.R_WB[:1000, -1]` reads
+    the blocks of 1000 bodies and no others. So does what the bodies begin with. Drifts and outcomes are read at once.
 
     Parameters
     ----------
@@ -74,16 +75,33 @@ def _find_scene(record: dict[str, Any], scene: object) -> Scene:
 
 
 def _read_bodies(group: Any, scene: Scene, n: int) -> Bodies:
-    start = {name: array for name, array in _members(group, "start")}
+    start: dict[str, Any] = _read_members(group, "start")
     return Bodies(
         scene,
         start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3))),
         start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3))),
         start.get("inertia"),
-        dict(_members(group, "parameters")),
+        _read_members(group, "parameters"),
     )
 
 
-def _members(group: Any, name: str) -> list[tuple[str, Any]]:
+def _read_members(group: Any, name: str) -> dict[str, Any]:
     """Return the arrays of a group in the group, which is not there where it has none."""
-    return list(group[name].arrays()) if name in group else []
+    return {key: _OnDisk(array) for key, array in group[name].arrays()} if name in group else {}
+
+
+class _OnDisk:
+    """An array of Zarr whose parts are those of a NumPy array that is closed to writing: of a row of numbers, numbers."""
+
+    def __init__(self, array: Any) -> None:
+        self._array, self.shape = array, array.shape
+
+    def __len__(self) -> int:
+        return len(self._array)
+
+    def __getitem__(self, part: Any) -> Any:
+        found = np.asarray(self._array[part])
+        return read_only(found) if found.ndim else found[()]
+
+    def __array__(self, *options: Any, **more: Any) -> Array:
+        return np.asarray(self._array[:])
