@@ -109,8 +109,8 @@ def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: boo
     return Study(RANDOM, random.bodies(bodies, seed), methods, quick, skip_missing, Truths(random.precise))
 
 
-def throughput_study(methods: tuple[Method, ...], **extent: Any) -> throughput.ThroughputStudy:
-    """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword.
+def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> throughput.ThroughputStudy:
+    """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword, fewer bodies if it is quick.
 
     Raises
     ------
@@ -118,7 +118,8 @@ def throughput_study(methods: tuple[Method, ...], **extent: Any) -> throughput.T
         A number is not an integer of 1 or more, a seed not one of 0 or more, or there is no method.
     """
     scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
-    return throughput.ThroughputStudy(THROUGHPUT, scenes, methods, **extent)
+    usual = {"sizes": throughput.QUICK_SIZES, "bodies": throughput.QUICK_BODIES} if quick else {}
+    return throughput.ThroughputStudy(THROUGHPUT, scenes, methods, quick, **{**usual, **extent})
 
 
 def _silent(done: int, total: int, what: str) -> None:

@@ -113,13 +113,16 @@ class Kind:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A setting that reaches its end, in one way: errors, rad, by which one they are, and what a body costs in a call, s."""
+    """A setting that reaches its end, in one way: errors, rad, by which one they are, and what a body costs, s.
+
+    That is a share of a call, and of its preparation with what is compiled at hand; 0 until that has been measured.
+    """
 
     way: Way
     case: Case
     errors: dict[str, float]
     spent: float
-    prepare: float
+    prepare: float = 0.0
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -143,7 +146,7 @@ def find_kind(study: ThroughputStudy, name: str) -> Generator[Measurement, None,
     bodies = draw(name, max(*study.sizes, study.bodies), study.seed)
     grid, few = Grid(DURATION / SAMPLES, SAMPLES), bodies[: study.bodies]
     methods = [Heyoka(SMALLEST_TOL, frame) for frame in ("base_vectors", "body")]
-    found = [_attitudes(attempt_many(Way(method), few, grid, study.hang_limit)) for method in methods]
+    found = [_attitudes(attempt_many(Way(method, together=False), few, grid, study.hang_limit)) for method in methods]
     kind = Kind(study, bodies, found[0])
     agreement = float(angle_between(*found).max(axis=1).max())
     yield _case(kind, methods[0], grid).row(Value(Measure.AGREEMENT, agreement), detail=methods[1].label)
@@ -182,12 +185,12 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
         found = attempt_many(replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit)
         if isinstance(found, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, name_of(way, MEDIAN)), found)
-            if not line:
+            if way.method.unsupported(kind.bodies.scene):
                 break
             continue
         errors = read_errors(found, kind.truth)
         n = len(kind.few)
-        line.append(Point(way, case, errors, found.spent / n, found.prepare / n))
+        line.append(Point(way, case, errors, found.spent / n))
         for name, error in errors.items():
             yield case.row(Value(Measure.ATTITUDE_MAX, error, name_of(way, name)))
     return line
@@ -232,9 +235,13 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
             ready[str(i)] = found
     rounds = QUICK_ROUNDS if study.quick else ROUNDS
     timings = time_interleaved({key: found.run for key, found in ready.items()}, rounds, CALL, budget=study.timing_budget)
-    for key, found in ready.items():
-        yield from rows_of(points[int(key)], size, timings[key], found.prepare / size)
-    return [points[int(key)] for key in ready]
+    done = [
+        replace(points[int(key)], spent=min(points[int(key)].spent, timings[key].minimum / size), prepare=found.prepare / size)
+        for key, found in ready.items()
+    ]
+    for point, timing in zip(done, timings.values(), strict=True):
+        yield from rows_of(point, size, timing)
+    return [point for point, timing in zip(done, timings.values(), strict=True) if timing.outcome.ok]
 
 
 def too_long(point: Point, size: int, limit: float) -> Outcome | None:
@@ -245,13 +252,13 @@ def too_long(point: Point, size: int, limit: float) -> Outcome | None:
     return None
 
 
-def rows_of(point: Point, size: int, timing: Timing, prepare: float) -> Iterator[Measurement]:
+def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
     """Yield what a body costs among so many: the time, s per simulated second, steps per second, and the preparation, s."""
     case, a_body = point.case, timing.minimum / size
     values = {
         Measure.TIME: a_body / DURATION,
         Measure.BODY_STEPS: math.nan if tolerance_setting(case.method) else case.grid.n_steps / a_body,
-        Measure.PREPARE: prepare,
+        Measure.PREPARE: point.prepare,
     }
     for measure, value in values.items():
         outcome = UNCOUNTED if timing.outcome.ok and math.isnan(value) else timing.outcome
