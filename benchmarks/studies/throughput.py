@@ -60,6 +60,8 @@ PREPARATION = 8.0
 ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
 """Which error of the bodies a value is of."""
+EXACT = "exact solution"
+"""Detail of errors that do not depend on the step."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,7 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
         n = len(kind.few)
         line.append(Point(way, case, errors, found.spent / n))
         for name, error in errors.items():
-            yield case.row(Value(Measure.ATTITUDE_MAX, error, name_of(way, name)))
+            yield case.row(Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method))
     return line
 
 
