@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from . import kernel, small
-from .lanes_llvm import choose, every, fill_like, lane_of, load, save, with_lane
+from .lanes import choose, every, fill_like, lane_of, load, save, with_lane
 from .reduced import (
     FEW,
     NEAR,
