@@ -5,7 +5,7 @@ from __future__ import annotations
 from llvmlite import ir
 from numba.core import cgutils
 
-from .series import HIGHEST, LOWEST, sum_orders
+from .series import HIGHEST, LOWEST, Straight, sum_orders
 from .simd_llvm import LANES
 
 MOST_STORED = 12 * HIGHEST
@@ -24,7 +24,7 @@ class _VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlit
         buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align 32\n")
 
 
-class Emitter:
+class Emitter(Straight):
     """Vector instructions by name, and memory for vectors."""
 
     def __init__(self, builder):
