@@ -26,18 +26,18 @@ TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
 
 
 class History:
-    """Coefficients of one quantity: the newest and the first are at hand, all others come out of memory."""
+    """Coefficients of one quantity: the newest and the first are at hand, all others come out of memory, from `places`."""
 
     def __init__(self, emit):
-        self._emit, self._values, self._places = emit, [], []
+        self._emit, self._values, self.places = emit, [], []
 
     def push(self, value):
         """Take the next coefficient."""
         self._values.append(value)
-        self._places.append(self._emit.store(value))
+        self.places.append(self._emit.store(value))
 
     def __getitem__(self, n):
-        return self._emit.load(self._places[n]) if 0 < n < len(self._values) - 1 else self._values[n]
+        return self._emit.load(self.places[n]) if 0 < n < len(self._values) - 1 else self._values[n]
 
 
 class Vectors:

@@ -15,13 +15,13 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INDEX = ir.IntType(32)
 
 
-class _VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
+class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
     """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
 
     def descr(self, buf):
         (pointer,) = self.operands
         kind = pointer.type
-        buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align 32\n")
+        buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {8 * kind.pointee.count}\n")
 
 
 class Emitter(Straight):
@@ -77,7 +77,7 @@ class Emitter(Straight):
 
     def load(self, at):
         """What was stored there."""
-        found = _VolatileLoad(self._builder.block, at, "")
+        found = VolatileLoad(self._builder.block, at, "")
         self._builder._insert(found)
         return found
 
