@@ -69,29 +69,8 @@ def outwards(n, first, last):
     return sorted(range(first, last + 1), key=lambda i: (abs(2 * i - n), -i))
 
 
-class Straight:
-    """Sums term by term, in what emits single operations on fours."""
-
-    def add_up(self, v):
-        """The sum of three lanes, in all of them."""
-        return self.plus(self.plus(v, self.shuffle(v, TURNED)), self.shuffle(v, TWICE))
-
-    def convolve(self, n, first, last, *sums, start=None):
-        """Sums over i = first ... last of x[i] y[n-i], less those of another pair, of which each sum has two or one.
-
-        What the first begins with is `start`; None where there are no terms.
-        """
-        found = [[start if k == 0 else None] + [None] * (len(pairs) - 1) for k, pairs in enumerate(sums)]
-        for i in outwards(n, first, last):
-            loaded = {}
-            for k, pairs in enumerate(sums):
-                for j, (x, y) in enumerate(pairs):
-                    a, b = (_load_once(loaded, *each) for each in ((x, i), (y, n - i)))
-                    found[k][j] = self.add(found[k][j], a, b)
-        return [parts[0] if len(parts) == 1 or parts[0] is None else self.minus(*parts) for parts in found]
-
-
-def _load_once(loaded, history, i):
+def load_once(loaded, history, i):
+    """Coefficient i of a history, out of memory only if it has not been `loaded` yet."""
     key = id(history), i
     if key not in loaded:
         loaded[key] = history[i]
@@ -142,19 +121,66 @@ def _next_rates(emit, c, n, sums, f, f1, f2, K, field):
     return emit.add(new, emit.times(f2, K), c[n, 4]) if n else new
 
 
-def next_coefficients(emit, c, n, h, K, field):
-    """The coefficients n + 1 of g, a and w."""
-    f = emit.times(h, emit.constant(1.0 / (n + 1)))
+def _products(c):
+    """What `convolve` takes for g x w, a x w and w2 w3 and its kin."""
     (g_r, g_s), (a_r, a_s), (w_r, w_s) = (c.turned(k) for k in range(3))
-    products = ((g_r, w_s), (g_s, w_r)), ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
-    gw, aw, ww = emit.convolve(n, 1, n - 1, *products)
+    return ((g_r, w_s), (g_s, w_r)), ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
+
+
+def _turn_rows(emit, c, f, field, g, a):
+    """The rows where their axes turn with a field."""
+    by = emit.times(f, field.turn)
+    return emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
+
+
+def next_in_short_chains(emit, c, n, h, K, field):
+    """The coefficients n + 1 of g, a and w, with few operations after the newest."""
+    f = emit.times(h, emit.constant(1.0 / (n + 1)))
+    gw, aw, ww = emit.convolve(n, 1, n - 1, *_products(c))
     f1, f2 = emit.times(f, c[0, 4]), emit.times(f, c[0, 5])
     g = _next_row(emit, c, n, 0, gw, f, f1, f2)
     a = _next_row(emit, c, n, 2, aw, f, f1, f2)
     if isinstance(field, TurningSeries):
-        by = emit.times(f, field.turn)
-        g, a = emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
+        g, a = _turn_rows(emit, c, f, field, g, a)
     return g, a, _next_rates(emit, c, n, ww, f, f1, f2, K, field)
+
+
+def next_by_sums(emit, c, n, h, K, field):
+    """The coefficients n + 1 of g, a and w, with few operations in all."""
+    f = emit.times(h, emit.constant(1.0 / (n + 1)))
+    gw, aw, ww = emit.convolve(n, 0, n, *_products(c))
+    torque = field.accelerate(c, n)
+    rates = emit.times(K, ww) if torque is None else emit.add(torque, K, ww)
+    g, a = emit.times(f, gw), emit.times(f, aw)
+    if isinstance(field, TurningSeries):
+        g, a = _turn_rows(emit, c, f, field, g, a)
+    return g, a, emit.times(f, rates)
+
+
+class Straight:
+    """Sums term by term, in what emits single operations on fours."""
+
+    def find_next(self, *given):
+        """The next coefficients: nothing else is there to be done while a sum waits for the newest."""
+        return next_in_short_chains(self, *given)
+
+    def add_up(self, v):
+        """The sum of three lanes, in all of them."""
+        return self.plus(self.plus(v, self.shuffle(v, TURNED)), self.shuffle(v, TWICE))
+
+    def convolve(self, n, first, last, *sums, start=None):
+        """Sums over i = first ... last of x[i] y[n-i], less those of another pair, of which each sum has two or one.
+
+        What the first begins with is `start`; None where there are no terms.
+        """
+        found = [[start if k == 0 else None] + [None] * (len(pairs) - 1) for k, pairs in enumerate(sums)]
+        for i in outwards(n, first, last):
+            loaded = {}
+            for k, pairs in enumerate(sums):
+                for j, (x, y) in enumerate(pairs):
+                    a, b = (load_once(loaded, *each) for each in ((x, i), (y, n - i)))
+                    found[k][j] = self.add(found[k][j], a, b)
+        return [parts[0] if len(parts) == 1 or parts[0] is None else self.minus(*parts) for parts in found]
 
 
 def find_terms(emit, h, start, K, field):
@@ -162,7 +188,7 @@ def find_terms(emit, h, start, K, field):
     c = Vectors(emit)
     c.push(start)
     for n in range(HIGHEST):
-        term = next_coefficients(emit, c, n, h, K, field)
+        term = emit.find_next(c, n, h, K, field)
         yield term
         c.push(term)
 

@@ -14,13 +14,11 @@ from llvmlite import ir
 from numba.core import cgutils
 
 from .lanes_llvm import REGISTER
-from .series import HIGHEST, LOWEST, Straight, find_terms
+from .series import HIGHEST, LOWEST, find_terms, load_once, next_by_sums, outwards
 from .series_llvm import VolatileLoad
 from .traced import Axes
 
 LOOPS_FROM = 6
-MOST_SUMS = 9
-"""Sums of a loop, of which a register each is taken."""
 MOST_STORED = 24 * (HIGHEST + 1)
 """Registers that a step may keep in memory."""
 
@@ -29,7 +27,7 @@ _BYTES = 8 * REGISTER
 _INDEX = ir.IntType(64)
 
 
-class Emitter(Straight):
+class Emitter:
     """Vector instructions by name, and memory for registers."""
 
     def __init__(self, builder):
@@ -40,6 +38,10 @@ class Emitter(Straight):
             memory = builder.alloca(_VECTOR, MOST_STORED)
             memory.align = _BYTES
             self._memory = builder.bitcast(memory, ir.IntType(8).as_pointer())
+
+    def find_next(self, *given):
+        """The next coefficients: another order's sums are formed while one waits for the newest."""
+        return next_by_sums(self, *given)
 
     def _each(self, build, *values):
         """What `build` makes of every component; a scalar has one for all of them."""
@@ -108,47 +110,37 @@ class Emitter(Straight):
         return found
 
     def convolve(self, n, first, last, *sums, start=None):
-        """As `Straight.convolve`: old coefficients in loops, the newest and the first after them."""
-        if n < LOOPS_FROM:
-            return super().convolve(n, first, last, *sums, start=start)
-        found = []
-        for group in _divide(sums):
-            begin = start if not found else None
-            found += [self._end(n, first, last, pairs, parts) for pairs, parts in self._loop(n, group, begin)]
-        return found
+        """As `Straight.convolve`, with one total for both pairs of a sum, and old coefficients in a loop."""
+        totals, rest = [start] + [None] * (len(sums) - 1), outwards(n, first, last)
+        if n >= LOOPS_FROM:
+            totals, rest = self._sum_old(n, sums, totals), [i for i in (n, 0) if first <= i <= last]
+        for i in rest:
+            loaded = {}
+            totals = [
+                self._add_product(total, [tuple(load_once(loaded, *each) for each in ((x, i), (y, n - i))) for x, y in pairs])
+                for total, pairs in zip(totals, sums, strict=True)
+            ]
+        return totals
 
-    def _end(self, n, first, last, pairs, parts):
-        """A sum out of its parts without the products of the newest and the first."""
-        for i in (n, 0):
-            if first <= i <= last:
-                parts = [self.add(part, x[i], y[n - i]) for part, (x, y) in zip(parts, pairs, strict=True)]
-        return parts[0] if len(parts) == 1 else self.minus(*parts)
+    def _add_product(self, total, pairs):
+        total = self.add(total, *pairs[0])
+        return total if len(pairs) == 1 else self.subtract(total, *pairs[1])
 
-    def _loop(self, n, sums, start):
-        """Pairs and parts of sums over i = 1 ... n-1."""
-        pairs = [pair for each in sums for pair in each]
-        totals = [self.constant(0.0) * _width(*pair) for pair in pairs]
-        if start is not None:
-            totals[0] = start
-        if n % 2 == 0:
-            totals = [self.add(total, x[n // 2], y[n // 2]) for total, (x, y) in zip(totals, pairs, strict=True)]
-        found = iter(self._loop_outwards(n, pairs, totals))
-        return [(each, [next(found) for _ in each]) for each in sums]
-
-    def _loop_outwards(self, n, pairs, totals):
-        """The totals with the products of i and n - i, and of n - i and i, for all i from n/2 to n - 1."""
-        builder, step = self._builder, _line(pairs[0][0])[1] * _BYTES
+    def _sum_old(self, n, sums, totals):
+        """The totals with the products of i and n - i for i = 1 ... n-1."""
+        builder, step = self._builder, _line(sums[0][0][0])[1] * _BYTES
+        totals = [total or self.constant(0.0) * _width(*pairs[0]) for total, pairs in zip(totals, sums, strict=True)]
         before, body, after = builder.block, *(builder.append_basic_block(f"{name}_{n}") for name in ("loop", "after"))
         builder.branch(body)
         builder.position_at_end(body)
-        upper, found = self._phi(_bytes((n // 2 + 1) * step), before), [self._phis(total, before) for total in totals]
-        phis, lower = found, builder.sub(_bytes(n * step), upper)
-        for i, j in ((upper, lower), (lower, upper)):
-            loaded = {}
-            products = [(self._load_at(loaded, x, i), self._load_at(loaded, y, j)) for x, y in pairs]
-            found = [self.add(total, *product) for total, product in zip(found, products, strict=True)]
-        following = builder.add(upper, _bytes(step))
-        for phi, value in ((upper, following), *zip(sum(phis, ()), sum(found, ()), strict=True)):
+        i, phis = self._phi(_bytes(step), before), [self._phis(total, before) for total in totals]
+        j, loaded = builder.sub(_bytes(n * step), i), {}
+        found = [
+            self._add_product(total, [(self._load_at(loaded, x, i), self._load_at(loaded, y, j)) for x, y in pairs])
+            for total, pairs in zip(phis, sums, strict=True)
+        ]
+        following = builder.add(i, _bytes(step))
+        for phi, value in ((i, following), *zip(sum(phis, ()), sum(found, ()), strict=True)):
             phi.add_incoming(value, body)
         _keep_rolled(builder.module, builder.cbranch(builder.icmp_unsigned("<", following, _bytes(n * step)), body, after))
         builder.position_at_end(after)
@@ -208,19 +200,6 @@ def _line(history):
     zero = tuple(place - step for place in history.places[1])
     assert all(places == tuple(k + i * step for k in zero) for i, places in enumerate(history.places) if i)
     return zero, step
-
-
-def _divide(sums):
-    """Groups of sums that registers hold."""
-    groups, size = [[]], 0
-    for pairs in sums:
-        more = sum(_width(*pair) for pair in pairs)
-        if groups[-1] and size + more > MOST_SUMS:
-            groups.append([])
-            size = 0
-        groups[-1].append(pairs)
-        size += more
-    return groups
 
 
 def _keep_rolled(module, branch):

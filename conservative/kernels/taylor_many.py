@@ -17,8 +17,8 @@ from .traced import add, cross, dot, scale, times, trace, where_above
 class Models(NamedTuple):
     """As `taylor.Model`, with what steps and samples are made of; numbers of it are columns of an array.
 
-    `h` is the length of a step in the units of the body. `axes` are the columns of the rotation from axes D to the world's,
-    `R_BP` the rows of that from principal to body axes, and `units` what rates in the units of the body are multiplied by to
+    `h` is the length of a step in the units of the body. `axes` are the rows of the rotation from axes D to the world's,
+    `R_BP` those of that from principal to body axes, and `units` what rates in the units of the body are multiplied by to
     be those of samples: the third has the spin in it where the body turns in a frame that does not.
     """
 
@@ -86,9 +86,8 @@ def count_failures(failed, left):
 def find_sample(model, turn, g, a, w):
     """Return the rows of R_WB, one after the other, and w_WB_B; `turn` is cosine and sine of the angle of a spin left out."""
     b, (cos, sin), (x, y, z) = cross(g, a), turn, times(model.units, w)
-    first, second, third = model.axes
     w = cos * x + sin * y, cos * y - sin * x, z
-    R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in zip(first, second, third, strict=True)]
+    R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in model.axes]
     R_WP = [(cos * x + sin * y, cos * y - sin * x, z) for x, y, z in R_WP]
     return tuple(dot(row, axis) for row in (*R_WP, w) for axis in model.R_BP)
 
