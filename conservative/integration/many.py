@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Generator, Mapping
 from contextlib import closing
-from typing import Protocol, TypedDict, Unpack
+from pathlib import Path
+from typing import Any, Protocol, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -14,11 +15,11 @@ from ..errors import BadInput
 from ..method import Grid, Method, grid_for
 from ..methods.many import Bodies
 from ..scene import Scene
-from .blocks import BlockResult, list_blocks, run_blocks, start_threads
-from .drifts import list_drifts
-from .ensemble import Ensemble, Memory
+from .blocks import BlockResult, list_blocks, run_blocks
+from .ensemble import Ensemble
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
+from .places import Place
 
 
 class Details(TypedDict, total=False):
@@ -27,6 +28,9 @@ class Details(TypedDict, total=False):
     method: Method | str | None
     sample_every: int
     threads: int | None
+    path: str | Path | None
+    resume: bool
+    client: Any
 
 
 def integrate_many(
@@ -63,11 +67,24 @@ def integrate_many(
     threads
         How many blocks of bodies run side by side; default: as many as there are processors for this process. Numbers do not
         depend on it.
+    path
+        A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
+        memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
+    resume
+        Whether the folder may have some blocks of the same run, which was interrupted: the others are added. The folder is then
+        the same, byte for byte, as that of a run without a break.
+    client
+        A `dask.distributed.Client`: blocks run on its workers, instead of threads of this process.
 
     Raises
     ------
     BadInput
-        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number.
+        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number. Or the folder is there
+        without `resume`, or is something else or of another run; or the cluster has no workers, or some of another version.
+    NotWritten
+        The folder cannot be written, or the disk is full; blocks that are done are kept.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed, or Dask, of the extra `cluster`.
     MissingEngine
         A method of that name needs an engine that is not installed.
     Unsupported
@@ -79,12 +96,13 @@ def integrate_many(
     if unknown:
         raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
     bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
-    threads = _read_threads(details.get("threads"))
+    to = details.get("client"), details.get("path"), details.get("resume", False)
+    place = Place(_read_threads(details.get("threads")), *to)
     method = read_method(details.get("method"), bodies.take(0))
     grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, details.get("sample_every", 1))
     require_support(method, bodies.take(0))
     try:
-        return run_all(method, bodies, grid, threads)
+        return run_all(method, bodies, grid, place)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
@@ -95,13 +113,12 @@ def _read_threads(value: object) -> int:
     return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
 
 
-def run_all(method: Method, bodies: Bodies, grid: Grid, threads: int) -> Ensemble:
-    """Return what all blocks give, in memory."""
-    sink = Memory(bodies, grid, list_drifts(bodies))
-    threads = min(threads, len(list_blocks(len(bodies), grid)))
-    with start_threads(threads) as executor:
-        fill(sink, run_blocks(method, bodies, grid, executor, 2 * threads, sink.done))
-    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures)
+def run_all(method: Method, bodies: Bodies, grid: Grid, place: Place) -> Ensemble:
+    """Return what all blocks give, in memory or in a folder."""
+    what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
+    with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
+        fill(sink, run_blocks(method, bodies, grid, executor, in_flight, sink.done))
+    return place.read(sink, *what)
 
 
 class Sink(Protocol):
