@@ -51,7 +51,7 @@ def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
     from distributed import Client
 
     with ExitStack() as stack:
-        stack.enter_context(_silence("distributed", "tornado.application"))
+        stack.enter_context(_silence("distributed", "distributed.client", "tornado.application"))
         try:
             client = stack.enter_context(Client(address, timeout=limit, set_as_default=False))
         except Exception as error:  # whatever else listens there can answer anything

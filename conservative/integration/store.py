@@ -11,8 +11,8 @@
 Numbers are as in memory, uncompressed: random digits do not compress. The attributes of the group say what is run, with a
 digest of all that the numbers follow from. The outcomes of a block are written last, and no body's is 255: a block is done
 exactly if its outcomes are there. Zarr writes a chunk under another name, which it then changes: a process that is killed, or a
-disk that is full, leaves whole blocks, and no part that is taken for one. Chunks are not forced to the disk one by one: with its
-power a machine can lose some that were written last.
+disk that is full, leaves whole blocks, and no part that is taken for one. Chunks are not forced to the disk one by one: with
+its power a machine can lose some that were written last.
 
 Source: Zarr's specification, version 3; the layout is our own.
 """
