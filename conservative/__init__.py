@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .integration.ensemble import Ensemble as Ensemble
     from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
+    from .integration.reading import open_ensemble as open_ensemble
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -109,6 +110,7 @@ _PLACES = {
     "WrongBranch": "errors",
     "integrate": "integration.one",
     "integrate_many": "integration.many",
+    "open_ensemble": "integration.reading",
 }
 
 __all__ = [
@@ -157,6 +159,7 @@ __all__ = [
     "WrongBranch",
     "integrate",
     "integrate_many",
+    "open_ensemble",
     "scenes",
     "shapes",
 ]
