@@ -23,6 +23,21 @@ class FilePath(click.Path):
         return Path(str(value))
 
 
+class Count(click.ParamType):
+    """A number of things, 1 or more, which may be written as 1e6."""
+
+    name = "count"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        try:
+            number = float(str(value))
+            if number >= 1 and number.is_integer():
+                return int(number)
+        except (ValueError, OverflowError):  # the latter: infinite
+            pass
+        self.fail(f"got {value!r}; allowed: an integer of 1 or more, such as 1000 or 1e6", param, ctx)
+
+
 find_links_option = click.option(
     "--find-links",
     type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
