@@ -26,10 +26,13 @@ if TYPE_CHECKING:
     from .errors import MissingExtra as MissingExtra
     from .errors import NotConserved as NotConserved
     from .errors import NotConverged as NotConverged
+    from .errors import NotRun as NotRun
     from .errors import NotWritten as NotWritten
     from .errors import PotentialFailed as PotentialFailed
     from .errors import Unsupported as Unsupported
     from .errors import WrongBranch as WrongBranch
+    from .integration.ensemble import Ensemble as Ensemble
+    from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
@@ -68,6 +71,7 @@ _PLACES = {
     "Convected": "methods.convected",
     "Counters": "trajectory",
     "Diverged": "errors",
+    "Ensemble": "integration.ensemble",
     "FunctionPotential": "potentials.python_function",
     "Gauss": "methods.gauss",
     "GravityGradient": "potentials.gravity_gradient",
@@ -83,6 +87,7 @@ _PLACES = {
     "MoserVeselov": "methods.moser_veselov",
     "NotConserved": "errors",
     "NotConverged": "errors",
+    "NotRun": "errors",
     "NotWritten": "errors",
     "Orbit": "potentials.turning",
     "Outcome": "outcome",
@@ -103,6 +108,7 @@ _PLACES = {
     "Unsupported": "errors",
     "WrongBranch": "errors",
     "integrate": "integration.one",
+    "integrate_many": "integration.many",
 }
 
 __all__ = [
@@ -113,6 +119,7 @@ __all__ = [
     "Convected",
     "Counters",
     "Diverged",
+    "Ensemble",
     "FunctionPotential",
     "Gauss",
     "GravityGradient",
@@ -128,6 +135,7 @@ __all__ = [
     "MoserVeselov",
     "NotConserved",
     "NotConverged",
+    "NotRun",
     "NotWritten",
     "Orbit",
     "Outcome",
@@ -148,6 +156,7 @@ __all__ = [
     "Unsupported",
     "WrongBranch",
     "integrate",
+    "integrate_many",
     "scenes",
     "shapes",
 ]

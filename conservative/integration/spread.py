@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from numbers import Integral
 from typing import Any, TypedDict
 
@@ -19,6 +19,7 @@ from ..attitude import Array, from_quaternion
 from ..check import describe, positive_integer
 from ..errors import BadInput, nearest
 from ..scene import Scene
+from . import inputs
 from .deviation import Deviation, read_angle, read_number, read_rate, read_share
 
 _PIECE = 1 << 16
@@ -97,12 +98,8 @@ def spread(
 
 
 def list_parameters(scene: Scene) -> list[str]:
-    """Return the names of what `spread` can vary of a scene's potential: its numbers and vectors, but no inertia."""
-    potential: Any = scene.potential
-    if not is_dataclass(potential):
-        return []
-    kinds = {field.name: getattr(potential, field.name) for field in fields(potential)}
-    return [name for name, value in kinds.items() if name != "inertia" and (type(value) is float or np.shape(value) == (3,))]
+    """Return the names of what `spread` can vary of a scene's potential: its numbers and vectors."""
+    return [name for name, shape in inputs.list_parameters(scene.potential).items() if shape in ((), (3,))]
 
 
 def _read_seed(seed: object) -> int:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from . import kernel, small
 from .lame import DAMPING, curve, scale_of, split_step, unit_vertical
-from .lanes_llvm import load, save
+from .lanes import load, save
 from .vector import add, cross, product, scale
 
 

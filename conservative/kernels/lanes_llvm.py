@@ -2,14 +2,15 @@
 
 Functions of `small` that are written for floats and branch on nothing compile for lanes as they are: + - * / between lanes, and
 between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max` are LLVM's vector instructions. Comparisons give a
-`Mask`, a truth value for each lane, joined by & | ~; `choose(mask, a, b)` takes a or b in each lane, `every(mask)` and
-`some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
+`Mask`, a truth value for each lane, joined by & | ~; `choose(mask, a, b)` takes a or b, numbers or tuples of lanes, in each
+lane, `every(mask)` and `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
 body and lanes.
 
 A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that
 results do not depend on the width: in a wider vector LLVM fuses other products with sums.
 
-`load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks.
+`load(array, index, width)` and `save(array, index, lanes)` are for contiguous arrays of one dimension, without bounds checks;
+`load_rows` and `save_rows` do the same for several numbers, each `stride` floats after the last.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 
 from . import SMALL
+from .lanes_plain import choose, every, fill_like, some
 
 _DOUBLE, _BIT, _INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
 
 
 REGISTER = 4
-"""Floats in a register; a width is a multiple of it."""
+"""Floats in a register; a width is a multiple of it. It is 4 on every processor: where registers are shorter LLVM takes several
+for each, and where they are longer results would depend on the processor, for the reason above."""
 
 
 class Lanes(types.Type):
@@ -161,6 +164,16 @@ _logical(operator.or_, lambda b, x, y: b.or_(x, y))
 
 
 @intrinsic
+def _choose_tuple(typing, mask, a, b):
+    def build(context, builder, sig, args):
+        pairs = zip(cgutils.unpack_tuple(builder, args[1]), cgutils.unpack_tuple(builder, args[2]), strict=True)
+        chosen = [_each(builder, lambda b, m, x, y: b.select(m, x, y), args[0], *pair) for pair in pairs]
+        return context.make_tuple(builder, sig.return_type, chosen)
+
+    return a(mask, a, b), build
+
+
+@intrinsic
 def _choose_lanes(typing, mask, a, b):
     lanes = _common((a, b)) or Lanes(mask.width)
 
@@ -171,14 +184,11 @@ def _choose_lanes(typing, mask, a, b):
     return lanes(mask, a, b), build
 
 
-def choose(mask, a, b):
-    """a where the mask is true, b elsewhere."""
-    return a if mask else b
-
-
 @overload(choose, inline="never", jit_options=SMALL)
 def _choose(mask, a, b):
     if isinstance(mask, Mask):
+        if isinstance(a, types.BaseTuple) and a == b:
+            return lambda mask, a, b: _choose_tuple(mask, a, b)
         return lambda mask, a, b: _choose_lanes(mask, a, b)
     return lambda mask, a, b: a if mask else b
 
@@ -203,16 +213,6 @@ def _every_lane(typing, mask):
 @intrinsic
 def _some_lane(typing, mask):
     return types.boolean(mask), lambda context, builder, sig, args: _reduced(builder, args[0], "or")
-
-
-def every(mask):
-    """Whether all lanes are true."""
-    return bool(mask)
-
-
-def some(mask):
-    """Whether any lane is true."""
-    return bool(mask)
 
 
 @overload(every, jit_options=SMALL)
@@ -246,11 +246,6 @@ def fuse(typing, a, b, c):
         return _each(builder, lambda b, x, y, z: _call(b, "fma", x, y, z), *values)
 
     return kind(a, b, c), build
-
-
-def fill_like(x, like):
-    """The number x in every lane, in the type of `like`."""
-    return x
 
 
 @overload(fill_like, jit_options=SMALL)
@@ -287,21 +282,38 @@ def with_lane(typing, a, index, x):
     return a(a, types.intp, types.float64), build
 
 
+def _float_address(context, builder, array_type, array, index):
+    return builder.gep(context.make_array(array_type)(context, builder, array).data, [index])
+
+
 def _address(context, builder, array_type, array, index, part):
-    data = context.make_array(array_type)(context, builder, array).data
     place = builder.add(index, ir.Constant(index.type, part * REGISTER))
-    return builder.bitcast(builder.gep(data, [place]), ir.VectorType(_DOUBLE, REGISTER).as_pointer())
+    first = _float_address(context, builder, array_type, array, place)
+    return builder.bitcast(first, ir.VectorType(_DOUBLE, REGISTER).as_pointer())
+
+
+def _load(context, builder, array_type, array, index, kind):
+    if kind == types.float64:
+        return builder.load(_float_address(context, builder, array_type, array, index))
+    at = [_address(context, builder, array_type, array, index, i) for i in range(kind.width // REGISTER)]
+    return _pack(builder, [builder.load(pointer, align=8) for pointer in at])
+
+
+def _save(context, builder, array_type, array, index, kind, value) -> None:
+    if kind == types.float64:
+        builder.store(value, _float_address(context, builder, array_type, array, index))
+        return
+    for i, (part,) in enumerate(_parts(builder, value)):
+        builder.store(part, _address(context, builder, array_type, array, index, i), align=8)
 
 
 @intrinsic(prefer_literal=True)
 def load(typing, array, index, width):
-    """array[index : index + width], the width a number in the source."""
-    kind = Lanes(width.literal_value)
+    """array[index : index + width], the width a number in the source; or as many as another number has: lanes or a float."""
+    kind = Lanes(width.literal_value) if isinstance(width, types.Literal) else width
 
     def build(context, builder, sig, args):
-        parts = range(kind.width // REGISTER)
-        at = [_address(context, builder, sig.args[0], args[0], args[1], i) for i in parts]
-        return _pack(builder, [builder.load(pointer, align=8) for pointer in at])
+        return _load(context, builder, sig.args[0], *args[:2], kind)
 
     return kind(array, types.intp, width), build
 
@@ -311,8 +323,37 @@ def save(typing, array, index, value):
     """array[index : index + width] = value"""
 
     def build(context, builder, sig, args):
-        for i, (part,) in enumerate(_parts(builder, args[2])):
-            builder.store(part, _address(context, builder, sig.args[0], *args[:2], i), align=8)
+        _save(context, builder, sig.args[0], *args[:2], sig.args[2], args[2])
         return context.get_dummy_value()
 
     return types.none(array, types.intp, value), build
+
+
+@intrinsic(prefer_literal=True)
+def load_rows(typing, array, index, stride, count, width):
+    """The tuple of `count` numbers at index, index + stride and so on; count and width are numbers in the source."""
+    kind = Lanes(width.literal_value)
+    rows = types.UniTuple(kind, count.literal_value)
+
+    def build(context, builder, sig, args):
+        found, at = [], args[1]
+        for _ in range(rows.count):
+            found.append(_load(context, builder, sig.args[0], args[0], at, kind))
+            at = builder.add(at, args[2])
+        return context.make_tuple(builder, rows, found)
+
+    return rows(array, types.intp, types.intp, count, width), build
+
+
+@intrinsic
+def save_rows(typing, array, index, stride, values):
+    """Store a tuple of numbers at index, index + stride and so on."""
+
+    def build(context, builder, sig, args):
+        at = args[1]
+        for number in cgutils.unpack_tuple(builder, args[3]):
+            _save(context, builder, sig.args[0], args[0], at, sig.args[3][0], number)
+            at = builder.add(at, args[2])
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, types.intp, values), build

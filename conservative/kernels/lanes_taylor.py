@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from . import kernel, small
+from .lanes import choose, fill_like, fuse, load, save, some
 from .lanes_emitter import emitted_orders
-from .lanes_llvm import choose, fill_like, fuse, load, save, some
 from .lanes_series_llvm import lane_orders
 from .vector import add, cross, dot, scale, subtract, times
 

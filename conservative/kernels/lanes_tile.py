@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import kernel, small
-from .lanes_llvm import fill_like, load, save, some
+from .lanes import fill_like, load, save, some
 from .lanes_taylor import ENOUGH, FAR, add_cross, add_mixed, choose_vector, correct, load3, save3, values
 from .vector import add, cross, scale, times
 
