@@ -14,16 +14,19 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.check import positive_number
-from conservative.errors import BadInput, nearest
+from conservative.check import MOST_STEPS, describe, positive_number
+from conservative.errors import BadInput, NotWritten, nearest
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
 from conservative.integration.spread import spread
 from conservative.method import grid_for
+from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
-from ..tables.cells import outcome_record
+from ..tables.cells import finite_or_none, outcome_record
+from ..tables.sweep import rate_text
+from ..terminal.supervision import tell
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
@@ -32,8 +35,10 @@ MOST_TIMES = 6
 """Times at which a summary tells how far attitudes are apart."""
 MOST_FAILURES = 10
 """Failures that a summary lists."""
-Told = Callable[[int, int], None]
-"""Called with the number of bodies that are done, and of all."""
+Step = Callable[[float, str], None]
+_WORDS = {"path": "out", "sample_every": "samples", "client": "scheduler", "n": "starts"}
+"""Arguments of functions, and the options that they come from."""
+_FOLDER = "a folder that is not there yet, such as sweep.zarr; the picture goes beside it, into sweep.svg"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,8 @@ class Sweep:
     spread: Mapping[str, Any]
     seed: int
     settings: Mapping[str, Any]
+    steps: int | None = None
+    """Of each body, where that is known before the run."""
 
 
 def read_spread(items: Iterable[str]) -> dict[str, Any]:
@@ -79,32 +86,84 @@ def plan(scene_name: str, n: int, varied: Mapping[str, Any], seed: int, **settin
         A name or a number cannot be used.
     """
     scene = registry.scene(scene_name)
-    samples, dt, error = settings.pop("samples"), settings.pop("dt"), settings["error"]
-    if error is None:
-        grid = grid_for(scene, scene.dt if dt is None else dt, settings["t_end"], 2**53)
+    samples, dt, end = settings.pop("samples"), settings.pop("dt"), settings["t_end"]
+    if settings["error"] is None:
+        grid = grid_for(scene, scene.dt if dt is None else dt, end, MOST_STEPS)
         settings |= {"dt": grid.dt, "sample_every": math.ceil(grid.n_steps / (samples - 1))}
-    else:
-        end = scene.t_end if settings["t_end"] is None else positive_number("t_end", settings["t_end"])
-        settings |= {"dt": end / (samples - 1) if dt is None else dt}
-    return Sweep(scene, n, varied, seed, settings)
+        return Sweep(scene, n, varied, seed, settings, grid.n_steps)
+    if dt is not None:
+        raise BadInput("dt", describe(dt), "none together with --error, which chooses the step")
+    end = scene.t_end if end is None else positive_number("t_end", end, "a finite duration above 0, s")
+    return Sweep(scene, n, varied, seed, settings | {"dt": end / (samples - 1)})
 
 
-def run_sweep(sweep: Sweep, tell: Told) -> tuple[Ensemble, float]:
-    """Return what the sweep gives, and the wall time that took, s.
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a sweep gave, the wall time that took, s, and the last that was heard of its progress, None of no work."""
+
+    ensemble: Ensemble
+    wall: float
+    last: ProgressOfMany | None
+
+
+def run_sweep(sweep: Sweep, step: Step) -> Result:
+    """Return what the sweep gives; `step` is called with the share that is done, and how fast, in words.
 
     Raises
     ------
     BadInput
-        A spread, a setting or a folder cannot be used.
+        A spread, a setting or a folder cannot be used; messages name options.
     """
-    starts = spread(sweep.scene, sweep.n, seed=sweep.seed, **sweep.spread)
-    begin = perf_counter()
-    found = integrate_many(sweep.scene, **starts, **sweep.settings, progress=tell)
-    return found, perf_counter() - begin
+    heard: list[ProgressOfMany] = []
+
+    def hear(progress: ProgressOfMany) -> None:
+        heard[:] = [progress]
+        tell(_kept_text(sweep, progress))
+        step(progress.done / progress.total, _progress_text(sweep, progress))
+
+    step(0.0, "starting")
+    try:
+        starts, settings = spread(sweep.scene, sweep.n, seed=sweep.seed, **sweep.spread), _given(sweep.settings)
+        begin = perf_counter()
+        found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
+    except KeyboardInterrupt as stop:
+        if heard and (text := _kept_text(sweep, heard[0])):
+            stop.add_note(text)
+        raise
+    except BadInput as error:
+        raise _in_options(error) from None
+    return Result(found, perf_counter() - begin, heard[0] if heard else None)
 
 
-def summarize(sweep: Sweep, found: Ensemble, wall: float, computed: int) -> dict[str, Any]:
-    """Return what was run, how it ended, what drifted and how far attitudes are apart; `computed` bodies took `wall` s."""
+def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in settings.items() if value is not None}
+
+
+def _in_options(error: BadInput) -> BadInput:
+    """Return an error about an argument of a function as one about an option."""
+    allowed = error.allowed.replace("resume=True", "--resume")
+    argument = _WORDS.get(error.argument, error.argument)
+    if isinstance(error, NotWritten):
+        return NotWritten(argument, error.path, error.cause, allowed)
+    return BadInput(argument, error.got, allowed)
+
+
+def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
+    """Return what is kept, should the run end now; nothing where it is not written to a folder."""
+    out = sweep.settings.get("path")
+    if out is None:
+        return ""
+    return f"{progress.done:,} of {progress.total:,} bodies are finished in {out}; the same command with --resume does the rest"
+
+
+def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
+    steps = f", {rate_text(progress.rate * sweep.steps)} body-steps/s" if sweep.steps else ""
+    return f"{progress.done:,} of {progress.total:,} bodies, {rate_text(progress.rate)}/s{steps}"
+
+
+def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
+    """Return what was run, how it ended, what drifted and how far attitudes are apart."""
+    found, last = result.ensemble, result.last
     failed = sorted(found.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
     return {
@@ -118,12 +177,16 @@ def summarize(sweep: Sweep, found: Ensemble, wall: float, computed: int) -> dict
         "t_end": float(found.t[-1]),
         "samples": len(found.t),
         "outcomes": {"ok": len(found) - len(failed), **kinds},
-        "failures": [{"body": i, **outcome_record(failure.outcome)} for i, failure in failed[:MOST_FAILURES]],
+        "failures": [
+            {"body": i, "text": str(failure.outcome), **outcome_record(failure.outcome)}
+            for i, failure in failed[:MOST_FAILURES]
+        ],
         "drift": {name: _largest(values) for name, values in found.drifts.items()},
-        "angles_from_mean": _angles(found),
-        "wall_time": wall,
-        "bodies_per_second": computed / wall,
-        "body_steps_per_second": computed * found.grid.n_steps / wall,
+        "angle_from_mean": _angles(found),
+        "wall_time": result.wall,
+        "found_before": last.found if last else len(found),
+        "bodies_per_second": last.rate if last else 0.0,
+        "body_steps_per_second": last.rate * found.grid.n_steps if last else 0.0,
     }
 
 
@@ -145,13 +208,10 @@ def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     samples = np.unique(np.linspace(0, len(found.t) - 1, MOST_TIMES).astype(int)).tolist()
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
     return [
-        {"t": float(found.t[i])} | {f"{share:g}": _finite(value) for share, value in zip(QUANTILES, row, strict=True)}
+        {"t": float(found.t[i])}
+        | {f"{100 * share:g}%": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
         for i, row in zip(samples, quantiles.tolist(), strict=True)
     ]
-
-
-def _finite(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 def draw_svg(found: Ensemble) -> str:
@@ -164,5 +224,11 @@ def draw_svg(found: Ensemble) -> str:
 
 
 def picture_path(out: Path) -> Path:
-    """Return the file of the picture beside a folder of samples."""
-    return out.with_suffix(".svg")
+    """Return the file of the picture beside a folder of samples. Raise `BadInput` where both would be the same."""
+    try:
+        picture = out.with_suffix(".svg")
+    except ValueError:  # no name, such as . or /
+        picture = out
+    if picture == out:
+        raise BadInput("out", repr(str(out)), _FOLDER)
+    return picture

@@ -29,16 +29,18 @@ def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
     yield "spread", ", ".join(f"{name}={value}" for name, value in summary["spread"].items()) + f"; seed {summary['seed']}"
     run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
     yield "run", run
-    rate, steps = summary["bodies_per_second"], summary["body_steps_per_second"]
-    yield "time", f"{summary['wall_time']:.3g} s: {number(rate)} bodies/s, {number(steps)} body-steps/s"
+    yield "time", _time_text(summary)
     for name, drift in summary["drift"].items():
         yield f"drift of {name}", _drift_text(drift)
-    yield from _angle_lines(summary["angles_from_mean"])
-    for key in ("samples_in", "picture"):
-        if summary.get(key):
-            yield key.replace("_", " "), summary[key]
-    for failure in summary["failures"]:
-        yield f"body {failure['body']}", failure["text"]
+    yield from _angle_lines(summary["angle_from_mean"])
+    yield from ((name, summary[name]) for name in ("out", "picture") if summary[name])
+    yield from ((f"body {failure['body']}", failure["text"]) for failure in summary["failures"])
+
+
+def _time_text(summary: Summary) -> str:
+    before = f", {summary['found_before']:,} bodies were there before" if summary["found_before"] else ""
+    bodies, steps = (rate_text(summary[key]) for key in ("bodies_per_second", "body_steps_per_second"))
+    return f"{summary['wall_time']:.3g} s: {bodies} bodies/s, {steps} body-steps/s{before}"
 
 
 def _drift_text(drift: dict[str, Any] | None) -> str:
@@ -54,9 +56,9 @@ def _angle_lines(angles: list[dict[str, float | None]]) -> Iterator[tuple[str, s
         yield f"  at t = {row['t']:.4g} s", f"{middle}, {low} to {high}"
 
 
-def number(value: float) -> str:
-    """Return a count or a rate with three digits, such as 12.3 million; of any unit."""
-    for size, name in ((1e9, " billion"), (1e6, " million"), (1e3, ",000")):
-        if value >= size and name != ",000":
-            return f"{value / size:.3g}{name}"
+def rate_text(value: float) -> str:
+    """Return a rate with three digits, such as 12.3 million; of any unit."""
+    for size, name in ((1e9, "billion"), (1e6, "million")):
+        if value >= size:
+            return f"{value / size:.3g} {name}"
     return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"
