@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .integration.ensemble import Ensemble as Ensemble
     from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
+    from .integration.spread import spread as spread
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -109,6 +110,7 @@ _PLACES = {
     "WrongBranch": "errors",
     "integrate": "integration.one",
     "integrate_many": "integration.many",
+    "spread": "integration.spread",
 }
 
 __all__ = [
@@ -159,6 +161,7 @@ __all__ = [
     "integrate_many",
     "scenes",
     "shapes",
+    "spread",
 ]
 
 

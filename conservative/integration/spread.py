@@ -18,6 +18,7 @@ import numpy as np
 from ..attitude import Array, from_quaternion
 from ..check import describe, positive_integer
 from ..errors import BadInput, nearest
+from ..potentials.turning import static_part
 from ..scene import Scene
 from . import inputs
 from .deviation import Deviation, read_angle, read_number, read_rate, read_share
@@ -82,7 +83,7 @@ def spread(
     ------
     BadInput
         A spread cannot be read, or is one of nothing, such as 2 % of a body's rate at rest; the potential has no such number;
-        the scene's inertia is none that a mass distribution has; n or the seed is no such integer.
+        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no such integer.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
@@ -174,6 +175,9 @@ def _draw_inertia(scene: Scene, n: int, deviation: Deviation, seed: int) -> Arra
 
 def _follow_inertia(scene: Scene, inertia: Array) -> dict[str, Array]:
     """Return the inertia for a potential that has the body's, as tensors (n, 3, 3), kg m^2."""
+    if scene.potential is not static_part(scene.potential) and hasattr(static_part(scene.potential), "inertia"):
+        got = "a spread in a field that turns, and has the inertia of the scene's body itself"
+        raise BadInput("inertia", got, "none: all bodies of such a field have the scene's inertia")
     if not hasattr(scene.potential, "inertia"):
         return {}
     return {"inertia": inertia if inertia.ndim == 3 else inertia[:, :, None] * np.eye(3)}

@@ -86,6 +86,8 @@ def plan(scene_name: str, n: int, varied: Mapping[str, Any], seed: int, **settin
         A name or a number cannot be used.
     """
     scene = registry.scene(scene_name)
+    if settings["resume"] and settings["path"] is None:
+        raise BadInput("resume", "no folder", "--out, the folder of a sweep that was interrupted")
     samples, dt, end = settings.pop("samples"), settings.pop("dt"), settings["t_end"]
     if settings["error"] is None:
         grid = grid_for(scene, scene.dt if dt is None else dt, end, MOST_STEPS)
@@ -136,7 +138,7 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
 
 
 def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in settings.items() if value is not None}
+    return {name: value for name, value in settings.items() if value not in (None, False)}
 
 
 def _in_options(error: BadInput) -> BadInput:

@@ -140,6 +140,7 @@ def test_the_spread_of_one_quantity_changes_no_other():
 
 
 REST = cv.Scene("rest", BODY, np.eye(3), (0, 0, 0), 1.0)
+ORBIT = REST.rename("orbit", potential=cv.Orbit(0.1, (0, 0, 1)).gravity_gradient(BODY.inertia, (1, 0, 0)))
 ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
 
 
@@ -159,6 +160,7 @@ ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
         (TOP, {"inertia": 0.01}, "inertia", "0.01", "such as 1%"),
         (TOP, {"inertia": "101%"}, "inertia", "'101%'", "up to 100%"),
         (ODD, {"inertia": "1%"}, "inertia", "[1.0, 1.0, 3.0]", "none is larger than the sum"),
+        (ORBIT, {"inertia": "1%"}, "inertia", "a field that turns", "none"),
         (TOP, {"parameters": {"wieght": "1%"}}, "parameters", "'wieght'", "'weight' (nearest)"),
         (TOP, {"parameters": {"weight": "1kg"}}, "potential.weight", "'1kg'", "its own SI unit"),
         (REST, {"parameters": {"weight": "1%"}}, "parameters", "'weight'", "none"),
