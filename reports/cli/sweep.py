@@ -93,14 +93,15 @@ def _connect(address: str | None) -> AbstractContextManager[Any]:
 
 def _run(planned: Sweep, picture: IO[str] | None) -> dict[str, Any]:
     """Return the summary of a sweep, and write its picture."""
-    from ..run.sweep import draw_svg, run_sweep, summarize
+    from ..charts.sweep import svg
+    from ..run.sweep import run_sweep, summarize
     from ..terminal.progress import progress
 
     with interruptible(signal.SIGTERM), progress() as step:
         result = run_sweep(planned, step)
         step(1.0, "summary and picture")
         if picture is not None:
-            picture.write(draw_svg(result.ensemble))
+            picture.write(svg(result.ensemble))
         return summarize(planned, result)
 
 

@@ -211,18 +211,9 @@ def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
     return [
         {"t": float(found.t[i])}
-        | {f"{100 * share:g}%": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
+        | {f"p{100 * share:g}": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
         for i, row in zip(samples, quantiles.tolist(), strict=True)
     ]
-
-
-def draw_svg(found: Ensemble) -> str:
-    """Return the picture of an ensemble as SVG."""
-    import vl_convert
-
-    from ..charts.style import apply_style
-
-    return str(vl_convert.vegalite_to_svg(apply_style(found.plot()).to_dict()))
 
 
 def picture_path(out: Path) -> Path:
