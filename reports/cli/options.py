@@ -10,7 +10,7 @@ EXIT_CODES = """Exit codes:
     0    done
     1    a run failed: it did not converge, or diverged; or the gate is not passed
     2    the command or an input cannot be used, or an engine or a baseline is missing
-    130  interrupted by Ctrl-C, 143 by SIGTERM; a report keeps what is finished, and --resume goes on
+    130  interrupted by Ctrl-C, 143 by SIGTERM; report and sweep keep what is finished, and --resume goes on
 """
 
 
