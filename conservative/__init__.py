@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .integration.ensemble import Ensemble as Ensemble
     from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
+    from .integration.reading import open_ensemble as open_ensemble
     from .integration.spread import spread as spread
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
@@ -110,6 +111,7 @@ _PLACES = {
     "WrongBranch": "errors",
     "integrate": "integration.one",
     "integrate_many": "integration.many",
+    "open_ensemble": "integration.reading",
     "spread": "integration.spread",
 }
 
@@ -159,6 +161,7 @@ __all__ = [
     "WrongBranch",
     "integrate",
     "integrate_many",
+    "open_ensemble",
     "scenes",
     "shapes",
     "spread",

@@ -2,23 +2,24 @@
 
     from dask.distributed import Client
 
-    with Client("tcp://10.0.0.7:8786") as client:
+    with Client("tcp://10.0.0.7:8786") as client:  # or open_client, which says in one line what is wrong
         ensemble = cv.integrate_many(scene, w_WB_B0=starts, path="starts.zarr", client=client)
 
-A task is a pure function of the bytes that it is sent, and its result comes back to whoever asked: workers need no file system in
-common, a task whose worker dies is run by another one, and what is run twice counts once. Workers need this package in the same
-version, which is asked for before any work. The same numbers come back as without a cluster, bit for bit, from processors of the
-same kind: compiled code differs from kind to kind.
+A task is a pure function of the bytes that it is sent, and its result comes back to whoever asked: workers need no file system
+in common, a task whose worker dies is run by another one, and what is run twice counts once. Workers need this package in the
+same version, which is asked for before any work. From processors of the same kind the same numbers come back as without a
+cluster, bit for bit; compiled code differs from kind to kind.
 
 Source: `concurrent.futures` and `distributed.Client.get_executor`; all scheduling is Dask's.
 """
 
 from __future__ import annotations
 
+import logging
 import pkgutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..check import describe
@@ -35,8 +36,9 @@ CONNECT_LIMIT = 5.0
 _LOST = "a cluster that stays there; what was written to a path is kept, and resume=True goes on from there"
 
 
-def connect(address: str, limit: float = CONNECT_LIMIT) -> Client:
-    """Return a client of the scheduler at an address such as `tcp://127.0.0.1:8786`; close it after use.
+@contextmanager
+def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
+    """Give a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, with Dask's own messages off in the block.
 
     Raises
     ------
@@ -48,12 +50,29 @@ def connect(address: str, limit: float = CONNECT_LIMIT) -> Client:
     require_extra("scheduler", "cluster")
     from distributed import Client
 
-    make: Any = Client
+    with ExitStack() as stack:
+        stack.enter_context(_silence("distributed", "distributed.client", "tornado.application"))
+        try:
+            client = stack.enter_context(Client(address, timeout=limit, set_as_default=False))
+        except Exception as error:  # whatever else listens there can answer anything
+            got = f"{address!r}, where no scheduler answers ({error or type(error).__name__})"
+            allowed = "the address of a Dask scheduler that runs, such as 'tcp://127.0.0.1:8786'"
+            raise BadInput("scheduler", got, allowed) from None
+        yield client
+
+
+@contextmanager
+def _silence(*names: str) -> Iterator[None]:
+    """Let loggers of these names say nothing in the block: what they say in many lines is an exception, too."""
+    loggers = [logging.getLogger(name) for name in names]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
-        return make(address, timeout=limit, set_as_default=False)
-    except Exception as error:  # whatever else listens there can answer anything
-        got = f"{address!r}, where no scheduler answers ({error or type(error).__name__})"
-        raise BadInput("scheduler", got, "the address of a Dask scheduler that runs, such as 'tcp://127.0.0.1:8786'") from None
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
 
 
 @contextmanager

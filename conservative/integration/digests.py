@@ -1,7 +1,7 @@
 """Digests of what a run is made from: the same numbers have the same digest in every process, others another one.
 
-Values are taken apart by their fields, and functions by their code: what pickle makes of equal values can differ from one process
-to the next. Source: our own.
+Values are taken apart by their fields, and functions by their code: what pickle makes of equal values can differ from one
+process to the next. Source: our own.
 """
 
 from __future__ import annotations

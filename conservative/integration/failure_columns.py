@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..attitude import Array
 from ..errors import Diverged, IntegrationFailed, InvalidResult, NotConserved, NotConverged, NotRun, WrongBranch
 from ..outcome import Outcome, OutcomeKind
 
@@ -36,7 +35,7 @@ _CLASSES: Mapping[OutcomeKind, type[IntegrationFailed]] = {
 }
 
 
-def list_kinds(n: int, failures: Mapping[int, IntegrationFailed]) -> Array:
+def list_kinds(n: int, failures: Mapping[int, IntegrationFailed]) -> Any:
     """Return the numbers (n,) of the kinds of outcomes of n bodies, of which some failed."""
     found = np.full(n, KINDS.index(OutcomeKind.OK), dtype=np.uint8)
     for i, failure in failures.items():
@@ -54,9 +53,7 @@ def list_columns(n: int, failures: Mapping[int, IntegrationFailed]) -> dict[str,
     return found
 
 
-def read_failures(
-    kinds: Array, names: Sequence[str], label: str, column: Callable[[str], Any]
-) -> dict[int, IntegrationFailed]:
+def read_failures(kinds: Any, names: Sequence[str], label: str, column: Callable[[str], Any]) -> dict[int, IntegrationFailed]:
     """Return what ended runs early, by the numbers of the bodies.
 
     Parameters

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol, TypedDict, Unpack
 
@@ -19,11 +21,11 @@ from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
-from .blocks import BlockResult, list_blocks, run_blocks, start_threads
-from .drifts import list_drifts
-from .ensemble import Ensemble, Memory
+from .blocks import BlockResult, count_left, list_blocks, run_blocks
+from .ensemble import Ensemble
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
+from .places import Place
 from .shared_choice import Goal, choose_for_all
 
 
@@ -35,6 +37,9 @@ class Details(TypedDict, total=False):
     error: float | None
     threads: int | None
     progress: Callable[[ProgressOfMany], object] | None
+    path: str | Path | None
+    resume: bool
+    client: Any
 
 
 def integrate_many(
@@ -79,11 +84,24 @@ def integrate_many(
         depend on it.
     progress
         Called with a `ProgressOfMany`, whose text is a line, after each block. `print` will do.
+    path
+        A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
+        memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
+    resume
+        Whether the folder may have some blocks of the same run, which was interrupted: the others are added. The folder is then
+        the same, byte for byte, as that of a run without a break.
+    client
+        A `dask.distributed.Client`: blocks run on its workers, instead of threads of this process.
 
     Raises
     ------
     BadInput
-        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number.
+        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number. Or the folder is there
+        without `resume`, or is something else or of another run; or the cluster has no workers, or some of another version.
+    NotWritten
+        The folder cannot be written, or the disk is full; blocks that are done are kept.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed, or Dask, of the extra `cluster`.
     MissingEngine
         A method of that name needs an engine that is not installed.
     Unsupported
@@ -94,12 +112,13 @@ def integrate_many(
     unknown = sorted(set(details) - set(Details.__annotations__))
     if unknown:
         raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
-    progress, threads = _read_progress(details.get("progress")), _read_threads(details.get("threads"))
+    progress, place = _read_progress(details.get("progress")), _read_place(details)
     bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
         method, grid, choice = _plan(bodies, dt, t_end, details)
-        _require_memory(bodies, grid)
-        return run_all(method, bodies, grid, threads, progress, choice)
+        if place.path is None:
+            _require_memory(bodies, grid)
+        return replace(run_all(method, bodies, grid, place, progress), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
@@ -108,6 +127,11 @@ def _read_progress(value: Any) -> Callable[[ProgressOfMany], object] | None:
     if value is not None and not callable(value):
         raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
     return value
+
+
+def _read_place(details: Details) -> Place:
+    to = details.get("client"), details.get("path"), details.get("resume", False)
+    return Place(_read_threads(details.get("threads")), *to)
 
 
 def _read_threads(value: object) -> int:
@@ -142,20 +166,14 @@ def _require_memory(bodies: Bodies, grid: Grid) -> None:
 
 
 def run_all(
-    method: Method,
-    bodies: Bodies,
-    grid: Grid,
-    threads: int,
-    progress: Callable[[ProgressOfMany], object] | None,
-    choice: ChoiceForMany | None,
+    method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Callable[[ProgressOfMany], object] | None
 ) -> Ensemble:
-    """Return what all blocks give, in memory. Steps of the grid are in s."""
-    sink = Memory(bodies, grid, list_drifts(bodies))
-    threads = min(threads, len(list_blocks(len(bodies), grid)))
-    with start_threads(threads) as executor:
-        results = run_blocks(method, bodies, grid, executor, 2 * threads, sink.done)
-        fill(sink, results, len(bodies), progress)
-    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures, choice)
+    """Return what all blocks give, in memory or in a folder. Steps of the grid are in s."""
+    what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
+    with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
+        results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
+        fill(sink, results, count_left(len(bodies), grid, sink.done), progress)
+    return place.read(sink, *what)
 
 
 class Sink(Protocol):
@@ -175,7 +193,7 @@ def fill(
     total: int,
     progress: Callable[[ProgressOfMany], object] | None,
 ) -> None:
-    """Hand all results to a sink, and tell after each of them how many of all bodies are done."""
+    """Hand all results to a sink, and tell after each of them how many bodies are done, of those that are left."""
     begun, done = perf_counter(), 0
     with closing(results):
         for first, result in results:

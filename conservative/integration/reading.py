@@ -25,8 +25,8 @@ _WHOLE = "one that is whole: integrate_many with the same arguments and resume=T
 def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
     """Return the ensemble that `integrate_many(..., path=...)` or `Ensemble.to_zarr` has written.
 
-    Samples stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, of which `ensemble.R_WB[:1000, -1]` reads
-    the blocks of 1000 bodies and no others. So does what the bodies begin with. Drifts and outcomes are read at once.
+    Samples stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, of which `ensemble.R_WB[:1000, -1]`
+    reads the blocks of 1000 bodies and no others. So does what the bodies begin with. Drifts and outcomes are read at once.
 
     Parameters
     ----------

@@ -8,10 +8,11 @@
     start/NAME           R_WB0, w_WB_B0, inertia, where they differ from body to body, as in `Bodies`
     parameters/NAME      numbers of the potential that differ from body to body
 
-Numbers are as in memory, uncompressed: random digits do not compress. The attributes of the group say what is run, with a digest
-of all that the numbers follow from. The outcomes of a block are written last, and no body's is 255: a block is done exactly if
-its outcomes are there. Zarr writes a chunk under another name, which it then changes: a process that is killed, or a disk that
-is full, leaves whole blocks, and no part that is taken for one. For what is lost with the power of a machine nobody vouches.
+Numbers are as in memory, uncompressed: random digits do not compress. The attributes of the group say what is run, with a
+digest of all that the numbers follow from. The outcomes of a block are written last, and no body's is 255: a block is done
+exactly if its outcomes are there. Zarr writes a chunk under another name, which it then changes: a process that is killed, or a
+disk that is full, leaves whole blocks, and no part that is taken for one. Chunks are not forced to the disk one by one: with
+its power a machine can lose some that were written last.
 
 Source: Zarr's specification, version 3; the layout is our own.
 """
@@ -128,7 +129,7 @@ def _require_same(place: Path, attributes: Mapping[str, Any], resume: bool) -> N
     """Raise `BadInput` unless a folder has an ensemble of the run with these attributes, and may be gone on with."""
     there = read_record(place)
     if not resume:
-        raise BadInput("path", f"{str(place)!r}, where an ensemble is", "a folder that is not there yet, or resume=True to go on")
+        raise BadInput("path", f"{str(place)!r}, where an ensemble is", "a new folder, or resume=True to go on with this one")
     if differing := list_differences(there, attributes):
         raise BadInput("path", f"{str(place)!r}, an ensemble of another run: {'; '.join(differing)}", "one of the same run")
 
