@@ -199,9 +199,7 @@ def march(lengths, tolerance, moments, moment, states, done, last, n_steps, ever
                 a, gain, _, _, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
                 if not every(trusted):
                     state = State(q, q_carry, L, L_carry, newest, known)
-                    a, gain, L, L_carry = solve_alone(
-                        h, J, J_inverse, field, state, tolerance, a, gain, trusted, finished, i
-                    )
+                    a, gain, L, L_carry = solve_alone(h, J, J_inverse, field, state, tolerance, a, gain, trusted, finished, i)
                     known = choose(trusted, known, zero)
                 if stages == 1:
                     change = subtract(a, newest)
