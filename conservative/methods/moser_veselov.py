@@ -146,15 +146,15 @@ def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany:
     longest = LONGEST_EXACT if method.order is None else LONGEST
     limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
     columns = -(-n // kernel.WIDTH) * kernel.WIDTH
-    table = np.empty((kernel.ROWS, columns))
-    kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table)
+    table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
+    kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
     finished = table[kernel.FINISHED, :n] == 1
 
     def run() -> Block:
-        states, R_WB, w_WB_B = table.copy(), np.empty((columns, s, 3, 3)), np.empty((columns, s, 3))
+        states, R_WB, w_WB_B = start.copy(), np.empty((columns, s, 3, 3)), np.empty((columns, s, 3))
 
         def take(done: int, last: int) -> None:
-            kernel.march(states, done, last, grid.n_steps, grid.every, R_WB, w_WB_B)
+            kernel.march(table, states, done, last, grid.n_steps, grid.every, R_WB, w_WB_B)
 
         take_pieces(grid.n_steps, n * (BODY_STEP + BODY_SAMPLE / grid.every), take)
         return Block(R_WB[:n], w_WB_B[:n], finished)
