@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import choice as require_choice
@@ -17,10 +18,11 @@ from ..methods.many import Bodies
 from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
-from . import tables
+from . import pictures, tables
 from .drifts import find_drifts, list_drifts
 
 if TYPE_CHECKING:
+    import altair
     import pandas
 
 
@@ -96,6 +98,20 @@ class Ensemble:
         """
         require_choice("rows", rows, ("samples", "bodies"))
         return tables.sample_table(self) if rows == "samples" else tables.body_table(self)
+
+    def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
+        """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
+
+        The axis is a direction (3,) in body axes, by default the axis of symmetry of body and field, else the third.
+
+        Raises
+        ------
+        BadInput
+            The axis is no direction.
+        MissingExtra
+            Altair or pandas, of the extra `report`, is not installed.
+        """
+        return pictures.draw_ensemble(self, axis_B)
 
     def _repr_html_(self) -> str:
         return tables.card(self)

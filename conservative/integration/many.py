@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol, TypedDict, Unpack
 
@@ -19,11 +20,11 @@ from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
-from .blocks import BlockResult, list_blocks, run_blocks, start_threads
-from .drifts import list_drifts
-from .ensemble import Ensemble, Memory, ensemble_of_one
+from .blocks import BlockResult, count_left, list_blocks, run_blocks
+from .ensemble import Ensemble, ensemble_of_one
 from .inputs import only_body, read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
+from .places import Place
 from .shared_choice import Goal, choose_for_all, pick_hardest
 
 Tell = Callable[[ProgressOfMany], object]
@@ -37,9 +38,12 @@ class Details(TypedDict, total=False):
     error: float | None
     threads: int | None
     progress: Tell | None
+    path: str | Path | None
+    resume: bool
+    client: Any
 
 
-_DETAILS = Details.__annotations__.keys()
+_DETAILS, _PLACES = Details.__annotations__.keys(), {"path", "resume", "client"}
 
 
 def integrate_many(
@@ -85,10 +89,24 @@ def integrate_many(
     progress
         Called with a `ProgressOfMany`, whose text is a line, after each block. `print` will do.
 
+    path
+        A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
+        memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
+    resume
+        Whether the folder may have some blocks of the same run, which was interrupted: the others are added. The folder is then
+        the same, byte for byte, as that of a run without a break.
+    client
+        A `dask.distributed.Client`: blocks run on its workers, instead of threads of this process.
+
     Raises
     ------
     BadInput
-        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number.
+        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number. Or the folder is there
+        without `resume`, or is something else or of another run; or the cluster has no workers, or some of another version.
+    NotWritten
+        The folder cannot be written, or the disk is full; blocks that are done are kept.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed, or Dask, of the extra `cluster`.
     MissingEngine
         A method of that name needs an engine that is not installed.
     Unsupported
@@ -103,9 +121,12 @@ def integrate_many(
     bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
         method, grid, choice = make_plan(bodies, dt, t_end, details)
-        if len(bodies) == 1:
+        if len(bodies) == 1 and details.keys().isdisjoint(_PLACES):
             return run_one(method, bodies, grid, choice, progress)
-        return run_all(Plan(method, bodies, grid, choice), _read_threads(details.get("threads")), progress)
+        place = _read_place(details)
+        if place.path is None:
+            _require_memory(bodies, grid)
+        return replace(run_all(method, bodies, grid, place, progress), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
@@ -114,6 +135,11 @@ def _read_progress(value: Any) -> Tell | None:
     if value is not None and not callable(value):
         raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
     return value
+
+
+def _read_place(details: Details) -> Place:
+    to = details.get("client"), details.get("path"), details.get("resume", False)
+    return Place(_read_threads(details.get("threads")), *to)
 
 
 def _read_threads(value: object) -> int:
@@ -130,20 +156,18 @@ def make_plan(
     Raises
     ------
     BadInput
-        An argument cannot be used, the samples do not fit in memory, or the method has no step of that length for a body.
+        An argument cannot be used, or the method has no step of that length for a body.
     Unsupported
         The method cannot do the scene.
     """
     first, every, error = bodies.first, details.get("sample_every", 1), details.get("error")
     if error is not None:
         choice = _choose(bodies, error, (dt, t_end, every), details.get("method"))
-        _require_memory(bodies, choice.grid)
         return choice.method, choice.grid, choice
     method = read_method(details.get("method"), first)
     grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
     require_support(method, first)
     if len(bodies) > 1:  # of one, the run says the same
-        _require_memory(bodies, grid)
         require_steps(method, bodies, grid)
     return method, grid, None
 
@@ -174,10 +198,13 @@ def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
 
 
 def _require_memory(bodies: Bodies, grid: Grid) -> None:
+    """Raise `BadInput` if the samples of all bodies do not fit in memory."""
     most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
     if samples > most:
         got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
-        raise BadInput("sample_every", got, f"a larger one: up to {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each")
+        raise BadInput(
+            "sample_every", got, f"a larger one, or a path: {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each"
+        )
 
 
 def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:
@@ -188,24 +215,13 @@ def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | 
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """What is run, and what was chosen for an error, if one was asked for."""
-
-    method: Method
-    bodies: Bodies
-    grid: Grid
-    choice: ChoiceForMany | None
-
-
-def run_all(plan: Plan, threads: int, progress: Tell | None) -> Ensemble:
-    """Return what all blocks give, in memory."""
-    method, bodies, grid = plan.method, plan.bodies, plan.grid
-    sink = Memory(bodies, grid, list_drifts(bodies))
-    threads = min(threads, len(list_blocks(len(bodies), grid)))
-    with start_threads(threads) as executor:
-        fill(sink, run_blocks(method, bodies, grid, executor, 2 * threads, sink.done), len(bodies), progress)
-    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures, plan.choice)
+def run_all(method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Tell | None) -> Ensemble:
+    """Return what all blocks give, in memory or in a folder. Steps of the grid are in s."""
+    what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
+    with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
+        results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
+        fill(sink, results, (count_left(len(bodies), grid, sink.done), len(bodies)), progress)
+    return place.read(sink, *what)
 
 
 class Sink(Protocol):
@@ -219,12 +235,15 @@ class Sink(Protocol):
         """Keep the result of the block that begins with body number `first`."""
 
 
-def fill(sink: Sink, results: Generator[tuple[int, BlockResult], None, None], total: int, progress: Tell | None) -> None:
-    """Hand all results to a sink, and tell after each of them how many of all bodies are done."""
-    begun, done = perf_counter(), 0
+def fill(
+    sink: Sink, results: Generator[tuple[int, BlockResult], None, None], counts: tuple[int, int], progress: Tell | None
+) -> None:
+    """Hand all results to a sink, and tell after each of them how many bodies are done; counts are those left, and all."""
+    begun, (left, total) = perf_counter(), counts
+    done = total - left
     with closing(results):
         for first, result in results:
             sink.write(first, result)
             done += len(result)
             if progress is not None:
-                progress(ProgressOfMany(perf_counter() - begun, done, total))
+                progress(ProgressOfMany(perf_counter() - begun, done, total, total - counts[0]))
