@@ -22,6 +22,9 @@ from .many import Block, Bodies, pause
 PIECE = 0.03
 """About how long a call of compiled code may take, s: between two of them, threads can be stopped."""
 
+LINE = 8
+"""Numbers in a line of the processor's first cache."""
+
 
 def find_unit_of_time(grid: Grid) -> float:
     """Return a power of two, s, that the step is 0.5 to 1 times as long as."""
@@ -37,6 +40,13 @@ def fill_columns(rows: Array, width: int) -> Array:
     """Return the numbers (n, k) of n bodies as columns (k, m), m the next multiple of `width`, filled up with the last body."""
     missing = -len(rows) % width
     return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
+
+
+def make_room(rows: int, width: int) -> Array:
+    """Return room (rows, width) that begins where a line of the cache does: loading a number across two lines costs two."""
+    room = np.empty(rows * width + LINE)
+    first = -(room.ctypes.data // room.itemsize) % LINE
+    return room[first : first + rows * width].reshape(rows, width)
 
 
 def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
