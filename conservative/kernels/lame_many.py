@@ -27,9 +27,9 @@ def prepare(J, kappa, q, L, h, table):
         q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
         parts, part = divide_step(Model(J[i], kappa[i], q0, L0), h)
         gamma = unit_vertical(q0)
-        state = (*q0, *gamma, L0[0] / J[i], L0[1] / J[i], L0[2])
+        state = q0 + gamma + (L0[0] / J[i], L0[1] / J[i], L0[2])
         row = 0
-        for x in (*part, float(parts), J[i], *state):
+        for x in part[:] + (float(parts), J[i]) + state:
             table[row, i] = x
             row += 1
     for i in range(n, table.shape[1]):
@@ -40,12 +40,13 @@ def prepare(J, kappa, q, L, h, table):
 @small
 def take_step(c, parts, least, most, q, gamma, w0, w1):
     """Take a step of so many parts, which differ from lane to lane: `least` of them at least, `most` at most."""
-    for _ in range(least):
-        q, gamma, w0, w1 = advance(c, q, gamma, w0, w1)
-    for part in range(least, most):
-        left = parts > float(part)
+    for part in range(most):
         q1, gamma1, v0, v1 = advance(c, q, gamma, w0, w1)
-        q, gamma, w0, w1 = choose(left, q1, q), choose(left, gamma1, gamma), choose(left, v0, w0), choose(left, v1, w1)
+        if part < least:
+            q, gamma, w0, w1 = q1, gamma1, v0, v1
+        else:
+            left = parts > float(part)
+            q, gamma, w0, w1 = choose(left, q1, q), choose(left, gamma1, gamma), choose(left, v0, w0), choose(left, v1, w1)
     return q, gamma, w0, w1
 
 
@@ -75,4 +76,4 @@ def march(table, done, last, n_steps, every, q_out, L_out):
                 to = i * samples + row
                 save_columns(q_flat, 4 * to, 4 * samples, q)
                 save_columns(L_flat, 3 * to, 3 * samples, (J * w0, J * w1, L2))
-        save_rows(flat, i + CONSTANTS * n, n, (*q, *gamma, w0, w1, L2))
+        save_rows(flat, i + CONSTANTS * n, n, q + gamma + (w0, w1, L2))
