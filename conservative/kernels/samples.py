@@ -62,9 +62,8 @@ def of_many(t, q, L, J_inverse, spin, R_BP, places, R_WB, w_WB_B):
     R_WB and w_WB_B are of all n bodies, q and L of k or more; spin is (k, 2) or None.
     """
     for i in range(len(places)):
-        if spin is None:
-            own = None
-        else:
-            own = (spin[i, 0], spin[i, 1])
         J, to = (J_inverse[i, 0], J_inverse[i, 1], J_inverse[i, 2]), places[i]
-        to_body_axes(t, q[i], L[i], J, own, R_BP[i], R_WB[to], w_WB_B[to])
+        if spin is None:
+            to_body_axes(t, q[i], L[i], J, None, R_BP[i], R_WB[to], w_WB_B[to])
+        else:
+            to_body_axes(t, q[i], L[i], J, (spin[i, 0], spin[i, 1]), R_BP[i], R_WB[to], w_WB_B[to])
