@@ -2,9 +2,9 @@
 
 Functions of `small` that are written for floats and branch on nothing compile for lanes as they are: + - * / between lanes, and
 between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max` are LLVM's vector instructions. Comparisons give a
-`Mask`, a truth value for each lane, joined by & | ~; `choose(mask, a, b)` takes a or b in each lane, `every(mask)` and
-`some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
-body and lanes.
+`Mask`, a truth value for each lane, joined by & | ~; `choose(mask, a, b)` takes a or b, numbers or tuples of lanes, in each
+lane, `every(mask)` and `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one
+source serves a single body and lanes.
 
 A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that
 results do not depend on the width: in a wider vector LLVM fuses other products with sums.
@@ -164,6 +164,16 @@ _logical(operator.or_, lambda b, x, y: b.or_(x, y))
 
 
 @intrinsic
+def _choose_tuple(typing, mask, a, b):
+    def build(context, builder, sig, args):
+        pairs = zip(cgutils.unpack_tuple(builder, args[1]), cgutils.unpack_tuple(builder, args[2]), strict=True)
+        chosen = [_each(builder, lambda b, m, x, y: b.select(m, x, y), args[0], *pair) for pair in pairs]
+        return context.make_tuple(builder, sig.return_type, chosen)
+
+    return a(mask, a, b), build
+
+
+@intrinsic
 def _choose_lanes(typing, mask, a, b):
     lanes = _common((a, b)) or Lanes(mask.width)
 
@@ -177,6 +187,8 @@ def _choose_lanes(typing, mask, a, b):
 @overload(choose, inline="never", jit_options=SMALL)
 def _choose(mask, a, b):
     if isinstance(mask, Mask):
+        if isinstance(a, types.BaseTuple) and a == b:
+            return lambda mask, a, b: _choose_tuple(mask, a, b)
         return lambda mask, a, b: _choose_lanes(mask, a, b)
     return lambda mask, a, b: a if mask else b
 
@@ -270,21 +282,38 @@ def with_lane(typing, a, index, x):
     return a(a, types.intp, types.float64), build
 
 
+def _float_address(context, builder, array_type, array, index):
+    return builder.gep(context.make_array(array_type)(context, builder, array).data, [index])
+
+
 def _address(context, builder, array_type, array, index, part):
-    data = context.make_array(array_type)(context, builder, array).data
     place = builder.add(index, ir.Constant(index.type, part * REGISTER))
-    return builder.bitcast(builder.gep(data, [place]), ir.VectorType(_DOUBLE, REGISTER).as_pointer())
+    first = _float_address(context, builder, array_type, array, place)
+    return builder.bitcast(first, ir.VectorType(_DOUBLE, REGISTER).as_pointer())
+
+
+def _load(context, builder, array_type, array, index, kind):
+    if kind == types.float64:
+        return builder.load(_float_address(context, builder, array_type, array, index))
+    at = [_address(context, builder, array_type, array, index, i) for i in range(kind.width // REGISTER)]
+    return _pack(builder, [builder.load(pointer, align=8) for pointer in at])
+
+
+def _save(context, builder, array_type, array, index, kind, value) -> None:
+    if kind == types.float64:
+        builder.store(value, _float_address(context, builder, array_type, array, index))
+        return
+    for i, (part,) in enumerate(_parts(builder, value)):
+        builder.store(part, _address(context, builder, array_type, array, index, i), align=8)
 
 
 @intrinsic(prefer_literal=True)
 def load(typing, array, index, width):
-    """array[index : index + width], the width a number in the source."""
-    kind = Lanes(width.literal_value)
+    """array[index : index + width], the width a number in the source; or as many as another number has: lanes or a float."""
+    kind = Lanes(width.literal_value) if isinstance(width, types.Literal) else width
 
     def build(context, builder, sig, args):
-        parts = range(kind.width // REGISTER)
-        at = [_address(context, builder, sig.args[0], args[0], args[1], i) for i in parts]
-        return _pack(builder, [builder.load(pointer, align=8) for pointer in at])
+        return _load(context, builder, sig.args[0], *args[:2], kind)
 
     return kind(array, types.intp, width), build
 
@@ -294,8 +323,7 @@ def save(typing, array, index, value):
     """array[index : index + width] = value"""
 
     def build(context, builder, sig, args):
-        for i, (part,) in enumerate(_parts(builder, args[2])):
-            builder.store(part, _address(context, builder, sig.args[0], *args[:2], i), align=8)
+        _save(context, builder, sig.args[0], *args[:2], sig.args[2], args[2])
         return context.get_dummy_value()
 
     return types.none(array, types.intp, value), build
@@ -310,8 +338,7 @@ def load_rows(typing, array, index, stride, count, width):
     def build(context, builder, sig, args):
         found, at = [], args[1]
         for _ in range(rows.count):
-            places = [_address(context, builder, sig.args[0], args[0], at, i) for i in range(kind.width // REGISTER)]
-            found.append(_pack(builder, [builder.load(pointer, align=8) for pointer in places]))
+            found.append(_load(context, builder, sig.args[0], args[0], at, kind))
             at = builder.add(at, args[2])
         return context.make_tuple(builder, rows, found)
 
@@ -325,9 +352,35 @@ def save_rows(typing, array, index, stride, values):
     def build(context, builder, sig, args):
         at = args[1]
         for number in cgutils.unpack_tuple(builder, args[3]):
-            for i, (part,) in enumerate(_parts(builder, number)):
-                builder.store(part, _address(context, builder, sig.args[0], args[0], at, i), align=8)
+            _save(context, builder, sig.args[0], args[0], at, sig.args[3][0], number)
             at = builder.add(at, args[2])
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, types.intp, values), build
+
+
+def _transpose(builder, numbers):
+    """Out of up to four registers, one for each number, four registers, one for each lane."""
+    pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, REGISTER), at))  # noqa: E731
+    a, b, c, d = (*numbers, *[ir.Constant(numbers[0].type, ir.Undefined)] * (REGISTER - len(numbers)))
+    ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
+    near, far = (0, 1, 4, 5), (2, 3, 6, 7)
+    return pick(ab[0], cd[0], near), pick(ab[1], cd[1], near), pick(ab[0], cd[0], far), pick(ab[1], cd[1], far)
+
+
+@intrinsic
+def save_columns(typing, array, index, stride, values):
+    """Store up to four numbers, those of a body one after the other: of the first at index, of the next at index + stride."""
+
+    def build(context, builder, sig, args):
+        numbers, at = cgutils.unpack_tuple(builder, args[3]), args[1]
+        kept = ir.Constant(ir.VectorType(_INDEX, len(numbers)), list(range(len(numbers))))
+        for registers in _parts(builder, *numbers):
+            for lane in _transpose(builder, registers):
+                place = _float_address(context, builder, sig.args[0], args[0], at)
+                found = builder.shuffle_vector(lane, lane, kept)
+                builder.store(found, builder.bitcast(place, found.type.as_pointer()), align=8)
+                at = builder.add(at, args[2])
         return context.get_dummy_value()
 
     return types.none(array, types.intp, types.intp, values), build

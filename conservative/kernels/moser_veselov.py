@@ -22,12 +22,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import entry, kernel
+from . import entry, kernel, small
+from .elliptic import find_means, jacobi, sine_and_cosine
+from .lanes import choose, fill_like, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
 from .vector import product
 
-NODES, WEIGHTS = (tuple(float(x) for x in part) for part in np.polynomial.legendre.leggauss(16))
+NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.legendre.leggauss(16), strict=True) if x > 0)
+"""Nodes and weights of Gauss's quadrature with 16 nodes on [-1, 1], those above 0."""
 TERMS = 12
 PAUSE = 2**20
 """Steps between two calls of handlers of signals."""
@@ -38,32 +41,32 @@ RESCALE = 32
 class Polhode(NamedTuple):
     """Where L moves: moments in this module's axes, amplitudes, momentum, energy, parameter, frequency, s, c, d at t = 0."""
 
-    J1: float
-    J2: float
-    J3: float
-    A1: float
-    A2: float
-    A3: float
-    l: float  # noqa: E741
-    E: float
-    m: float
-    mc: float
-    nu: float
-    s: float
-    c: float
-    d: float
+    J1: Any
+    J2: Any
+    J3: Any
+    A1: Any
+    A2: Any
+    A3: Any
+    l: Any  # noqa: E741
+    E: Any
+    m: Any
+    mc: Any
+    nu: Any
+    s: Any
+    c: Any
+    d: Any
 
 
 class Step(NamedTuple):
     """What one step does: half its shift (S, C, D) and its quaternion (r0, r1, r2, r3); r0 is nan where there is none."""
 
-    S: float
-    C: float
-    D: float
-    r0: float
-    r1: float
-    r2: float
-    r3: float
+    S: Any
+    C: Any
+    D: Any
+    r0: Any
+    r1: Any
+    r2: Any
+    r3: Any
 
 
 class Model(NamedTuple):
@@ -77,75 +80,79 @@ Coefficients = Step
 """All that a step is made of."""
 
 
+class Shift(NamedTuple):
+    """What all steps of a run have in common.
+
+    Of a whole shift cn, sn, cn dn, sn dn and m sn^2; m and mc; factors of a step's quaternion, y0 to y3; amplitudes of L/l.
+    """
+
+    C1: Any
+    S1: Any
+    CD1: Any
+    SD1: Any
+    mS1: Any
+    m: Any
+    mc: Any
+    y0: Any
+    y0s: Any
+    y1: Any
+    y2: Any
+    y3: Any
+    a1: Any
+    a2: Any
+    a3: Any
+
+
+class State(NamedTuple):
+    """s, c, d and the complex number z of the attitude."""
+
+    s: Any
+    c: Any
+    d: Any
+    z_re: Any
+    z_im: Any
+
+
 @kernel
 def polhode(J1, J2, J3, L1, L2, L3):
     """Return the polhode for J2 intermediate, L3 >= 0 and L^2 - 2 E J2 not below 0 for J3 > J1, not above for J3 < J1.
 
     All differences are of given moments, and every sum is of terms of one sign except D = L^2 - 2 E J2 in mc, which is what
-    tells both sides of the separatrix apart.
+    tells both sides of the separatrix apart. Where L stays, as in a spherical body or one at rest, the phase is that of L. A
+    body with J3 = J2 alone is given with its axes exchanged.
     """
     l = math.sqrt(L1 * L1 + L2 * L2 + L3 * L3)  # noqa: E741
     E = 0.5 * (L1 * L1 / J1 + L2 * L2 / J2 + L3 * L3 / J3)
-    if J3 == J2 or l == 0.0:
-        # Spherical, or at rest: L stays. A body with J3 = J2 alone is given with its axes exchanged.
-        across = math.hypot(L1, L2)
-        s, c = (L2 / across, L1 / across) if across > 0.0 else (0.0, 1.0)
-        return Polhode(J1, J2, J3, across, across, L3, l, E, 0.0, 1.0, 0.0, s, c, 1.0)
-    sign = 1.0 if J3 > J1 else -1.0
+    one, zero = fill_like(1.0, l), fill_like(0.0, l)
+    stays = (J3 == J2) | (l == 0.0)
+    sign = choose(J3 > J1, one, -one)
     no1 = sign * (L3 * L3 * (J3 - J1) / J3 + L2 * L2 * (J2 - J1) / J2)
     no3 = sign * (L1 * L1 * (J3 - J1) / J1 + L2 * L2 * (J3 - J2) / J2)
     no2 = sign * (L3 * L3 * (J3 - J2) / J3 - L1 * L1 * (J2 - J1) / J1)
-    gap31, gap32, gap21 = sign * (J3 - J1), sign * (J3 - J2), sign * (J2 - J1)
-    A1, A2, A3 = math.sqrt(no3 * J1 / gap31), math.sqrt(no3 * J2 / gap32), math.sqrt(no1 * J3 / gap31)
-    m, mc = (gap21 * no3 / (gap32 * no1), gap31 * no2 / (gap32 * no1)) if no1 > 0.0 else (0.0, 1.0)
-    nu = sign * math.sqrt(gap32 * no1 / (J1 * J2 * J3))
-    s, c = (L2 / A2, L1 / A1) if no3 > 0.0 else (0.0, 1.0)
-    return Polhode(J1, J2, J3, A1, A2, A3, l, E, m, max(mc, 0.0), nu, s, c, math.sqrt(max(mc, 0.0) + m * c * c))
-
-
-@kernel
-def jacobi(u, mc):
-    """sn, cn, dn of u for the complementary parameter mc in [0, 1] (Bulirsch 1965, sncndn): no 1 - m is ever formed."""
-    if mc == 0.0:
-        sech = 1.0 / math.cosh(u)
-        return math.tanh(u), sech, sech
-    a, dn, c, n = 1.0, 1.0, 1.0, 0
-    larger, smaller = np.empty(16), np.empty(16)
-    for i in range(16):
-        n = i
-        larger[i] = a
-        mc = math.sqrt(mc)
-        smaller[i] = mc
-        c = 0.5 * (a + mc)
-        if abs(a - mc) <= 1e-9 * a:
-            break
-        mc *= a
-        a = c
-    sn, cn = math.sin(c * u), math.cos(c * u)
-    if sn == 0.0:
-        return sn, cn, 1.0
-    a = cn / sn
-    c *= a
-    for i in range(n, -1, -1):
-        a *= c
-        c *= dn
-        dn = (smaller[i] + a) / (larger[i] + a)
-        a = c / larger[i]
-    a = 1.0 / math.sqrt(c * c + 1.0)
-    sn = a if sn >= 0.0 else -a
-    return sn, c * sn, dn
+    gap31, gap32 = choose(stays, one, sign * (J3 - J1)), choose(stays, one, sign * (J3 - J2))
+    gap21 = sign * (J2 - J1)
+    across = math.sqrt(L1 * L1 + L2 * L2)
+    A1, A2 = choose(stays, across, math.sqrt(no3 * J1 / gap31)), choose(stays, across, math.sqrt(no3 * J2 / gap32))
+    A3 = choose(stays, L3, math.sqrt(no1 * J3 / gap31))
+    flat = stays | (no1 <= 0.0)
+    below = choose(flat, one, gap32 * no1)
+    m, mc = choose(flat, zero, gap21 * no3 / below), choose(flat, one, max(gap31 * no2 / below, 0.0))
+    nu = choose(stays, zero, sign * math.sqrt(gap32 * no1 / (J1 * J2 * J3)))
+    still = (A1 == 0.0) | (A2 == 0.0)
+    s, c = choose(still, zero, L2 / choose(still, one, A2)), choose(still, one, L1 / choose(still, one, A1))
+    return Polhode(J1, J2, J3, A1, A2, A3, l, E, m, mc, nu, s, c, math.sqrt(mc + m * c * c))
 
 
 @kernel
 def intermediate(p, C, D, r1, r3):
     """r2: the factors r1/C, r2/(C D), r3/D, each over its amplitude, are affine in 1/J, as K = css/J + cdd is."""
-    if p.J3 == p.J2:
-        return r1
-    gap = p.J2 * (p.J3 - p.J1)
-    r2 = p.J1 * (p.J3 - p.J2) / gap * D * math.sqrt(p.J2 * (p.J3 - p.J1) / (p.J1 * (p.J3 - p.J2))) * r1
-    if p.J2 != p.J1:
-        r2 += p.J3 * (p.J2 - p.J1) / gap * C * p.A2 / p.A3 * r3
-    return r2
+    same = p.J3 == p.J2
+    one = fill_like(1.0, p.l)
+    gap = choose(same, one, p.J2 * (p.J3 - p.J1))
+    ratio = p.J1 * (p.J3 - p.J2) / gap
+    r2 = ratio * D * math.sqrt(1.0 / choose(same, one, ratio)) * r1
+    r2 = r2 + p.J3 * (p.J2 - p.J1) / gap * C * p.A2 / choose(p.A3 > 0.0, p.A3, one) * r3
+    return choose(same, r1, r2)
 
 
 @kernel
@@ -155,21 +162,27 @@ def exact_step(p, h):
     About its momentum the body turns by 2 f, f = int_0^(h/2) (2 E/l + w3) / (1 + L3/l) dt, which no motion makes singular. With
     (x, y, z) = (A1 C, A2 S, A3 D)/l the ends of the step are (x, -y, z) and (x, y, z), and its quaternion follows.
     """
-    S, C, D = jacobi(0.5 * h * p.nu, p.mc)
-    if p.l == 0.0:
-        return Step(S, C, D, 1.0, 0.0, 0.0, 0.0)
-    a3, rate = p.A3 / p.l, 2.0 * p.E / p.l
-    f = 0.0
-    for k in range(16):
-        t = 0.25 * h * (1.0 + NODES[k])
-        d = jacobi(p.nu * t, p.mc)[2]
-        f += 0.25 * h * WEIGHTS[k] * (rate + p.A3 * d / p.J3) / (1.0 + a3 * d)
-    x, y, z = p.A1 * C / p.l, p.A2 * S / p.l, a3 * D
-    cos, sin = math.cos(f), math.sin(f)
-    r0 = (x * x + z + z * z) * cos - x * y * sin
-    r1 = (1.0 + z) * (x * sin + y * cos)
-    r3 = z * (1.0 + z) * sin - (x * cos - y * sin) * y
-    return Step(S, C, D, r0, r1, intermediate(p, C, D, r1, r3), r3)
+    means = find_means(p.mc)
+    S, C, D = jacobi(0.5 * h * p.nu, means)
+    one = fill_like(1.0, p.l)
+    rests = p.l == 0.0
+    size = choose(rests, one, p.l)
+    a3, rate, w3 = p.A3 / size, 2.0 * p.E / size, p.A3 / p.J3
+    middle = 0.25 * h
+    s, c, d = jacobi(p.nu * middle, means)
+    f = 0.0 * one
+    for x, weight in NODES:
+        # Two nodes, as far before the middle as after it, by the addition theorem.
+        s_x, c_x, d_x = jacobi(p.nu * (middle * x), means)
+        below, shift = 1.0 / (1.0 - p.m * (s * s) * (s_x * s_x)), p.m * (s * s_x) * (c * c_x)
+        d0, d1 = (d * d_x + shift) * below, (d * d_x - shift) * below
+        f = f + middle * weight * ((rate + w3 * d0) / (1.0 + a3 * d0) + (rate + w3 * d1) / (1.0 + a3 * d1))
+    x, y, z = p.A1 * C / size, p.A2 * S / size, a3 * D
+    sine, cosine = sine_and_cosine(f)
+    r0 = (x * x + z + z * z) * cosine - x * y * sine
+    r1 = (1.0 + z) * (x * sine + y * cosine)
+    r3 = z * (1.0 + z) * sine - (x * cosine - y * sine) * y
+    return Step(S, C, D, choose(rests, one, r0), r1, intermediate(p, C, D, r1, r3), r3)
 
 
 @kernel
@@ -291,68 +304,114 @@ def normalise(step):
 @kernel
 def directions(p):
     """Amplitudes of L/l; a body at rest has no direction of its own and gets e3."""
-    return (p.A1 / p.l, p.A2 / p.l, p.A3 / p.l) if p.l > 0.0 else (0.0, 0.0, 1.0)
+    one = fill_like(1.0, p.l)
+    rests = p.l == 0.0
+    size = choose(rests, one, p.l)
+    return (p.A1 / size, p.A2 / size, choose(rests, one, p.A3 / size))
 
 
 @kernel
-def store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out):
+def whole_shift(p, step):
+    """What all steps have in common: one whole shift, by the addition theorem from two halves.
+
+    1 / (1 - m S^2 s_mid^2) = (1 + m S^2 s0 s1) / (1 - m S^4), and s0 + s1 = 2 s_mid C D / (1 - m S^2 s_mid^2), and so on.
+    """
+    S, C, D, m = step.S, step.C, step.D, p.m
+    below = 1.0 / (1.0 - m * S * S * S * S)
+    S1, C1, D1 = 2.0 * S * C * D * below, (C * C - S * S * D * D) * below, (D * D - m * S * S * C * C) * below
+    y0, y0s = step.r0 * below, step.r0 * below * m * S * S
+    y1, y2, y3 = step.r1 / (2.0 * C), step.r2 / (2.0 * C * D), step.r3 / (2.0 * D)
+    a1, a2, a3 = directions(p)
+    return Shift(C1, S1, C1 * D1, S1 * D1, m * S1 * S1, m, p.mc, y0, y0s, y1, y2, y3, a1, a2, a3)
+
+
+@kernel
+def start(k, p, q):
+    """The state at the start, and the turn in front of `own_quaternion` that makes q its attitude."""
+    one, zero = fill_like(1.0, p.l), fill_like(0.0, p.l)
+    x, y, up = k.a1 * p.c, k.a2 * p.s, 1.0 + k.a3 * p.d
+    n = 1.0 / (x * x + y * y + up * up)
+    return State(p.s, p.c, p.d, one, zero), product(q, (n * up, -n * y, n * x, zero))
+
+
+@small
+def advance(k, at):
+    """One step.
+
+    After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from c, so that energy and momentum
+    cannot drift, and mc is not lost near the separatrix, where it is far below the round-off of L. Of two products that are
+    added, `fuse` says which one is not rounded: the compiler would take either, in lanes the other one.
+    """
+    s, c, d, z_re, z_im = at
+    r = 1.0 / (1.0 - k.mS1 * (s * s))
+    s1, c1 = fuse(s, k.CD1, k.S1 * (c * d)) * r, fuse(c, k.C1, -(k.SD1 * (s * d))) * r
+    f = 1.5 - 0.5 * fuse(s1, s1, c1 * c1)
+    s1, c1 = s1 * f, c1 * f
+    d1 = math.sqrt(k.mc + k.m * (c1 * c1))
+    q0, q1, q2, q3 = k.y0 + k.y0s * (s * s1), k.y1 * (c + c1), k.y2 * (s + s1), k.y3 * (d + d1)
+    x, y, up = k.a1 * c, k.a2 * s, 1.0 + k.a3 * d
+    re, im = fuse(q0, up, fuse(x, q2, -(y * q1))), fuse(q3, up, fuse(y, q2, x * q1))
+    return State(s1, c1, d1, fuse(z_re, re, -(z_im * im)), fuse(z_re, im, z_im * re))
+
+
+@small
+def rescale(at):
+    """The same attitude with |z| = 1."""
+    n = 1.0 / math.sqrt(fuse(at.z_re, at.z_re, at.z_im * at.z_im))
+    return State(at.s, at.c, at.d, at.z_re * n, at.z_im * n)
+
+
+@small
+def take_steps(k, at, done, last):
+    """The state after `last` steps, given that after `done`."""
+    while done < last:
+        end = min(last, done - done % RESCALE + RESCALE)
+        for _ in range(end - done):
+            at = advance(k, at)
+        done = end
+        if done % RESCALE == 0:
+            at = rescale(at)
+    return at
+
+
+@small
+def own_quaternion(k, at):
+    """The attitude against axes along the momentum, of any length."""
+    x, y, up = k.a1 * at.c, k.a2 * at.s, 1.0 + k.a3 * at.d
+    return (
+        at.z_re * up,
+        fuse(at.z_re, y, at.z_im * x),
+        fuse(at.z_im, y, -(at.z_re * x)),
+        at.z_im * up,
+    )
+
+
+@kernel
+def store(row, p, k, at, left, q_out, L_out):
     """Write a state: its momentum and its quaternion, turned in the world by what is constant."""
-    x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
-    own = (z_re * up, z_re * y + z_im * x, z_im * y - z_re * x, z_im * up)
-    q_out[row, :] = product(left, own)
-    L_out[row, 0], L_out[row, 1], L_out[row, 2] = p.A1 * c, p.A2 * s, p.A3 * d
+    q_out[row, :] = product(left, own_quaternion(k, at))
+    L_out[row, 0], L_out[row, 1], L_out[row, 2] = p.A1 * at.c, p.A2 * at.s, p.A3 * at.d
 
 
 @kernel
 def march(model, coefficients, workspace):
-    """Take the steps (`protocol`).
-
-    After the addition theorem c and s are brought back to s^2 + c^2 = 1 and d is formed from c, so that energy and momentum
-    cannot drift, and mc is not lost near the separatrix, where it is far below the round-off of L.
-    """
-    p, step = Polhode(*model.polhode), coefficients
+    """Take the steps (`protocol`)."""
+    p = Polhode(*model.polhode)
     n_steps, every, pause, q_out, L_out = workspace
-    S, C, D = step.S, step.C, step.D
-    m, mc = p.m, p.mc
-    # One whole shift, by the addition theorem from two halves.
-    below = 1.0 / (1.0 - m * S * S * S * S)
-    S1, C1, D1 = 2.0 * S * C * D * below, (C * C - S * S * D * D) * below, (D * D - m * S * S * C * C) * below
-    CD1, SD1, mS1 = C1 * D1, S1 * D1, m * S1 * S1
-    # 1 / (1 - m S^2 s_mid^2) = (1 + m S^2 s0 s1) / (1 - m S^4), and s0 + s1 = 2 s_mid C D / (1 - m S^2 s_mid^2), and so on.
-    y0, y0s = step.r0 * below, step.r0 * below * m * S * S
-    y1, y2, y3 = step.r1 / (2.0 * C), step.r2 / (2.0 * C * D), step.r3 / (2.0 * D)
-    a = directions(p)
-    s, c, d, z_re, z_im = p.s, p.c, p.d, 1.0, 0.0
-    x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
-    n = 1.0 / (x * x + y * y + up * up)
-    left = product(model.q, (n * up, -n * y, n * x, 0.0))
-    store(0, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
-    row, until_rescale, until_sample = 0, RESCALE, every
-    done = 0
+    k = whole_shift(p, coefficients)
+    at, left = start(k, p, model.q)
+    store(0, p, k, at, left, q_out, L_out)
+    row, done = 0, 0
     while done < n_steps:
         last = end_of_block(done, n_steps, pause)
-        for step_number in range(done + 1, last + 1):
-            r = 1.0 / (1.0 - mS1 * (s * s))
-            s1, c1 = (s * CD1 + S1 * (c * d)) * r, (c * C1 - SD1 * (s * d)) * r
-            f = 1.5 - 0.5 * (s1 * s1 + c1 * c1)
-            s1, c1 = s1 * f, c1 * f
-            d1 = math.sqrt(mc + m * (c1 * c1))
-            q0, q1, q2, q3 = y0 + y0s * (s * s1), y1 * (c + c1), y2 * (s + s1), y3 * (d + d1)
-            x, y, up = a[0] * c, a[1] * s, 1.0 + a[2] * d
-            re, im = q0 * up - y * q1 + x * q2, q3 * up + y * q2 + x * q1
-            z_re, z_im = z_re * re - z_im * im, z_re * im + z_im * re
-            s, c, d = s1, c1, d1
-            until_rescale -= 1
-            if until_rescale == 0:
-                until_rescale = RESCALE
-                n = 1.0 / math.hypot(z_re, z_im)
-                z_re, z_im = z_re * n, z_im * n
-            until_sample -= 1
-            if until_sample == 0 or step_number == n_steps:
-                until_sample = every
+        while done < last:
+            sample = min((row + 1) * every, n_steps)
+            end = min(sample, last)
+            at = take_steps(k, at, done, end)
+            done = end
+            if done == sample:
                 row += 1
-                store(row, p, a, s, c, d, z_re, z_im, left, q_out, L_out)
-        done = last
+                store(row, p, k, at, left, q_out, L_out)
         if done < n_steps:
             call_handlers()
     return Result(n_steps, n_steps, 0, None, 0.0, False)

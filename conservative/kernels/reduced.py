@@ -25,9 +25,10 @@ from typing import Any, NamedTuple
 
 from . import entry, kernel, small
 from .fields import body_torque, finite_torque
+from .lanes import choose, every, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
-from .vector import accumulate, add, apply, cross, dot, inverse, product, scale, subtract, times
+from .vector import accumulate, add, apply, choose_vector, cross, dot, inverse, invert, scale, subtract, times, turn
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
@@ -75,8 +76,14 @@ def explicit_guess(h, J_inverse, field, q, L):
 
 
 @small
+def guess_ahead(past):
+    """The next a by the polynomial of degree 5 through the last six, newest first."""
+    return extrapolate(0, past), extrapolate(1, past), extrapolate(2, past)
+
+
+@small
 def extrapolate(k, past):
-    """Component k of the next a by the polynomial of degree 5 through the last six, newest first."""
+    """Component k of `guess_ahead`."""
     a, b, c, d, e, f = past
     # The newest comes last: a processor sums the rest while it still computes the newest.
     return ((20.0 * c[k] - 15.0 * (b[k] + d[k])) + (6.0 * e[k] - f[k])) + 6.0 * a[k]
@@ -100,20 +107,26 @@ def residual(h, J, field, q, L, a):
 
 
 @small
-def inverse_tangent(h, J, field, q, a):
-    """Rows of the inverse of the residual's derivative by a."""
+def tangent(h, J, field, q, a):
+    """The residual's derivative by a, three columns."""
     Ja = times(J, a)
     k0 = (J[0], a[2] * J[0] - Ja[2], Ja[1] - a[1] * J[0])
     k1 = (Ja[2] - a[2] * J[1], J[1], a[0] * J[1] - Ja[0])
     k2 = (a[1] * J[2] - Ja[1], Ja[0] - a[0] * J[2], J[2])
     if field is None:
-        return inverse((k0, k1, k2))
+        return k0, k1, k2
     T, dT = finite_torque(field, q, a)
     f = 0.25 * h * h
     k0 = subtract(k0, scale(f, subtract(subtract(dT[0], (0.0, -T[2], T[1])), cross(a, dT[0]))))
     k1 = subtract(k1, scale(f, subtract(subtract(dT[1], (T[2], 0.0, -T[0])), cross(a, dT[1]))))
     k2 = subtract(k2, scale(f, subtract(subtract(dT[2], (-T[1], T[0], 0.0)), cross(a, dT[2]))))
-    return inverse((k0, k1, k2))
+    return k0, k1, k2
+
+
+@small
+def inverse_tangent(h, J, field, q, a):
+    """Rows of the inverse of the residual's derivative by a."""
+    return inverse(tangent(h, J, field, q, a))
 
 
 @small
@@ -145,20 +158,35 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
     A correction of relative size s leaves an error of s^2, and one more with the same tangent s^3. The loop ends AFTER that
     one, if s^3 <= the relative error asked for, which is given as the square of s: `tolerance`. Stopping where a residual is
     small enough instead would leave an error of one sign, and the energy would drift.
+
+    Of lanes, each of another body, all go on until the last one is done; one that is done stays as it is, so that its result
+    does not depend on its neighbours. After one correction the answer is as near to the guess as that correction is small.
     """
-    a = guess
-    for iteration in range(1, FEW + 1):
-        rows = inverse_tangent(h, J, field, q, a)
-        correction = apply(rows, residual(h, J, field, q, L, a))
-        a = subtract(a, correction)
+    rows, over = invert(tangent(h, J, field, q, guess))
+    correction = apply(rows, residual(h, J, field, q, L, guess))
+    a = subtract(guess, correction)
+    square = dot(correction, correction)
+    enough = square <= tolerance * (dot(a, a) + REST)
+    iterations, close = 1, enough
+    while iterations < FEW and not every(enough):
+        new_rows, new_over = invert(tangent(h, J, field, q, a))
+        correction = apply(new_rows, residual(h, J, field, q, L, a))
+        a = choose_vector(enough, a, subtract(a, correction))
+        rows = choose_rows(enough, rows, new_rows)
+        over = choose(enough, over, new_over)
         square = dot(correction, correction)
-        aa = dot(a, a) + REST
-        if square <= tolerance * aa:
-            away = subtract(a, guess)
-            trusted = dot(away, away) <= near * aa + NEAR_ZERO and dot(rows[0], cross(rows[1], rows[2])) > 0.0
-            a, gain = final_correction(h, J, field, q, L, carry, rows, a)
-            return a, gain, iteration + 1, math.sqrt(square), trusted
-    return a, a, FEW, math.inf, False
+        aa, away = dot(a, a) + REST, subtract(a, guess)
+        enough = enough | (square <= tolerance * aa)
+        close = dot(away, away) <= near * aa + NEAR_ZERO
+        iterations += 1
+    a, gain = final_correction(h, J, field, q, L, carry, rows, a)
+    return a, gain, iterations + 1, math.sqrt(square), enough & close & (over > 0.0)
+
+
+@small
+def choose_rows(mask, a, b):
+    """The rows of one matrix or the other, in each lane."""
+    return choose_vector(mask, a[0], b[0]), choose_vector(mask, a[1], b[1]), choose_vector(mask, a[2], b[2])
 
 
 @kernel
@@ -281,7 +309,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
         for stage in range(first, len(lengths)):
             h = lengths[stage]
             if known >= 6:
-                a = (extrapolate(0, past), extrapolate(1, past), extrapolate(2, past))
+                a = guess_ahead(past)
             else:
                 a = explicit_guess(h, J_inverse, field, q, L)
             a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
@@ -329,10 +357,10 @@ def turn_attitude(a, q, carry):
 
     With 1 / sqrt(1 + a.a) = 1 + c it is p + c (q0 + p), p = q0 (0, a): what is rounded in c counts a.a times less than in p.
     """
-    square = dot(a, a)
+    square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # which product is rounded is said, for the same bits in lanes
     root = math.sqrt(1.0 + square)
     c = -square / (root * (1.0 + root))
-    p = product(q, (0.0, a[0], a[1], a[2]))
+    p = turn(q, a)
     w, cw = accumulate(q[0], carry[0], p[0] + c * (q[0] + p[0]))
     x, cx = accumulate(q[1], carry[1], p[1] + c * (q[1] + p[1]))
     y, cy = accumulate(q[2], carry[2], p[2] + c * (q[2] + p[2]))

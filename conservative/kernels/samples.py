@@ -53,3 +53,11 @@ def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
         if done < n:
             call_handlers()
     return finite
+
+
+@entry
+def of_many(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
+    """`to_body_axes` of n bodies: all arrays have one more axis in front; spin is (n, 2) or None."""
+    for i in range(len(q)):
+        own = None if spin is None else (spin[i, 0], spin[i, 1])
+        to_body_axes(t, q[i], L[i], J_inverse[i], own, R_BP[i], R_WB[i], w_WB_B[i])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from . import small
+from .lanes import choose, fuse
 
 
 @small
@@ -53,6 +54,23 @@ def product(q, p):
 
 
 @small
+def turn(q, v):
+    """The product q (0, v), without products by zero; which product is rounded is said, for the same bits in lanes."""
+    return (
+        -fuse(q[3], v[2], fuse(q[2], v[1], q[1] * v[0])),
+        fuse(q[0], v[0], fuse(q[2], v[2], -(q[3] * v[1]))),
+        fuse(q[0], v[1], fuse(q[3], v[0], -(q[1] * v[2]))),
+        fuse(q[0], v[2], fuse(q[1], v[1], -(q[2] * v[0]))),
+    )
+
+
+@small
+def choose_vector(mask, a, b):
+    """a or b, in each lane if these are lanes."""
+    return (choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2]))
+
+
+@small
 def vertical(q):
     """World e_z in the axes that the quaternion q turns into world axes: the last row of its matrix, over |q|^2."""
     n = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -64,12 +82,21 @@ def vertical(q):
 
 
 @small
-def inverse(columns):
-    """Rows of the inverse of the matrix with these columns, by Cramer's rule: one division, no branch, all in registers."""
+def invert(columns):
+    """Rows of the inverse of the matrix with these columns, and one over its determinant.
+
+    By Cramer's rule: one division, no branch, all in registers.
+    """
     c0, c1, c2 = columns
     c12 = cross(c1, c2)
     over = 1.0 / dot(c0, c12)
-    return scale(over, c12), scale(over, cross(c2, c0)), scale(over, cross(c0, c1))
+    return (scale(over, c12), scale(over, cross(c2, c0)), scale(over, cross(c0, c1))), over
+
+
+@small
+def inverse(columns):
+    """Rows of the inverse of the matrix with these columns."""
+    return invert(columns)[0]
 
 
 @small

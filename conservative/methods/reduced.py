@@ -16,6 +16,16 @@ from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .coefficients.compositions import BEST, composition_of
+from .columns import (
+    fill_columns,
+    find_unit_of_time,
+    find_units_of_moments,
+    in_gravity_or_free,
+    moments_of_gravity,
+    take_pieces,
+    turn_samples,
+)
+from .many import Block, Bodies, RunMany
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
@@ -115,6 +125,10 @@ class Reduced(Method):
         coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)
         return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
 
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        """Lanes for free bodies and in uniform gravity, in principal axes."""
+        return prepare_lanes(self, bodies, grid) if self.frame == "body" and in_gravity_or_free(bodies) else None
+
 
 def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
@@ -128,3 +142,31 @@ def convert(scene: Scene, method: Reduced) -> tuple[str, PrincipalStart, Any]:
 def find_coefficients(order: int, composition: str | None, tol: float, dt: float) -> Any:
     """Return the kernel's coefficients of a step dt, s."""
     return kernels("reduced").Coefficients(np.array(composition_of(order, composition).lengths(dt)), tol)
+
+
+BODY_STEP = 2e-8
+"""Seconds that a stage takes for a body among many, about: only how often a run can be stopped follows from it."""
+
+
+def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
+    """Return the run of many bodies with `conservative.kernels.reduced_many`."""
+    kernel, n, s = kernels("reduced_many"), len(bodies), grid.n_samples
+    moments, R_BP = bodies.principal
+    time, units = find_unit_of_time(grid), find_units_of_moments(moments)[:, None]
+    lengths, tol = find_coefficients(method.order, method.composition, method.tol, grid.dt / time)
+    J, L0 = moments / units, bodies.L_P0 / units * time
+    columns = fill_columns(np.concatenate([J, 1 / J], axis=1), kernel.WIDTH)
+    field = None if bodies.scene.free else fill_columns(moments_of_gravity(bodies, R_BP) / units * time * time, kernel.WIDTH)
+    states, q, L = np.empty((kernel.ROWS, columns.shape[1])), np.empty((n, s, 4)), np.empty((n, s, 3))
+
+    def run() -> Block:
+        finished = np.ones(columns.shape[1], dtype=bool)
+        kernel.start(bodies.q_WP0, L0, states, q, L)
+
+        def take(done: int, last: int) -> None:
+            kernel.enter(lengths, tol, columns, field, states, done, last, grid.n_steps, grid.every, q, L, finished)
+
+        take_pieces(grid.n_steps, BODY_STEP * len(lengths) * n, take)
+        return turn_samples(grid, q, L, 1 / J / time, None, R_BP, finished[:n])
+
+    return run

@@ -1,0 +1,77 @@
+"""Many bodies as kernels with lanes take them: in columns of whole registers, and in units in which all are of order one.
+
+Moments of inertia are in units of the largest of each body, rounded to a power of two, and times in units of the step, likewise.
+So squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold, and powers of two round nothing: results are
+those in SI units, bit for bit. Source: definitions; our own layout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+from ..deferred_imports import kernels
+from ..method import Grid
+from ..potentials.uniform_gravity import UniformGravity
+from .many import Block, Bodies, pause
+
+PIECE = 0.03
+"""About how long a call of compiled code may take, s: between two of them, threads can be stopped."""
+
+
+def find_unit_of_time(grid: Grid) -> float:
+    """Return a power of two, s, that the step is 0.5 to 1 times as long as."""
+    return math.ldexp(1.0, math.frexp(grid.dt)[1])
+
+
+def find_units_of_moments(moments: Array) -> Array:
+    """Return powers of two (n,), kg m^2, that the largest of the moments (n, 3) of each body is 0.5 to 1 times as large as."""
+    return np.ldexp(1.0, np.frexp(moments.max(axis=1))[1])
+
+
+def fill_columns(rows: Array, width: int) -> Array:
+    """Return the numbers (n, k) of n bodies as columns (k, m), m the next multiple of `width`, filled up with the last body."""
+    missing = -len(rows) % width
+    return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
+
+
+def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
+    """Return weight times centre of mass (n, 3), N m, in axes (n, 3, 3), of bodies in `UniformGravity`."""
+    potential: Any = bodies.scene.potential
+    weight, com_B = (np.asarray(bodies.parameters.get(name, getattr(potential, name))) for name in ("weight", "com_B"))
+    moment_B = np.broadcast_to(weight[..., None] * com_B, (len(bodies), 3))
+    return np.asarray((moment_B[:, None, :] @ R_BP)[:, 0, :])
+
+
+def in_gravity_or_free(bodies: Bodies) -> bool:
+    """Whether the field of the bodies is one that lanes know."""
+    return isinstance(bodies.scene.potential, UniformGravity | None)
+
+
+def take_pieces(n_steps: int, cost: float, take: Callable[[int, int], object]) -> None:
+    """Call `take(done, last)` until n_steps are done, in pieces that take about `PIECE` where a step costs so much, s.
+
+    Between two of them `pause` can end it.
+    """
+    piece, done = max(1, int(PIECE / cost)), 0
+    while done < n_steps:
+        last = min(n_steps, done + piece)
+        take(done, last)
+        done = last
+        pause()
+
+
+def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array | None, R_BP: Array, finished: Array) -> Block:
+    """Return the samples in body axes.
+
+    Attitudes q (n, s, 4) and momenta L (n, s, 3) are in axes R_BP (n, 3, 3); L times J_inverse (n, 3) are rates, rad/s. `spin`
+    (n, 2) is what `PrincipalStart` has, of each body, or None.
+    """
+    n, s = q.shape[:2]
+    R_WB, w_WB_B = np.empty((n, s, 3, 3)), np.empty((n, s, 3))
+    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, np.require(R_BP, np.float64, ("C", "W")), R_WB, w_WB_B)
+    return Block(R_WB, w_WB_B, finished)
