@@ -6,7 +6,6 @@ axes D whose third one is that of the field, in units in which the body is of or
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,15 +14,13 @@ import numpy as np
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion
 from ..deferred_imports import kernels
 from ..method import Grid
+from .columns import fill_columns, take_pieces
 from .fields_of_many import Fields, find_fields, into_axes
 from .many import Block, Bodies, RunMany
 from .units import COARSE, SHORTEST
 
-PIECE = 0.03
-"""About how long a call of compiled code takes, s."""
 NEARLY_EQUAL = 4e-12
 """Relative difference of two moments below which a body may be symmetric: no less than `Scene.symmetry_axis_B` allows."""
-Part = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,28 +84,17 @@ def prepare_bodies(bodies: Bodies, grid: Grid, order: int) -> RunMany | None:
         return None
     n, s, m = len(bodies), grid.n_samples, start.states.shape[1]
     enter, turns = kernels("taylor_many").enter, find_turns(start.spin, grid.t, m)
-    R_WB0, w_WB_B0 = from_quaternion(to_quaternion(bodies.R_WB0)), bodies.w_WB_B0
+    R_WB0, cost = from_quaternion(to_quaternion(bodies.R_WB0)), m * (20e-9 + 0.7e-9 * order**2)
 
     def run() -> Block:
         states, R_WB, w_WB_B = start.states.copy(), np.empty((m, s, 3, 3)), np.empty((m, s, 3))
         samples = R_WB.reshape(-1), w_WB_B.reshape(-1)
-        for some, steps in divide(m, grid.n_steps, order):
-            enter(order, start.like, start.columns, states, turns, *some, *steps, grid.n_steps, grid.every, *samples)
-        R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, w_WB_B0
+        given = order, start.like, start.columns, states, turns
+        take_pieces(grid.n_steps, cost, lambda done, last: enter(*given, done, last, grid.n_steps, grid.every, *samples))
+        R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
         return Block(R_WB[:n], w_WB_B[:n], states[-1, :n] == 0)
 
     return run
-
-
-def divide(m: int, n_steps: int, order: int) -> Iterator[tuple[Part, Part]]:
-    """Yield which of m bodies and which steps are next, first and last: as many as take about `PIECE` together."""
-    width = kernels("lanes").REGISTER
-    piece = int(PIECE / (20e-9 + 0.7e-9 * order**2)) // width
-    steps = min(n_steps, piece)
-    count = piece // steps * width
-    for first in range(0, m, count):
-        for done in range(0, n_steps, steps):
-            yield (first, min(m, first + count)), (done, min(n_steps, done + steps))
 
 
 def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
@@ -123,8 +109,8 @@ def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
     R_DP = directions(fields.axis_W).swapaxes(1, 2) @ bodies.R_WB0 @ frames.R_BP
     model = build_model(frames, fields, units, grid.dt, w, np.where(energy > 0, energy, 1.0), R_DP)
     state = (model.g, model.a, model.L / model.J, np.zeros((len(w), 1)))
-    spin = find_spins(frames, w) if frames.spinning.any() else None
-    return Start(build_likes(fields.like), fill_columns(model), fill_columns(state), spin)
+    spin, width = find_spins(frames, w) if frames.spinning.any() else None, kernels("lanes").REGISTER
+    return Start(build_likes(fields.like), *(fill_columns(np.column_stack(parts), width) for parts in (model, state)), spin)
 
 
 def is_free(bodies: Bodies) -> bool:
@@ -220,13 +206,6 @@ def build_likes(field: Any) -> tuple[Any, Any]:
     nine = (three, three, three)
     sizes = {"J": three, "J_inverse": three, "field": field, "loose": three, "scales": (one, one), "g": three, "a": three}
     return kernel.Models(**sizes, L=three, h=one, axes=nine, R_BP=nine, units=three), kernel.State(three, three, three, one)
-
-
-def fill_columns(parts: Any) -> Array:
-    """Return numbers (n, .) of n bodies as columns (., m), m the next multiple of the bodies in a register."""
-    rows = np.column_stack(parts)
-    missing = -len(rows) % kernels("lanes").REGISTER
-    return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
 
 
 def find_turns(spin: Array | None, t: Array, m: int) -> Array:
