@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from ..method import Grid
 from ..methods.many import Bodies
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
+from .blocks import BlockResult
+from .store import open_store
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,27 @@ class Ensemble:
         m = len(self.t) if failure is None else int(np.isfinite(self.w_WB_B[i]).all(axis=1).sum())
         samples = self.t[:m], self.R_WB[i, :m], self.w_WB_B[i, :m]
         return Trajectory(scene, *samples, self.label, Counters(self.grid.n_steps), failure, self.choice)
+
+    def to_zarr(self, path: str | Path) -> None:
+        """Write the ensemble to a new folder, from which `open_ensemble(path)` reads it: see `conservative.integration.store`.
+
+        Raises
+        ------
+        BadInput
+            There is something.
+        NotWritten
+            It cannot be written, or the disk is full.
+        MissingExtra
+            Zarr, of the extra `ensembles`, is not installed.
+        """
+        with open_store(path, self.label, self.bodies, self.grid) as store:
+            for first in range(0, len(self), store.block):
+                store.write(first, self._take_block(slice(first, first + store.block)))
+
+    def _take_block(self, part: slice) -> BlockResult:
+        drifts = np.stack([values[part] for values in self.drifts.values()], axis=1)
+        failures = {i - part.start: failure for i, failure in self.failures.items() if part.start <= i < part.stop}
+        return BlockResult(self.R_WB[part], self.w_WB_B[part], drifts, failures)
 
     def __len__(self) -> int:
         return len(self.bodies)
