@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .integration.ensemble import Ensemble as Ensemble
     from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
+    from .integration.reading import open_ensemble as open_ensemble
+    from .integration.spread import spread as spread
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -109,6 +111,8 @@ _PLACES = {
     "WrongBranch": "errors",
     "integrate": "integration.one",
     "integrate_many": "integration.many",
+    "open_ensemble": "integration.reading",
+    "spread": "integration.spread",
 }
 
 __all__ = [
@@ -157,8 +161,10 @@ __all__ = [
     "WrongBranch",
     "integrate",
     "integrate_many",
+    "open_ensemble",
     "scenes",
     "shapes",
+    "spread",
 ]
 
 

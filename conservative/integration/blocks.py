@@ -61,6 +61,11 @@ def list_blocks(n: int, grid: Grid) -> range:
     return range(0, n, count_bodies(grid))
 
 
+def count_left(n: int, grid: Grid, done: Collection[int]) -> int:
+    """Return how many of n bodies are in blocks whose first indices are not in `done`."""
+    return sum(min(count_bodies(grid), n - first) for first in list_blocks(n, grid) if first not in done)
+
+
 def run_block(method: Method, bodies: Bodies, grid: Grid) -> BlockResult:
     """Return the samples of bodies, whose outcomes are those of `Method.solve` for each of them alone."""
     run = method.prepare_many(bodies, grid)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..errors import IntegrationFailed
@@ -14,6 +15,10 @@ from ..method import Grid
 from ..methods.many import Bodies
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
+from . import pictures
+
+if TYPE_CHECKING:
+    import altair
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +70,20 @@ class Ensemble:
     def outcome(self, i: int) -> Outcome:
         """Return how the run of body number i ended."""
         return self.failures[i].outcome if i in self.failures else OK
+
+    def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
+        """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
+
+        The axis is a direction (3,) in body axes, by default the axis of symmetry of body and field, else the third.
+
+        Raises
+        ------
+        BadInput
+            The axis is no direction.
+        MissingExtra
+            Altair or pandas, of the extra `report`, is not installed.
+        """
+        return pictures.draw_ensemble(self, axis_B)
 
     def __getitem__(self, i: int) -> Trajectory:
         failure, scene = self.failures.get(range(len(self))[i]), self.bodies.take(i)

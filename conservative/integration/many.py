@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Generator, Mapping
+from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import closing
-from typing import Protocol, TypedDict, Unpack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Protocol, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
-from ..check import describe, positive_integer
+from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, positive_number
 from ..errors import BadInput
 from ..method import Grid, Method, grid_for
+from ..methods.automatic import grid_of
+from ..methods.between import Samples
 from ..methods.many import Bodies
+from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
-from .blocks import BlockResult, list_blocks, run_blocks, start_threads
-from .drifts import list_drifts
-from .ensemble import Ensemble, Memory
+from .blocks import SAMPLE_BYTES as KEPT_BYTES
+from .blocks import BlockResult, count_left, list_blocks, run_blocks
+from .ensemble import Ensemble
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
+from .places import Place
+from .shared_choice import Goal, choose_for_all
 
 
 class Details(TypedDict, total=False):
@@ -26,7 +34,12 @@ class Details(TypedDict, total=False):
 
     method: Method | str | None
     sample_every: int
+    error: float | None
     threads: int | None
+    progress: Callable[[ProgressOfMany], object] | None
+    path: str | Path | None
+    resume: bool
+    client: Any
 
 
 def integrate_many(
@@ -60,14 +73,35 @@ def integrate_many(
         By keyword, as all that follow: a method, or its name, as `integrate` has it.
     sample_every
         Keep every so many steps (and the first and last state).
+    error
+        Attitude error of every body over the run, rad, instead of a method and a step; dt then is the distance of samples.
+        `conservative.integration.shared_choice` chooses both for the bodies that turn fastest and for some others, and verifies
+        them on further ones: `ensemble.choice` has them, the largest estimated error, and on how many bodies it was estimated.
+        A warning `AccuracyNotReached` where one of those is not near enough. Bodies that are not looked at may be further off:
+        those near a separatrix, say, which amplify errors.
     threads
         How many blocks of bodies run side by side; default: as many as there are processors for this process. Numbers do not
         depend on it.
+    progress
+        Called with a `ProgressOfMany`, whose text is a line, after each block. `print` will do.
+    path
+        A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
+        memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
+    resume
+        Whether the folder may have some blocks of the same run, which was interrupted: the others are added. The folder is then
+        the same, byte for byte, as that of a run without a break.
+    client
+        A `dask.distributed.Client`: blocks run on its workers, instead of threads of this process.
 
     Raises
     ------
     BadInput
-        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number.
+        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number. Or the folder is there
+        without `resume`, or is something else or of another run; or the cluster has no workers, or some of another version.
+    NotWritten
+        The folder cannot be written, or the disk is full; blocks that are done are kept.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed, or Dask, of the extra `cluster`.
     MissingEngine
         A method of that name needs an engine that is not installed.
     Unsupported
@@ -78,15 +112,26 @@ def integrate_many(
     unknown = sorted(set(details) - set(Details.__annotations__))
     if unknown:
         raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
+    progress, place = _read_progress(details.get("progress")), _read_place(details)
     bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
-    threads = _read_threads(details.get("threads"))
-    method = read_method(details.get("method"), bodies.take(0))
-    grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, details.get("sample_every", 1))
-    require_support(method, bodies.take(0))
     try:
-        return run_all(method, bodies, grid, threads)
+        method, grid, choice = _plan(bodies, dt, t_end, details)
+        if place.path is None:
+            _require_memory(bodies, grid)
+        return replace(run_all(method, bodies, grid, place, progress), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
+
+
+def _read_progress(value: Any) -> Callable[[ProgressOfMany], object] | None:
+    if value is not None and not callable(value):
+        raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
+    return value
+
+
+def _read_place(details: Details) -> Place:
+    to = details.get("client"), details.get("path"), details.get("resume", False)
+    return Place(_read_threads(details.get("threads")), *to)
 
 
 def _read_threads(value: object) -> int:
@@ -95,13 +140,40 @@ def _read_threads(value: object) -> int:
     return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
 
 
-def run_all(method: Method, bodies: Bodies, grid: Grid, threads: int) -> Ensemble:
-    """Return what all blocks give, in memory."""
-    sink = Memory(bodies, grid, list_drifts(bodies))
-    threads = min(threads, len(list_blocks(len(bodies), grid)))
-    with start_threads(threads) as executor:
-        fill(sink, run_blocks(method, bodies, grid, executor, 2 * threads, sink.done))
-    return Ensemble(bodies, grid, sink.R_WB, sink.w_WB_B, sink.drifts_by_name, method.label, sink.failures)
+def _plan(bodies: Bodies, dt: float | None, t_end: float | None, details: Details) -> tuple[Method, Grid, ChoiceForMany | None]:
+    """Return the method and the grid of steps, s, as they are given or chosen for an error."""
+    first, error, every = bodies.take(0), details.get("error"), details.get("sample_every", 1)
+    if error is None:
+        method = read_method(details.get("method"), first)
+        grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
+        require_support(method, first)
+        return method, grid, None
+    positive_number("error", error, "a finite attitude error above 0, rad")
+    if details.get("method") is not None:
+        raise BadInput("method", describe(details["method"]), "None together with error, which chooses the method")
+    end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", every))
+    choice = choose_for_all(bodies, Goal(error, end, samples))
+    return choice.method, grid_of(choice.dt, end, samples), choice
+
+
+def _require_memory(bodies: Bodies, grid: Grid) -> None:
+    """Raise `BadInput` if the samples of all bodies do not fit in memory."""
+    most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
+    if samples > most:
+        got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
+        raise BadInput("sample_every", got, f"a larger one: up to {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each")
+
+
+def run_all(
+    method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Callable[[ProgressOfMany], object] | None
+) -> Ensemble:
+    """Return what all blocks give, in memory or in a folder. Steps of the grid are in s."""
+    what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
+    with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
+        results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
+        fill(sink, results, count_left(len(bodies), grid, sink.done), progress)
+    return place.read(sink, *what)
 
 
 class Sink(Protocol):
@@ -115,8 +187,17 @@ class Sink(Protocol):
         """Keep the result of the block that begins with body number `first`."""
 
 
-def fill(sink: Sink, results: Generator[tuple[int, BlockResult], None, None]) -> None:
-    """Hand all results to a sink."""
+def fill(
+    sink: Sink,
+    results: Generator[tuple[int, BlockResult], None, None],
+    total: int,
+    progress: Callable[[ProgressOfMany], object] | None,
+) -> None:
+    """Hand all results to a sink, and tell after each of them how many bodies are done, of those that are left."""
+    begun, done = perf_counter(), 0
     with closing(results):
         for first, result in results:
             sink.write(first, result)
+            done += len(result)
+            if progress is not None:
+                progress(ProgressOfMany(perf_counter() - begun, done, total))

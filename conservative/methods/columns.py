@@ -17,7 +17,7 @@ from ..attitude import Array
 from ..deferred_imports import kernels
 from ..method import Grid
 from ..potentials.uniform_gravity import UniformGravity
-from .many import Block, Bodies
+from .many import Block, Bodies, pause
 
 PIECE = 0.03
 """About how long a call of compiled code may take, s: between two of them, threads can be stopped."""
@@ -53,12 +53,16 @@ def in_gravity_or_free(bodies: Bodies) -> bool:
 
 
 def take_pieces(n_steps: int, cost: float, take: Callable[[int, int], object]) -> None:
-    """Call `take(done, last)` until n_steps are done, in pieces that take about `PIECE` where a step costs so much, s."""
+    """Call `take(done, last)` until n_steps are done, in pieces that take about `PIECE` where a step costs so much, s.
+
+    Between two of them `pause` can end it.
+    """
     piece, done = max(1, int(PIECE / cost)), 0
     while done < n_steps:
         last = min(n_steps, done + piece)
         take(done, last)
         done = last
+        pause()
 
 
 def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array | None, R_BP: Array, finished: Array) -> Block:
@@ -69,5 +73,5 @@ def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array |
     """
     n, s = q.shape[:2]
     R_WB, w_WB_B = np.empty((n, s, 3, 3)), np.empty((n, s, 3))
-    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, np.ascontiguousarray(R_BP), R_WB, w_WB_B)
+    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, np.require(R_BP, np.float64, ("C", "W")), R_WB, w_WB_B)
     return Block(R_WB, w_WB_B, finished)
