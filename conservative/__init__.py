@@ -26,11 +26,16 @@ if TYPE_CHECKING:
     from .errors import MissingExtra as MissingExtra
     from .errors import NotConserved as NotConserved
     from .errors import NotConverged as NotConverged
+    from .errors import NotRun as NotRun
     from .errors import NotWritten as NotWritten
     from .errors import PotentialFailed as PotentialFailed
     from .errors import Unsupported as Unsupported
     from .errors import WrongBranch as WrongBranch
+    from .integration.ensemble import Ensemble as Ensemble
+    from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
+    from .integration.reading import open_ensemble as open_ensemble
+    from .integration.spread import spread as spread
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -68,6 +73,7 @@ _PLACES = {
     "Convected": "methods.convected",
     "Counters": "trajectory",
     "Diverged": "errors",
+    "Ensemble": "integration.ensemble",
     "FunctionPotential": "potentials.python_function",
     "Gauss": "methods.gauss",
     "GravityGradient": "potentials.gravity_gradient",
@@ -83,6 +89,7 @@ _PLACES = {
     "MoserVeselov": "methods.moser_veselov",
     "NotConserved": "errors",
     "NotConverged": "errors",
+    "NotRun": "errors",
     "NotWritten": "errors",
     "Orbit": "potentials.turning",
     "Outcome": "outcome",
@@ -103,6 +110,9 @@ _PLACES = {
     "Unsupported": "errors",
     "WrongBranch": "errors",
     "integrate": "integration.one",
+    "integrate_many": "integration.many",
+    "open_ensemble": "integration.reading",
+    "spread": "integration.spread",
 }
 
 __all__ = [
@@ -113,6 +123,7 @@ __all__ = [
     "Convected",
     "Counters",
     "Diverged",
+    "Ensemble",
     "FunctionPotential",
     "Gauss",
     "GravityGradient",
@@ -128,6 +139,7 @@ __all__ = [
     "MoserVeselov",
     "NotConserved",
     "NotConverged",
+    "NotRun",
     "NotWritten",
     "Orbit",
     "Outcome",
@@ -148,8 +160,11 @@ __all__ = [
     "Unsupported",
     "WrongBranch",
     "integrate",
+    "integrate_many",
+    "open_ensemble",
     "scenes",
     "shapes",
+    "spread",
 ]
 
 

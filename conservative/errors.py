@@ -74,9 +74,20 @@ class IntegrationFailed(ArithmeticError):
 
     outcome: Outcome
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return _restore, (type(self), self.args, self.__dict__)
+
     def at_times(self, unit: float) -> Self:
         """Return the failure with its time, which is in units of `unit` s, in s; of failures without a time the same."""
         return self
+
+
+def _restore(kind: type[IntegrationFailed], args: tuple[object, ...], values: dict[str, object]) -> IntegrationFailed:
+    """Return a failure that was sent to another process: without a call of its constructor, which takes other arguments."""
+    found = kind.__new__(kind, *args)
+    found.args = args
+    found.__dict__.update(values)
+    return found
 
 
 class NotConverged(IntegrationFailed):
@@ -150,6 +161,15 @@ class InvalidResult(IntegrationFailed):
         )
 
 
+class NotRun(IntegrationFailed):
+    """The method does not take a body, one of many. Attribute: `reason`, what `integrate` would raise for it alone."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        self.outcome = Outcome(OutcomeKind.UNSUPPORTED, reason)
+        super().__init__(reason)
+
+
 class PotentialFailed(RuntimeError):
     """A function that a potential was made of raised an exception, which is this one's `__cause__`."""
 
@@ -175,6 +195,8 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "engines": ("mujoco", "pinocchio", "heyoka"),
         "environments": ("uv", "platformdirs"),
         "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert", "cloudpickle"),
+        "ensembles": ("zarr",),
+        "cluster": ("distributed", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),
     }
 )

@@ -5,6 +5,7 @@ An end is a kind out of a fixed list, and the fields that belong to it. Text is 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -111,6 +112,41 @@ class Progress:
 
 
 @dataclass(frozen=True)
+class ProgressOfMany:
+    """How far `integrate_many` has got; its text is a line for people.
+
+    Attributes
+    ----------
+    elapsed
+        Time since the first block was begun, s.
+    done, total
+        Bodies that are done, and all bodies.
+    found
+        How many of those that are done were done before, and are there because a run was resumed.
+    """
+
+    elapsed: float
+    done: int
+    total: int
+    found: int = 0
+
+    @property
+    def rate(self) -> float:
+        """Bodies a second, 1/s, since the first block was begun."""
+        return (self.done - self.found) / self.elapsed if self.elapsed > 0 else 0.0
+
+    @property
+    def left(self) -> float:
+        """Time that the bodies left will take at this rate, s; infinite as long as nothing is known."""
+        return (self.total - self.done) / self.rate if self.rate > 0 else math.inf
+
+    def __str__(self) -> str:
+        """Return a line such as `12288 of 100000 bodies in 2.1 s, 5851 a second, 15 s left`."""
+        left = f"{self.left:.0f} s left" if self.rate > 0 else "time left unknown"
+        return f"{self.done} of {self.total} bodies in {self.elapsed:.1f} s, {self.rate:.4g} a second, {left}"
+
+
+@dataclass(frozen=True)
 class Choice:
     """What `integrate(scene, error=...)` chose.
 
@@ -136,3 +172,16 @@ class Choice:
     def reached(self) -> bool:
         """Whether the estimate is within what was asked for."""
         return self.estimate <= self.error
+
+
+@dataclass(frozen=True)
+class ChoiceForMany(Choice):
+    """What `integrate_many(scene, ..., error=...)` chose; `estimate` is the largest of those bodies that were looked at.
+
+    Attributes
+    ----------
+    bodies
+        On how many bodies it was estimated, the hardest among them. Of the others nothing is known but that they turn no faster.
+    """
+
+    bodies: int = 1

@@ -21,7 +21,7 @@ from functools import lru_cache
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from .pickling import NotTransferable, dump, load
+from conservative.integration.pickling import NotTransferable, dump, load
 
 T = TypeVar("T")
 START_LIMIT = 120.0

@@ -63,7 +63,7 @@ def requirements(wheel):
 
 def test_four_packages_are_required_and_no_more(requirements):
     assert requirements[""] == LEAN
-    assert set(requirements) == {"", "engines", "environments", "report", "gate", "all", "dev"}
+    assert set(requirements) == {"", "engines", "environments", "report", "ensembles", "cluster", "gate", "all", "dev"}
 
 
 @pytest.mark.parametrize("extra", EXTRAS)

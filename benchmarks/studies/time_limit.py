@@ -8,11 +8,11 @@ from functools import partial
 from weakref import WeakKeyDictionary
 
 from conservative.errors import BadInput
+from conservative.integration.pickling import NotTransferable
 from conservative.method import Grid, Method, Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 from conservative.references.environments.engine_method import EngineMethod
-from conservative.references.pickling import NotTransferable
 from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

@@ -44,6 +44,22 @@ def default_method(scene: Scene) -> Method:
     return first if first.unsupported(scene) is None else (*candidates(scene), first)[0]
 
 
+def read_method(method: object, scene: Scene) -> Method:
+    """Return a method from what users give: one, the name of one, or None for that of the scene.
+
+    Raises
+    ------
+    BadInput
+        It is none of these.
+    """
+    if isinstance(method, str):
+        method = registry.method(method)
+    method = default_method(scene) if method is None else method
+    if not isinstance(method, Method):
+        raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
+    return method
+
+
 def integrate(
     scene: Scene,
     dt: float | None = None,
@@ -113,13 +129,13 @@ def integrate(
         else:
             trajectory = _integrate_with(method, scene, dt, t_end, sample_every, at)
     except SystemError as failure:
-        raise _interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
+        raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
     if trajectory.failure is not None and on_failure == "raise":
         raise trajectory.failure
     return trajectory
 
 
-def _interrupt_of(failure: SystemError) -> BaseException:
+def interrupt_of(failure: SystemError) -> BaseException:
     """Return the interrupt that came while Python called machine code, which makes `SystemError`s of it; else the failure."""
     reason: BaseException | None = failure
     while isinstance(reason, SystemError):
@@ -159,11 +175,7 @@ def _require_choice(error: float, dt: float | None, method: Method | str | None,
 def _integrate_with(
     method: Method | str | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int, at: Array | None
 ) -> Trajectory:
-    if isinstance(method, str):
-        method = registry.method(method)
-    method = default_method(scene) if method is None else method
-    if not isinstance(method, Method):
-        raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
+    method = read_method(method, scene)
     step = DEFAULT_DT if dt is None else dt
     grid = grid_for(scene, step, t_end, sample_every if at is None else MOST_STEPS)
     require_support(method, scene)

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 from . import entry, kernel, small
 from .fields import body_torque, finite_torque
-from .lanes_llvm import choose, every
+from .lanes import choose, every, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
 from .vector import accumulate, add, apply, choose_vector, cross, dot, inverse, invert, scale, subtract, times, turn
@@ -357,7 +357,7 @@ def turn_attitude(a, q, carry):
 
     With 1 / sqrt(1 + a.a) = 1 + c it is p + c (q0 + p), p = q0 (0, a): what is rounded in c counts a.a times less than in p.
     """
-    square = dot(a, a)
+    square = fuse(a[2], a[2], fuse(a[1], a[1], a[0] * a[0]))  # which product is rounded is said, for the same bits in lanes
     root = math.sqrt(1.0 + square)
     c = -square / (root * (1.0 + root))
     p = turn(q, a)

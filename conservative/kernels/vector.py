@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from . import small
-from .lanes_llvm import choose, fuse
+from .lanes import choose, fuse
 
 
 @small

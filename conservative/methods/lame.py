@@ -34,6 +34,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
+from ..attitude import Array, to_quaternion
 from ..declarations import README, Candidacy, Claims
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -42,6 +45,9 @@ from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
+from .columns import fill_columns, find_unit_of_time, find_units_of_moments, in_gravity_or_free, make_room, moments_of_gravity
+from .columns import take_pieces, turn_samples
+from .many import Block, Bodies, RunMany
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
@@ -107,9 +113,56 @@ class Lame(Method):
         kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        """Lanes for all tops that it has a step for."""
+        return prepare_lanes(self, bodies, grid) if in_gravity_or_free(bodies) else None
+
 
 def convert(scene: Scene, method: Lame) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in the frame that does not spin and the kernel's model of it."""
     start = principal_start(scene, "non_spinning")
     moment = start.field.z if start.field else 0.0
     return method.label, start, kernels("lame").Model(start.J[0], moment, start.q, start.L)
+
+
+PART = 1.5e-8
+"""Seconds that a part of a step takes for a body among many, about: only how often a run can be stopped follows from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tops:
+    """Starts of n tops in the frame that does not spin, as `PrincipalStart` has them, and the weight times lever arm, N m."""
+
+    J: Array
+    kappa: Array
+    q: Array
+    L: Array
+    R_BP: Array
+    spin: Array
+
+
+def prepare_lanes(method: Lame, bodies: Bodies, grid: Grid) -> RunMany | None:
+    """Return the run of many tops with `conservative.kernels.lame_many`; None where none of them has such a step."""
+    kernel, n, s = kernels("lame_many"), len(bodies), grid.n_samples
+    chosen, tops = find_tops(bodies, method, grid)
+    if not len(chosen):
+        return None
+    time, units = find_unit_of_time(grid), find_units_of_moments(tops.J[:, None])
+    J, L0, m = tops.J / units, tops.L / units[:, None] * time, -(-len(chosen) // kernel.WIDTH) * kernel.WIDTH
+    table = np.empty((kernel.ROWS, m))
+    most = kernel.prepare(J, tops.kappa / units * time * time, tops.q, L0, grid.dt / time, table)
+    q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
+    q[: len(chosen), 0], L[: len(chosen), 0] = tops.q, L0
+    finished = np.isin(np.arange(n), chosen)
+
+    def run() -> Block:
+        states = table.copy()
+
+        def take(done: int, last: int) -> None:
+            kernel.march(states, done, last, grid.n_steps, grid.every, q, L)
+
+        take_pieces(grid.n_steps, PART * most * n, take)
+        rates = np.repeat(1 / J / time, 3).reshape(-1, 3)
+        return spread(turn_samples(grid, q, L, rates, tops.spin, tops.R_BP), finished)
+
+    return run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -115,3 +116,26 @@ class Block:
 
 
 RunMany = Callable[[], Block]
+
+
+class GivenUp(BaseException):
+    """Nobody waits for this block any more: whoever asked for it was interrupted, or another block failed."""
+
+
+_of_thread = threading.local()
+
+
+def watch(given_up: threading.Event) -> None:
+    """Let `pause` of this thread raise `GivenUp` once the event is set."""
+    _of_thread.given_up = given_up
+
+
+def pause() -> None:
+    """Raise `GivenUp` if nobody waits for this thread's block any more.
+
+    Called between two pieces of a block, every 20 to 50 ms. In the main thread, Ctrl-C needs no call: Python raises it by
+    itself.
+    """
+    given_up = getattr(_of_thread, "given_up", None)
+    if given_up is not None and given_up.is_set():
+        raise GivenUp

@@ -19,8 +19,10 @@ from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
+from .many import Bodies, RunMany
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple
 from .run_kernel import prepare_run
+from .taylor_many import prepare_run_many
 from .units import in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
@@ -137,6 +139,9 @@ class Taylor(_Settings):
         coefficients = kernel.Coefficients(self.terms, grid.dt, self.tolerance or 0.0)
         run = prepare_run(scene, grid, label, start, kernel, model, coefficients)
         return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
+
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        return prepare_run_many(bodies, grid, self.terms) if self.tolerance is None else None
 
 
 def turn_samples(run: Run, orbit: Orbit) -> Run:

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array
-from conservative.errors import require_extra
+from ..attitude import Array
+from ..errors import require_extra
 
 LOCK = threading.Lock()
 """Held while bytes are made: which modules are taken by value is a setting of the whole process."""

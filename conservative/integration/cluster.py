@@ -1,0 +1,148 @@
+"""Work on other machines: a Dask cluster as an executor like any other.
+
+    from dask.distributed import Client
+
+    with Client("tcp://10.0.0.7:8786") as client:  # or open_client, which says in one line what is wrong
+        ensemble = cv.integrate_many(scene, w_WB_B0=starts, path="starts.zarr", client=client)
+
+A task is a pure function of the bytes that it is sent, and its result comes back to whoever asked: workers need no file system
+in common, a task whose worker dies is run by another one, and what is run twice counts once. Workers need this package in the
+same version, which is asked for before any work. From processors of the same kind the same numbers come back as without a
+cluster, bit for bit; compiled code differs from kind to kind.
+
+Source: `concurrent.futures` and `distributed.Client.get_executor`; all scheduling is Dask's.
+"""
+
+from __future__ import annotations
+
+import logging
+import pkgutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ..check import describe
+from ..errors import BadInput, require_extra
+from ..version import VERSION
+from .pickling import dump, load
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+T = TypeVar("T")
+CONNECT_LIMIT = 5.0
+"""Time, s, that a scheduler may take to answer."""
+_LOST = "a cluster that stays there; what was written to a path is kept, and resume=True goes on from there"
+
+
+@contextmanager
+def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
+    """Give a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, with Dask's own messages off in the block.
+
+    Raises
+    ------
+    BadInput
+        No scheduler answers there within `limit` s, or it is no address.
+    MissingExtra
+        Dask, of the extra `cluster`, is not installed.
+    """
+    require_extra("scheduler", "cluster")
+    from distributed import Client
+
+    with ExitStack() as stack:
+        stack.enter_context(_silence("distributed", "distributed.client", "tornado.application"))
+        try:
+            client = stack.enter_context(Client(address, timeout=limit, set_as_default=False))
+        except Exception as error:  # whatever else listens there can answer anything
+            got = f"{address!r}, where no scheduler answers ({error or type(error).__name__})"
+            allowed = "the address of a Dask scheduler that runs, such as 'tcp://127.0.0.1:8786'"
+            raise BadInput("scheduler", got, allowed) from None
+        yield client
+
+
+@contextmanager
+def _silence(*names: str) -> Iterator[None]:
+    """Let loggers of these names say nothing in the block: what they say in many lines is an exception, too."""
+    loggers = [logging.getLogger(name) for name in names]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+@contextmanager
+def start_executor(client: Client) -> Iterator[ClusterExecutor]:
+    """Yield an executor on the workers of a client, whose versions it has compared.
+
+    Raises
+    ------
+    BadInput
+        The client is none, or not connected; there are no workers; or some have another version of this package. Out of the
+        block: the cluster was lost, or a task has ended every worker that tried it.
+    MissingExtra
+        Dask, of the extra `cluster`, is not installed.
+    """
+    require_extra("client", "cluster")
+    from distributed import KilledWorker
+    from distributed.comm import CommClosedError
+
+    _require_client(client)
+    try:
+        require_versions(client)
+        yield ClusterExecutor(client)
+    except (CommClosedError, KilledWorker, CancelledError) as error:
+        raise BadInput("client", f"a cluster that was lost ({type(error).__name__}: {error})", _LOST) from error
+
+
+def _require_client(client: object) -> None:
+    from distributed import Client
+
+    allowed = "a dask.distributed.Client, not asynchronous, whose scheduler runs, or None"
+    if not isinstance(client, Client):
+        raise BadInput("client", describe(client), allowed)
+    if client.asynchronous or client.status != "running":
+        raise BadInput("client", f"one that is {'asynchronous' if client.asynchronous else client.status}", allowed)
+
+
+def require_versions(client: Any) -> None:
+    """Raise `BadInput` unless the client has workers, and all of them have this version of this package."""
+    found = client.run(pkgutil.resolve_name, "conservative.version:VERSION", on_error="return")
+    if not found:
+        allowed = "one with a worker or more, which client.wait_for_workers(1) waits for"
+        raise BadInput("client", f"a scheduler at {client.scheduler.address} without workers", allowed)
+    others = [f"{_name_version(version)} on {worker}" for worker, version in found.items() if version != VERSION]
+    if others:
+        raise BadInput("client", f"workers of another version: {', '.join(others)}", f"{VERSION}, as here, on all of them")
+
+
+def _name_version(found: object) -> str:
+    return found if isinstance(found, str) else f"none ({type(found).__name__}: {found})"
+
+
+class ClusterExecutor(Executor):
+    """Sends calls to the workers of a client; `places` is how many run at a time."""
+
+    def __init__(self, client: Any) -> None:
+        self.places = sum(client.nthreads().values())
+        self._executor: Executor = client.get_executor(pure=False)
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """Return the future of a call, whose function and arguments are made bytes of: they may be those of a script."""
+        return self._executor.submit(_call, VERSION, dump((fn, args, kwargs)))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Wait for all calls, or give them up. The client stays as it is."""
+        self._executor.shutdown(wait=wait and not cancel_futures)
+
+
+def _call(version: str, content: bytes) -> Any:
+    """Do on a worker what was sent, by a program of the same version: a worker can have come after versions were compared."""
+    if version != VERSION:
+        raise BadInput("client", f"a worker of version {VERSION}", version)
+    do, args, kwargs = load(content)
+    return do(*args, **kwargs)

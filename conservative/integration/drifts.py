@@ -1,0 +1,188 @@
+"""What each of many bodies conserves, and how far the samples of a block are off it. Source: as `conservative.invariants`.
+
+Drifts, and the rule of bounds, are those of one body: what `Trajectory.drift` and `conservative.trajectory.accept` say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+from ..deferred_imports import kernels
+from ..invariants import MOMENTUM_UNIT, Invariant, sizes
+from ..methods.many import Bodies
+from ..potentials.potential import depends_on_time
+from ..potentials.turning import Turning, static_part
+
+ORTHONORMALITY = "orthonormality"
+AXIAL = "axial momentum"
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """What departures of n bodies are relative to: energies (n,), J, and momenta (n,), kg m^2/s.
+
+    `bounds` are those momenta (n,), kg m^2/s, that the bounds of a method are relative to.
+    """
+
+    energy: Array
+    momentum: Array
+    bounds: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Drifts:
+    """The largest drifts of n bodies over their samples, dimensionless.
+
+    Attributes
+    ----------
+    values
+        (n, k) by the names of `list_drifts`, relative to the scales of the invariants; nan where a body has no such invariant,
+        or its samples are not finite.
+    bounded
+        (n, k) relative to what the bounds of a method are relative to.
+    """
+
+    values: Array
+    bounded: Array
+
+
+def list_drifts(bodies: Bodies) -> tuple[str, ...]:
+    """Return the names of what drifts: orthonormality, and the invariants of the scene."""
+    return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
+
+
+def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
+    """Return how far samples are off what each body conserves.
+
+    Parameters
+    ----------
+    bodies
+        n bodies.
+    t, R_WB, w_WB_B
+        Times (m,), s, attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    """
+    scales, found = find_scales(bodies), np.empty((len(bodies), 4))
+    V = field_energies(bodies, t, R_WB, w_WB_B)
+    fixed = inertia_of(bodies), find_axes(bodies), expect(bodies, scales)
+    kernels("drifts_of_many").measure(R_WB, w_WB_B, V, *fixed, found)
+    values = np.stack([_drift_of(each, found, bodies, (R_WB, w_WB_B)) for each in (None, *bodies.scene.invariants)], axis=1)
+    bounded = values.copy()
+    for column, each in enumerate(bodies.scene.invariants, start=1):
+        if each.unit == MOMENTUM_UNIT and each not in bodies.scene.extra_invariants:
+            bounded[:, column] *= scales.momentum / scales.bounds
+        if each.name == AXIAL:
+            values[np.isnan(find_axial(bodies))[:, 0] & np.ones(len(bodies), dtype=bool), column] = np.nan
+    return Drifts(values, bounded)
+
+
+def _drift_of(invariant: Invariant | None, found: Array, bodies: Bodies, samples: tuple[Array, Array]) -> Array:
+    """Return the largest drift (n,) of an invariant, None for orthonormality, out of what the kernel found (n, 4)."""
+    if invariant is None:
+        return found[:, 0]
+    if invariant in bodies.scene.extra_invariants:
+        return _drift_of_extra(invariant, bodies, *samples)
+    if invariant.unit == "J":
+        return found[:, 1]
+    return found[:, 3] if invariant.name == AXIAL else found[:, 2]
+
+
+def _drift_of_extra(invariant: Invariant, bodies: Bodies, R_WB: Array, w_WB_B: Array) -> Array:
+    n, m = w_WB_B.shape[:2]
+    start = invariant.evaluate(bodies.R_WB0, bodies.w_WB_B0)
+    at = invariant.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
+    off = (at - start[:, None]) / invariant.scale
+    return sizes(off.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1)
+
+
+def inertia_of(bodies: Bodies) -> Array:
+    """Return the inertia (n, 3, 3), kg m^2, body axes; (1, 3, 3) where all have the scene's."""
+    return bodies.scene.body.inertia[None].copy() if bodies.inertia is None else bodies.inertia
+
+
+def momenta_of(bodies: Bodies) -> Array:
+    """Return the momenta (n, 3) at the start, kg m^2/s, body axes."""
+    return np.asarray((inertia_of(bodies) @ bodies.w_WB_B0[..., None])[..., 0])
+
+
+def find_scales(bodies: Bodies) -> Scales:
+    """Return what drifts are relative to, body by body, by the rule of `Scene.energy_scale` and `invariants_of`."""
+    momenta, largest = momenta_of(bodies), bodies.principal[0].max(axis=1)
+    energy = np.sum(momenta * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
+    energy[energy == 0] = 1.0
+    most = np.sqrt(largest) * np.sqrt(energy)
+    size = np.hypot(np.hypot(momenta[:, 0], momenta[:, 1]), momenta[:, 2])
+    momentum = np.where(size > 0, size, most)
+    if isinstance(bodies.scene.potential, Turning):
+        energy = energy + bodies.scene.potential.orbit.rate * np.sqrt(2) * most
+    return Scales(energy, momentum, np.maximum(momentum, np.sqrt(2) * most))
+
+
+def expect(bodies: Bodies, scales: Scales) -> Array:
+    """Return what `conservative.kernels.drifts_of_many` takes as `expected` (n, 10), in SI units, kg, m and s."""
+    found, L_B = np.zeros((len(bodies), 10)), momenta_of(bodies)
+    V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], bodies.w_WB_B0[:, None])
+    found[:, 0] = np.sum(L_B * bodies.w_WB_B0, axis=1) / 2 + (V[:, 0] if len(V) else 0.0)
+    if any(each.unit == "J" for each in bodies.scene.invariants):
+        found[:, 1] = 1 / scales.energy
+    found[:, 2:5] = (find_axes(bodies) @ (bodies.R_WB0 @ L_B[..., None]))[..., 0]
+    found[:, 5] = 1 / scales.momentum
+    found[:, 7:] = np.nan_to_num(find_axial(bodies)) / scales.momentum[:, None]
+    found[:, 6] = np.sum(found[:, 7:] * L_B, axis=1)
+    return found
+
+
+def find_axial(bodies: Bodies) -> Array:
+    """Return unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan where not."""
+    none = np.full((1, 3), np.nan)
+    if bodies.scene.symmetry_axis_B is None:
+        return none
+    if bodies.inertia is None and not bodies.parameters:
+        return bodies.scene.symmetry_axis_B[None]
+    found = (bodies.take(i).symmetry_axis_B for i in range(len(bodies)))
+    return np.stack([none[0] if axis is None else axis for axis in found])
+
+
+def find_axes(bodies: Bodies) -> Array:
+    """Return the directions (n, 3, 3), or (1, 3, 3) for all, row by row, that momenta are conserved along; 0 is none."""
+    if bodies.scene.potential is None:
+        return np.eye(3)[None]
+    found = np.zeros((1, 3, 3))
+    axis = bodies.scene.potential.axis_W
+    if axis is not None:
+        found[0, 0] = axis
+    return found
+
+
+def field_scales(bodies: Bodies) -> Any:
+    """Return the size of the field, J: of each body (n,), or one for all."""
+    if bodies.scene.potential is None:
+        return 0.0
+    if not bodies.parameters:
+        return bodies.scene.potential.scale()
+    potentials: list[Any] = [bodies.take_potential(i) for i in range(len(bodies))]
+    return np.array([each.scale() for each in potentials])
+
+
+def field_energies(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return what makes the conserved energies (n, m), J, of the kinetic ones; (0, 0) where nothing does.
+
+    Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    """
+    potential = bodies.scene.potential
+    if potential is None or (depends_on_time(potential) and not isinstance(potential, Turning)):
+        return np.empty((0, 0))
+    R_OB = bodies.scene.in_field_axes(R_WB, t)
+    if bodies.parameters:
+        each = (static_part(bodies.take_potential(i)).energy(R_OB[i]) for i in range(len(bodies)))
+        V = np.stack(list(each))
+    else:
+        V = static_part(potential).energy(R_OB)
+    if not isinstance(potential, Turning):
+        return np.ascontiguousarray(V)
+    normal_O = potential.orbit.normal_W @ R_OB  # of the body's axes: the normal is the same in W and O
+    L_B = (inertia_of(bodies)[:, None] @ w_WB_B[..., None])[..., 0]
+    return np.ascontiguousarray(V - potential.orbit.rate * np.sum(normal_O * L_B, axis=-1))

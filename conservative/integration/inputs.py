@@ -1,0 +1,153 @@
+"""Starts and bodies of many, checked before any work: which argument, which body, what was got and what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
+from ..body import RigidBody
+from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
+from ..errors import BadInput, nearest
+from ..methods.many import Bodies
+from ..scene import Scene
+
+RATES = "three finite rates (3,), rad/s"
+
+
+def read_bodies(
+    scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
+) -> Bodies:
+    """Return the bodies that users give, those of the scene where they give nothing.
+
+    Attitudes are (n, 3, 3), rates (n, 3), rad/s, inertia (n, 3) or (n, 3, 3), kg m^2, and parameters those of the potential.
+
+    Raises
+    ------
+    BadInput
+        An argument has another shape, or a body is one that `Scene` or its parts refuse.
+    """
+    given: dict[str, Array] = {}
+    for name, value, shapes in (
+        ("R_WB0", _matrices_of(R_WB0), ((3, 3),)),
+        ("w_WB_B0", w_WB_B0, ((3,),)),
+        ("inertia", inertia, ((3,), (3, 3))),
+    ):
+        if value is not None:
+            given[name] = _read(name, value, shapes, given)
+    values = _read_parameters(scene, parameters, given)
+    n = len(next(iter(given.values()))) if given else 1
+    R = given.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
+    w = given.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
+    if "R_WB0" in given:
+        _refuse_first("R_WB0", R, ~_are_rotations(R), lambda each: rotation("R_WB0", each))
+    if "w_WB_B0" in given:
+        _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
+    J = _read_inertia(given["inertia"]) if "inertia" in given else None
+    if (J is not None or values) and scene.extra_invariants:
+        scene = scene.rename(scene.name, extra_invariants=())  # which are of the scene's own body and field
+    return Bodies(scene, R, w, J, values)
+
+
+def _matrices_of(value: Any) -> Any:
+    """Return the matrices of SciPy's `Rotation`; anything else as it is."""
+    try:
+        return value.as_matrix()
+    except Exception:  # what else it may be, and be wrong about, its check says
+        return value
+
+
+def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Mapping[str, Array]) -> Array:
+    """Return an argument as a new array (n, ...), where n is that of the arguments given before it."""
+    array = real_array(value)
+    other = next(iter(given), None)
+    n = "n" if other is None else str(len(given[other]))
+    allowed = "numbers of shape " + " or ".join(f"({', '.join((n, *map(str, shape)))})" for shape in shapes)
+    allowed += "" if other is None else f": {n} bodies, as {other} has"
+    if array is None:
+        raise BadInput(name, describe(value), allowed)
+    if array.shape[1:] not in shapes or array.ndim == 0 or len(array) == 0 or n not in ("n", str(len(array))):
+        raise BadInput(name, f"shape {array.shape}", allowed)
+    return read_only(array)
+
+
+def _refuse_first(name: str, values: Array, bad: Any, check: Callable[[Any], object]) -> None:
+    """Raise what `check` raises for the first bad one of `values` (n, ...), with its number."""
+    for i in np.flatnonzero(bad).tolist():
+        try:
+            check(values[i])
+        except BadInput as refusal:
+            raise BadInput(f"{name}[{i}]", refusal.got, refusal.allowed) from None
+
+
+def _are_in_range(values: Array) -> Any:
+    """Return which of n arrays (n, ...), of any unit, are finite and in the range that all numbers with a unit have."""
+    largest = np.abs(values.reshape(len(values), -1)).max(axis=1)
+    return (largest == 0) | ((largest >= SMALLEST) & (largest <= LARGEST))
+
+
+def _are_rotations(R: Array) -> Any:
+    with np.errstate(all="ignore"):
+        return _are_in_range(R) & (orthonormality(R) <= ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
+
+
+def _read_inertia(value: Array) -> Array:
+    """Return tensors (n, 3, 3), kg m^2, of moments (n, 3) or tensors, as `RigidBody` has them."""
+    tensors = value if value.ndim == 3 else value[:, :, None] * np.eye(3)
+    _refuse_first("inertia", value, ~_are_inertias(tensors), RigidBody)
+    return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
+
+
+def _are_inertias(tensors: Array) -> Any:
+    """Return which of n tensors (n, 3, 3), kg m^2, are taken without a closer look."""
+    with np.errstate(all="ignore"):
+        off = np.abs(tensors - np.swapaxes(tensors, 1, 2)).max(axis=(1, 2))
+        good = _are_in_range(tensors) & (off <= 1e-13 * np.abs(tensors).max(axis=(1, 2)))
+        moments = np.full((len(tensors), 3), -1.0)
+        moments[good] = np.linalg.eigvalsh(tensors[good])
+    return good & (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
+
+
+def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> dict[str, Array]:
+    """Return parameters (n, ...) by name, checked; `given` gets one of them where nothing else is given."""
+    if parameters is None:
+        return {}
+    if not isinstance(parameters, Mapping):
+        raise BadInput("parameters", describe(parameters), "a mapping of names of the potential's numbers to arrays (n, ...)")
+    known = list_parameters(scene.potential)
+    found = {}
+    for name, value in parameters.items():
+        if name not in known:
+            allowed = nearest(str(name), known) if known else f"none: the scene {scene.name!r} has no potential with numbers"
+            raise BadInput("parameters", describe(name), allowed)
+        found[name] = _read(f"parameters[{name!r}]", value, (known[name],), given)
+        given.setdefault(f"parameters[{name!r}]", found[name])
+    _check_potentials(scene, found)
+    return found
+
+
+def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
+    """Return the numbers of a potential by the names of its fields, with their shapes."""
+    if not is_dataclass(potential) or isinstance(potential, type):
+        return {}
+    values = {field.name: getattr(potential, field.name) for field in fields(potential)}
+    return {name: np.shape(value) for name, value in values.items() if _is_numeric(value)}
+
+
+def _is_numeric(value: object) -> bool:
+    return isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype == np.float64)
+
+
+def _check_potentials(scene: Scene, parameters: Mapping[str, Array]) -> None:
+    """Raise `BadInput` for the first body whose potential cannot be made."""
+    n = len(next(iter(parameters.values()), ()))
+    bodies = Bodies(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
+    for i in range(n):
+        try:
+            bodies.take_potential(i)
+        except BadInput as refusal:
+            raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None
