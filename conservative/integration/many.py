@@ -202,9 +202,7 @@ def _require_memory(bodies: Bodies, grid: Grid) -> None:
     most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
     if samples > most:
         got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
-        raise BadInput(
-            "sample_every", got, f"a larger one, or a path: {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each"
-        )
+        raise BadInput("sample_every", got, f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory")
 
 
 def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:
