@@ -236,5 +236,5 @@ def find_alike(method: Lame, bodies: Bodies) -> Tops:
     axes, J1, J3 = slow_axes(scene)
     R_BP = np.tile(axes, (n, 1, 1))
     kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
-    q, L = to_quaternion(bodies.R_WB0 @ axes), (bodies.w_WB_B0 @ axes) * (J1, J1, J3)
+    q, L = to_quaternion(bodies.R_WB0 @ R_BP), (bodies.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * (J1, J1, J3)
     return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)
