@@ -197,13 +197,13 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
     kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L
-    rates, spin = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time
+    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
     cost = PART * m * float(table[kernel.PARTS].max())
 
     def run() -> Block:
         states = table.copy()
         take_pieces(grid.n_steps, cost, lambda done, last: kernel.march(states, done, last, grid.n_steps, grid.every, q, L))
-        return turn_samples(grid, q, L, rates, spin, tops.R_BP, tops.places, n)
+        return turn_samples(grid, q, L, turn, tops.places, n)
 
     return run
 
