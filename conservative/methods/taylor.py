@@ -133,6 +133,10 @@ class Taylor(_Settings):
     def suite_settings(cls) -> tuple[Taylor, ...]:
         return (cls(14),)
 
+    @classmethod
+    def many_settings(cls) -> tuple[Taylor, ...]:
+        return tuple(cls(order) for order in (8, 10, 12, 14))
+
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
