@@ -2,8 +2,9 @@
 
 A value is the registers of x, y and z, or one register where it is a scalar, so that shuffles are other names and no
 instructions. A processor that has nothing to wait for wants few operations: sums have one total for products that are added and
-for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body: after 100
-steps attitudes differ by some 1e-14, and as much faster as the motion itself lets two of them part.
+for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body. Of 32 random
+heavy tops the attitudes differ by 3e-16 from those of one body after 10 steps, by 1e-15 to 3e-15 after 100 (the worst by
+6e-14), by 4e-14 to 4e-13 after 1,000; from then on chaotic motions part, as those of any two starts that round-off tells apart.
 
 Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has a
 loop of its own, whose end the processor learns.
