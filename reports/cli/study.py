@@ -31,6 +31,7 @@ COLUMNS = 7
         "conservative study random --bodies 5 --methods projected,gauss,heyoka --csv rows.csv",
         "conservative study convergence --scenes lagrange_top --methods reduced,gauss --json",
         "conservative study engines_at_one_step --engines all --out one_step",
+        "conservative study hard_cases --scheduler tcp://10.0.0.7:8786",
     ),
 )
 @click.argument("name", shell_complete=completion.studies)
@@ -44,6 +45,7 @@ COLUMNS = 7
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option("--time-limit", type=float, metavar="S", help="Longest run to plan for, s.  [default: 0.6, with --quick 0.15]")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that finds the rows of a study without times.")
 @click.option("--json", "as_json", is_flag=True, help="Rows and samples as JSON on stdout.")
 @click.option("--csv", type=FilePath(), help="Write the rows as CSV.")
 @click.option("--markdown", type=FilePath(), help="Write the tables as Markdown.")
@@ -94,11 +96,11 @@ def _measure(name: str, options: dict[str, Any]) -> StudyRows:
     from ..terminal.progress import progress
 
     scenes, methods = (tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods"))
-    engines = tuple(split_list("engines", options.pop("engines")))
+    engines, scheduler = tuple(split_list("engines", options.pop("engines"))), options.pop("scheduler")
     planned, source = plan_study(name, Extent(scenes, methods, engines, **options)), provenance()
     made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
     with interruptible(signal.SIGTERM), progress() as step:
-        found = measure_study(planned, lambda done, total, what: step(done / total, what))
+        found = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
     return StudyRows(name, found.table, found.samples, made)
 
 
