@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .integration.many import integrate_many as integrate_many
     from .integration.one import integrate as integrate
     from .integration.reading import open_ensemble as open_ensemble
+    from .integration.spread import spread as spread
     from .invariants import Invariant as Invariant
     from .method import Grid as Grid
     from .method import Method as Method
@@ -111,6 +112,7 @@ _PLACES = {
     "integrate": "integration.one",
     "integrate_many": "integration.many",
     "open_ensemble": "integration.reading",
+    "spread": "integration.spread",
 }
 
 __all__ = [
@@ -162,6 +164,7 @@ __all__ = [
     "open_ensemble",
     "scenes",
     "shapes",
+    "spread",
 ]
 
 

@@ -222,6 +222,11 @@ class Method(ABC):
         return cls.variants()
 
     @classmethod
+    def many_settings(cls) -> tuple[Method, ...]:
+        """Return the settings whose throughput on many bodies is measured; by default those of the suite."""
+        return cls.suite_settings()
+
+    @classmethod
     def audit_settings(cls) -> tuple[Method, ...]:
         """Return the settings whose order `claims` are about; by default those of the suite."""
         return cls.suite_settings()

@@ -31,6 +31,7 @@ class Measure(Enum):
     ORDER_RATES_STDERR = "observed order rates stderr", "1"
     TIME_PER_STEP = "time per step", "s"
     TIME_PER_STEP_MEDIAN = "time per step median", "s"
+    BODY_STEPS = "body-steps per second", "1/s"
     TIME = "time per simulated second", "s/s"
     TIME_MEDIAN = "time per simulated second median", "s/s"
     PREPARE = "prepare time", "s"

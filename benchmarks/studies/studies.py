@@ -28,8 +28,10 @@ from . import (
     speed,
     sphere_curves,
     stability,
+    throughput,
     work_precision,
 )
+from .ensembles import KINDS, draw
 from .study import Finding, Maker, Progress, Study, Truths
 
 MAKERS: Mapping[str, Maker] = {
@@ -46,6 +48,7 @@ MAKERS: Mapping[str, Maker] = {
     "stability": stability.findings,
     "hard_cases": hard_cases.findings,
     "random": random.findings,
+    "throughput": throughput.findings,
 }
 """What makes each study, by its name, which is that of its file."""
 HARD = ("stability", "hard_cases")
@@ -54,7 +57,9 @@ ENGINES = ("engines_at_one_step", "engines_over_steps")
 """Studies of the scenes that are chosen, and of engines alone."""
 RANDOM = "random"
 """Study of bodies that are drawn for it."""
-CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES, RANDOM))
+THROUGHPUT = "throughput"
+"""Study of many bodies, which are drawn for it."""
+CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES, RANDOM, THROUGHPUT))
 """Studies of the scenes and methods that are chosen."""
 
 
@@ -102,6 +107,19 @@ def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: boo
         bodies is not an integer of 1 or more, seed not one of 0 or more, or there is no method.
     """
     return Study(RANDOM, random.bodies(bodies, seed), methods, quick, skip_missing, Truths(random.precise))
+
+
+def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> throughput.ThroughputStudy:
+    """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword, fewer bodies if it is quick.
+
+    Raises
+    ------
+    BadInput
+        A number is not an integer of 1 or more, a seed not one of 0 or more, or there is no method.
+    """
+    scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
+    usual = {"sizes": throughput.QUICK_SIZES, "bodies": throughput.QUICK_BODIES} if quick else {}
+    return throughput.ThroughputStudy(THROUGHPUT, scenes, methods, quick, **{**usual, **extent})
 
 
 def _silent(done: int, total: int, what: str) -> None:

@@ -8,21 +8,25 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.check import choice, describe, finite_number
+from conservative.check import choice, describe, finite_number, positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
-from conservative.methods.units import in_own_units
+from conservative.methods.many import Bodies, RunMany
+from conservative.methods.units import SI, find_units, in_own_units
 from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import STEP_LIMIT, limit_reason, pace_reason, symmetric_axes, version
-from ..heyoka_equations import accelerations, forms, formulations
+from ..heyoka_equations import accelerations, batches, forms, formulations
 
 FRAMES = ("body", "non_spinning", "lean", "base_vectors")
 
 SMALLEST_TOL = 1e-20
 """A step of this tolerance has five terms more than one of 1e-16; smaller ones compile ever longer and gain nothing."""
+
+WIDEST = 64
+"""Bodies in a batch: more are refused, since each number of them is compiled for itself."""
 
 # Up to here it is cheaper (5 to 20 %) not to keep the polynomials of the steps for evaluation between their ends.
 _FEW_SAMPLES = 8
@@ -49,16 +53,23 @@ class Heyoka(Method):
         angle (symmetric top that stays away from one of the poles); otherwise the non-spinning frame where there is one, and
         base vectors where not. At equal error those take 17 to 30 % less time than "body" (measured in four fields).
 
+    width, driver
+        Of `prepare_many`, for the frames "body" and "base_vectors": how many bodies are in a batch, by default as many as heyoka
+        recommends on this processor, and whether batches run in a loop ("batch") or in heyoka's function for ensembles, on one
+        thread ("ensemble"). Other frames run one body at a time.
+
     Raises
     ------
     BadInput
-        tol is out of range or the frame is unknown.
+        tol is out of range, the frame or the driver is unknown, or the width is not an integer of 1 to 64.
     MissingEngine
         heyoka is not installed.
     """
 
     tol: float = 1e-16
     frame: str = "body"
+    width: int | None = None
+    driver: str = "batch"
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
@@ -71,11 +82,15 @@ class Heyoka(Method):
         if not SMALLEST_TOL <= finite_number("tol", self.tol, allowed) < 1:
             raise BadInput("tol", describe(self.tol), allowed)
         choice("frame", self.frame, FRAMES)
+        choice("driver", self.driver, tuple(batches.MARCHES))
+        if self.width is not None and not 1 <= positive_integer("width", self.width) <= WIDEST:
+            raise BadInput("width", describe(self.width), f"an integer from 1 to {WIDEST}, or None")
         version("heyoka", "heyoka")
 
     @property
     def label(self) -> str:
-        return f"heyoka=={version('heyoka', 'heyoka')}/tol={self.tol:g},{self.frame}"
+        many = "".join(f",{part}" for part in (self.width and f"width={self.width}", self.driver != "batch" and self.driver) if part)
+        return f"heyoka=={version('heyoka', 'heyoka')}/tol={self.tol:g},{self.frame}{many}"
 
     @property
     def order(self) -> None:
@@ -108,6 +123,22 @@ class Heyoka(Method):
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), reason)
 
         return run
+
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        scenes = [bodies.take(i) for i in range(len(bodies))]
+        if not scenes or any(self.unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
+            return None
+        problems = [getattr(formulations, self.frame)(scene) for scene in scenes]
+        together = batches.gather(problems, self.tol, self.width or batches.recommended_width())
+        if together is None:
+            return None
+        march, t = batches.MARCHES[self.driver], grid.t
+        return lambda: together.read(march(together, t), len(bodies))
+
+    @classmethod
+    def many_settings(cls) -> tuple[Method, ...]:
+        widths = (cls(frame="base_vectors", width=width) for width in (None, 2, 8, 16))
+        return cls(frame="lean"), *widths, cls(frame="base_vectors", driver="ensemble")
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:

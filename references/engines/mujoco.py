@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from threading import Lock
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
-from conservative.check import choice
+from conservative.check import choice, positive_integer
 from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.errors import Unsupported
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.many import Block, Bodies, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -23,8 +24,8 @@ from conservative.trajectory import Trajectory
 from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
-from ..environments.plain_numbers import Samples, describe
-from .inside.mujoco import prepare_with
+from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
+from .inside.mujoco import prepare_many_with, prepare_with
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 
@@ -41,16 +42,19 @@ class MuJoCo(Method):
     ----------
     integrator
         "Euler", "RK4", "implicit", "implicitfast" or "discrete".
+    threads
+        Threads of `mujoco.rollout` where many bodies run at once, each with a model of its own.
 
     Raises
     ------
     BadInput
-        The integrator is unknown.
+        The integrator is unknown, or threads is not an integer of 1 or more.
     MissingEngine
         MuJoCo is not installed.
     """
 
     integrator: str = "RK4"
+    threads: int = 1
 
     family: ClassVar[str] = "mujoco"
     role: ClassVar[Role] = Role.ENGINE
@@ -71,11 +75,13 @@ class MuJoCo(Method):
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
+        positive_integer("threads", self.threads)
         version("mujoco", "MuJoCo")
 
     @property
     def label(self) -> str:
-        return f"mujoco=={version('mujoco', 'MuJoCo')}/{self.integrator}"
+        threads = "" if self.threads == 1 else f",threads={self.threads}"
+        return f"mujoco=={version('mujoco', 'MuJoCo')}/{self.integrator}{threads}"
 
     @property
     def order(self) -> int:
@@ -101,6 +107,24 @@ class MuJoCo(Method):
             return samples.trajectory(found)
 
         return run
+
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        mj = load("mujoco", "mujoco", "MuJoCo")
+        axes = take_axes(bodies, grid, self.unsupported)
+        if axes is None or not hasattr(mj.mjtIntegrator, f"mjINT_{self.integrator.upper()}"):
+            return None
+        samples = ManySamples(axes, grid)
+        march = prepare_many_with(mj, [SimpleNamespace(**asdict(self), **describe(each, grid)) for each in axes])
+
+        def run() -> Block:
+            with _quiet(mj):
+                return samples.trajectory(march())
+
+        return run
+
+    @classmethod
+    def many_settings(cls) -> tuple[Method, ...]:
+        return *(cls(integrator) for integrator in INTEGRATORS), cls("RK4", threads=2)
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
@@ -146,6 +170,7 @@ class MuJoCoVersion(EngineMethod):
     family: ClassVar[str] = "mujoco"
     distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
     takes_gravity: ClassVar[bool] = True
+    many = ({"integrator": "RK4"},)
     colour: ClassVar[str] = "vermilion"
 
     def __post_init__(self) -> None:

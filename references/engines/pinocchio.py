@@ -11,11 +11,13 @@ import numpy as np
 from conservative.attitude import Array, from_quaternion
 from conservative.check import choice
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.many import Block, Bodies, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import Axes, gravity_or_free, load, mass_model, mass_model_reason, principal_axes, version
+from ..environments.plain_numbers import ManySamples, take_axes
 
 SCHEMES = ("Euler", "RK4")
 
@@ -79,6 +81,21 @@ class Pinocchio(Method):
             evaluations = grid.n_steps * (4 if self.scheme == "RK4" else 1)
             R_WF = from_quaternion(np.roll(q, 1, axis=1))
             return axes.trajectory(grid, self.label, R_WF, v, Counters(grid.n_steps, evaluations=evaluations))
+
+        return run
+
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        """Return one loop over all bodies, each with a model of its own: Pinocchio has no function for many."""
+        pin, axes = load("pinocchio", "pin", "Pinocchio"), take_axes(bodies, grid, self.unsupported)
+        if axes is None:
+            return None
+        samples = ManySamples(axes, grid)
+        make = _rk4 if self.scheme == "RK4" else _euler
+        starts = [(make(pin, _model(pin, each), grid.dt), np.roll(each.q0, -1), each.w0) for each in axes]
+
+        def run() -> Block:
+            q, w = (np.stack(part) for part in zip(*(_march(*start, grid) for start in starts), strict=True))
+            return samples.trajectory({"q": np.roll(q, 1, axis=-1), "w": w})
 
         return run
 

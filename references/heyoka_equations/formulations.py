@@ -6,7 +6,7 @@ The forms are those of `conservative.references.heyoka_equations.forms`. Source:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -41,6 +41,8 @@ class Formulation:
         Attitudes (n, 3, 3) and rates (n, 3) in F from times (n,) and states (n, m).
     fast_math
         Whether it is compiled so that sums may be reordered.
+    attitudes, R_WD
+        Where R_WF is R_WD times what `attitudes` makes of states (n, m) but their last three, which are the rates: both.
     """
 
     axes: Axes
@@ -49,6 +51,8 @@ class Formulation:
     start: Array
     readout: Callable[[Array, Array], tuple[Array, Array]]
     fast_math: bool = False
+    attitudes: Callable[[Array], Array] | None = None
+    R_WD: Array = field(default_factory=lambda: np.eye(3))
 
 
 def body(scene: Scene) -> Formulation:
@@ -69,16 +73,18 @@ def _turning(
     scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], read: Callable[[Array], Array]
 ) -> Formulation:
     """Return Euler's equations with those of the attitude, whose state is written from a matrix and read as matrices."""
-    field = express_field(scene)
-    axes, R_WD = field.axes, field.R_WD
-    equations = forms.Turning(attitude, field.acceleration)
-    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *field.parameters])
+    found = express_field(scene)
+    axes, R_WD = found.axes, found.R_WD
+    equations = forms.Turning(attitude, found.acceleration)
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *found.turn_D.tolist(), *found.parameters])
 
     def readout(t: Array, states: Array) -> tuple[Array, Array]:
         R = R_WD @ read(states[:, :-3])
         return scene.potential.orbit.R_WO(t) @ R if isinstance(scene.potential, Turning) else R, states[:, -3:]
 
-    return Formulation(axes, form, parameters, np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0]), readout)
+    start = np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0])
+    steady = None if isinstance(scene.potential, Turning) else read
+    return Formulation(axes, form, parameters, start, readout, attitudes=steady, R_WD=R_WD)
 
 
 def _from_rows(rows: Array) -> Array:

@@ -8,6 +8,8 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
+SPREADS = ("attitude", "rate", "inertia")
+"""What can be spread of every scene."""
 Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
@@ -42,6 +44,24 @@ def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
     from conservative.benchmarks.studies.studies import MAKERS
 
     return [CompletionItem(name) for name in MAKERS if name.startswith(incomplete)]
+
+
+def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return what can be spread of the scene on the line, the last of several, up to the equals sign."""
+    before, last = _last(incomplete)
+    names = [*SPREADS, *(f"potential.{name}" for name in _parameters(ctx.params.get("scene")))]
+    return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]
+
+
+def _parameters(scene: str | None) -> list[str]:
+    """Return what can be spread of the potential of a scene; of one that cannot be made, nothing."""
+    from conservative import registry
+    from conservative.integration.spread import list_parameters
+
+    try:
+        return list_parameters(registry.scene(scene or ""))
+    except Exception:  # nobody reads an error while completing
+        return []
 
 
 def _last(incomplete: str) -> tuple[str, str]:

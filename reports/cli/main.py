@@ -21,6 +21,7 @@ from .recommend import recommend
 from .report import report
 from .run import run
 from .study import study
+from .sweep import sweep
 from .track import track
 
 
@@ -95,5 +96,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new, engines, track, published, study):
+for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, published, study):
     main.add_command(command)

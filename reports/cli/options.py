@@ -10,7 +10,7 @@ EXIT_CODES = """Exit codes:
     0    done
     1    a run failed: it did not converge, or diverged; or the gate is not passed
     2    the command or an input cannot be used, or an engine or a baseline is missing
-    130  interrupted by Ctrl-C, 143 by SIGTERM; a report keeps what is finished, and --resume goes on
+    130  interrupted by Ctrl-C, 143 by SIGTERM; report and sweep keep what is finished, and --resume goes on
 """
 
 
@@ -21,6 +21,21 @@ class FilePath(click.Path):
         if "\0" in str(value):
             self.fail(f"got {value!r}; allowed: a path without NUL", param, ctx)
         return Path(str(value))
+
+
+class Count(click.ParamType):
+    """A number of things, 1 or more, which may be written as 1e6."""
+
+    name = "count"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        try:
+            number = float(str(value))
+            if number >= 1 and number.is_integer():
+                return int(number)
+        except (ValueError, OverflowError):  # the latter: infinite
+            pass
+        self.fail(f"got {value!r}; allowed: an integer of 1 or more, such as 1000 or 1e6", param, ctx)
 
 
 find_links_option = click.option(

@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import TypedDict, Unpack
 
-from conservative.benchmarks.studies import engine_selection, random, selection, studies
+from conservative.benchmarks.studies import engine_selection, many_runs, random, selection, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
@@ -30,6 +30,7 @@ SECONDS = {
     "paper_figures": 0.1,
     "import_time": 0.1,
     "random": 0.15,
+    "throughput": 6.0,
 }
 """How long each study takes for one scene and one method, roughly: for the time left."""
 RENDERING = {"pictures": 6.0, "page": 3.0}
@@ -87,7 +88,7 @@ class Plan:
         hard = studies.list_hard_studies(self.methods, self.skip_missing, self.time_limit) if self.hard else ()
         limits = (self.quick, self.skip_missing, self.time_limit)
         engines = studies.list_engine_studies(self.scenes, self.engines, *limits) if self.engines else ()
-        return (*self._random, *crossed, *engines, *hard)
+        return (*self._random, *crossed, *engines, *hard, *self._throughput)
 
     @cached_property
     def _random(self) -> tuple[Study, ...]:
@@ -96,6 +97,15 @@ class Plan:
         if not (self.bodies and methods):
             return ()
         return (studies.random_study(methods, self.bodies, self.seed, self.quick, self.skip_missing),)
+
+    @cached_property
+    def _throughput(self) -> tuple[Study, ...]:
+        """The study of many bodies, where the report has random ones and a method that runs many at once."""
+        methods = tuple(many_runs.families((*self.methods, *self.engines)))
+        if not (self.bodies and methods):
+            return ()
+        limits = {"skip_missing": self.skip_missing, "time_limit": self.time_limit}
+        return (studies.throughput_study(methods, quick=self.quick, seed=self.seed, **limits),)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -112,8 +122,8 @@ class Plan:
 
     def _pairs(self, name: str) -> int:
         """Return how many pairs of a scene and a method a study is about as long as."""
-        if name == studies.RANDOM:
-            return sum(len(study.scenes) * len(study.methods) for study in self._random)
+        if name in (studies.RANDOM, studies.THROUGHPUT):
+            return sum(len(study.scenes) * len(study.methods) for study in self.studies if study.name == name)
         return len(self.scenes) * len(self.engines if name in studies.ENGINES else self.methods)
 
 

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.studies import engine_selection, hard_cases, on_cluster, random, selection, stability, studies
+from conservative.benchmarks.studies import (
+    engine_selection,
+    hard_cases,
+    many_runs,
+    on_cluster,
+    random,
+    selection,
+    stability,
+    studies,
+)
 from conservative.benchmarks.studies.study import Finding, Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
@@ -26,6 +36,7 @@ class Extent:
     scenes: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     engines: tuple[str, ...] = ()
+    sizes: tuple[str, ...] = ()
     bodies: int | None = None
     seed: int | None = None
     quick: bool = False
@@ -46,20 +57,50 @@ def plan_study(name: str, extent: Extent) -> Study:
     choice("name", name, tuple(studies.MAKERS))
     if name == studies.RANDOM:
         return _random(extent)
-    for argument, value in (("bodies", extent.bodies), ("seed", extent.seed)):
+    if name == studies.THROUGHPUT:
+        return _throughput(extent)
+    for argument, value in (("bodies", extent.bodies), ("seed", extent.seed), ("sizes", extent.sizes or None)):
         if value is not None:
-            raise BadInput(argument, str(value), f"nothing: only the study {studies.RANDOM!r} draws bodies")
+            drawn = f"the studies {studies.RANDOM!r} and {studies.THROUGHPUT!r} draw bodies"
+            raise BadInput(argument, str(value), f"nothing: only {drawn}")
     limits = (extent.quick, extent.skip_missing)
     return Study(name, _scenes(name, extent), _methods(name, extent), *limits, time_limit=extent.time_limit)
 
 
 def _random(extent: Extent) -> Study:
-    if extent.scenes:
-        raise BadInput("scenes", ", ".join(extent.scenes), "none: the study draws its bodies; say how many, and a seed")
+    _require_drawn(extent)
+    if extent.sizes:
+        raise BadInput(
+            "sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
+        )
     bodies = DEFAULT_BODIES if extent.bodies is None else extent.bodies
     found = selection.methods(extent.methods or None, extent.skip_missing, random.settings)
     methods = tuple(dict.fromkeys((*found, *_engines(extent))))
     return studies.random_study(methods, bodies, extent.seed or 0, extent.quick, extent.skip_missing)
+
+
+def _throughput(extent: Extent) -> Study:
+    """Return the study of many bodies: of what runs many at once, of what is named, and of engines that are."""
+    _require_drawn(extent)
+    found = selection.methods(extent.methods or None, extent.skip_missing, many_runs.settings)
+    methods = tuple(dict.fromkeys((*found, *_engines(extent))))
+    sizes = tuple(read_count("sizes", size) for size in extent.sizes)
+    numbers = {"sizes": sizes or None, "bodies": extent.bodies, "seed": extent.seed, "time_limit": extent.time_limit}
+    given = {name: value for name, value in numbers.items() if value is not None}
+    return studies.throughput_study(methods, quick=extent.quick, skip_missing=extent.skip_missing, **given)
+
+
+def _require_drawn(extent: Extent) -> None:
+    if extent.scenes:
+        raise BadInput("scenes", ", ".join(extent.scenes), "none: the study draws its bodies; say how many, and a seed")
+
+
+def read_count(argument: str, text: str) -> int:
+    """Return the number that a text such as `1000` or `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
+    with suppress(ValueError, OverflowError):
+        if (number := float(text)) >= 1 and number == int(number):
+            return int(number)
+    raise BadInput(argument, repr(text), "an integer of 1 or more, such as 1000 or 1e6")
 
 
 def _engines(extent: Extent) -> tuple[Method, ...]:

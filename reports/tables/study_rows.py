@@ -6,15 +6,16 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.studies.studies import RANDOM
+from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
 from ..labels import with_names
-from . import random_contests, random_ratios
+from . import random_contests, random_ratios, throughput
 from .cells import DASH, Cell, Table, markdown, number
 from .rows import prefix_quantity
 
@@ -41,9 +42,16 @@ class StudyRows:
     samples: pd.DataFrame
     made: Mapping[str, str]
 
+    @cached_property
+    def _many(self) -> throughput.ThroughputView | None:
+        return throughput.view(with_names(self.table)) if self.name == THROUGHPUT else None
+
     @property
     def tables(self) -> list[Captioned]:
-        """The tables: ratios of random bodies; of any other study its rows."""
+        """The tables: ratios of random bodies, costs of many; of any other study its rows."""
+        if self._many:
+            captions = ("Many bodies: an engine's time over ours", "Many bodies: what one of them costs", "What did not run")
+            return list(zip(captions, (self._many.ratios, self._many.costs, self._many.absent), strict=True))
         if self.name != RANDOM:
             return [(f"{self.name}: {len(self.table)} rows", rows_table(self.table))]
         contests = random_contests.contests(self.table)
@@ -54,7 +62,9 @@ class StudyRows:
 
     @property
     def statements(self) -> tuple[str, ...]:
-        """What it comes to, in words; only of random bodies."""
+        """What it comes to, in words; only of random bodies, and of many."""
+        if self._many:
+            return self._many.statements
         return random_ratios.statements(random_contests.contests(self.table)) if self.name == RANDOM else ()
 
     def csv_text(self) -> str:
@@ -72,7 +82,7 @@ class StudyRows:
         """Return tables and statements as Markdown, and how they were made."""
         tables = [f"## {caption}\n\n{markdown(table)}" for caption, table in self.tables]
         said = ["\n".join(f"- {text}" for text in self.statements)] if self.statements else []
-        terms = [random_ratios.TERMS] if self.name == RANDOM else []
+        terms = {RANDOM: [random_ratios.TERMS], THROUGHPUT: [throughput.TERMS]}.get(self.name, [])
         made = "\n".join(["| | |", "| --- | --- |", *(f"| {name} | {value} |" for name, value in self.made.items())])
         return "\n\n".join([f"# Study: {self.name}", *terms, *said, *tables, f"## How this was made\n\n{made}"]) + "\n"
 

@@ -24,6 +24,8 @@ SWITCHED_OFF = (
 )
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
 ROLLOUT_UP_TO = 8
+# Numbers in the states that a rollout of many bodies keeps at a time: 32 MiB.
+ROOM = 1 << 22
 
 
 def prepare(given):
@@ -47,6 +49,50 @@ def prepare_with(mj: Any, given: Any) -> Any:
         return {"q": q, "w": w, "reason": reason, "evaluations": evaluations}
 
     return run
+
+
+def prepare_many(bodies):
+    """Return a run of many bodies by `mujoco.rollout`; see `prepare`."""
+    import mujoco as mj
+
+    mj.set_mju_user_warning(lambda message: None)
+    return prepare_many_with(mj, bodies)
+
+
+def prepare_many_with(mj: Any, bodies: Any) -> Any:
+    """Return a run of many bodies, a model and a state for each, with a module `mujoco` that is there."""
+    from mujoco.rollout import Rollout
+
+    given, models = bodies[0], [_model(mj, body) for body in bodies]
+    threads = getattr(given, "threads", 1)
+    datas = [mj.MjData(models[0]) for _ in range(threads)]
+    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies)])
+    room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
+
+    def run():
+        states = [start]
+        with Rollout(nthread=threads if threads > 1 else 0) as pool:
+            for n_steps in np.diff(given.steps).tolist():
+                states.append(_roll_on(pool, (models, datas), states[-1], n_steps, room))
+        return _read(models[0], np.stack(states, axis=1), given)
+
+    return run
+
+
+def _read(model, states, given):
+    """Return samples of states (n, samples, size); a rollout stands still where it cannot go on, and so does its time."""
+    states[states[..., 0] < given.steps * given.dt * (1 - 1e-9)] = np.nan
+    nq = 1 + model.nq
+    return {"q": states[..., nq - 4 : nq], "w": states[..., nq + model.nv - 3 : nq + model.nv]}
+
+
+def _roll_on(pool, engine, state, n_steps, room):
+    """Return the states (n, size) after more steps: a rollout keeps all of them, and what they are kept in has an end."""
+    while n_steps:
+        part = np.ascontiguousarray(room[:, :n_steps])
+        pool.rollout(*engine, state, nstep=part.shape[1], state=part)
+        state, n_steps = part[:, -1].copy(), n_steps - part.shape[1]
+    return state
 
 
 def _model(mj, given):

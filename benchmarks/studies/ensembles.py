@@ -1,0 +1,63 @@
+"""Ensembles that nobody chose: thousands of random bodies of one kind, which all differ.
+
+Body number i is the same however many are drawn. Drawn with NumPy's PCG64 from (seed, number of the kind):
+
+* second moments about the principal axes 0.1 to 1, log-uniform, so that a mass distribution has them; of the moments of inertia
+  that they make the mean is 1 kg m^2 and the condition at most 5.5;
+* principal axes, and the attitude at the start, turned by rotations that are uniform on the group: all inertias are full matrices;
+* rates at the start normal, 2 rad/s along each axis, which is 3.2 rad/s at the median;
+* heavy tops: the centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform.
+
+Source: ours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from conservative.attitude import Array, from_quaternion
+from conservative.body import RigidBody
+from conservative.check import choice
+from conservative.methods.many import Bodies
+from conservative.potentials.uniform_gravity import UniformGravity
+from conservative.scene import Scene
+
+KINDS = ("heavy_tops", "free_bodies")
+DURATION = 12.0
+"""Length of the motion, s."""
+RATE = 2.0
+MOMENT = (1.8, 12.0)
+
+
+def draw(kind: str, n: int, seed: int = 0) -> Bodies:
+    """Return the first n bodies of a kind that a seed gives.
+
+    Raises
+    ------
+    BadInput
+        The kind is none of `KINDS`.
+    """
+    choice("kind", kind, KINDS)
+    tables = [np.random.Generator(np.random.PCG64((seed, KINDS.index(kind), column))) for column in range(6)]
+    second = 10 ** -tables[0].random((n, 3))
+    J = second.sum(axis=1, keepdims=True) - second
+    J /= J.mean(axis=1, keepdims=True)
+    R_BP, R_WB0 = (_rotations(table.standard_normal((n, 4))) for table in tables[1:3])
+    w_WB_B0 = RATE * tables[3].standard_normal((n, 3))
+    inertia = (R_BP * J[:, None]) @ R_BP.swapaxes(1, 2)
+    inertia = (inertia + inertia.swapaxes(1, 2)) / 2
+    parameters = {"com_B": _points(tables[4].standard_normal((n, 3)), tables[5].random(n))} if kind == KINDS[0] else {}
+    potential = UniformGravity(1.0, parameters["com_B"][0]) if parameters else None
+    first = Scene(kind, RigidBody(inertia[0]), R_WB0[0], w_WB_B0[0], DURATION, potential, group="random", source="ours")
+    return Bodies(first, R_WB0, w_WB_B0, inertia, parameters)
+
+
+def _rotations(normal: Array) -> Array:
+    """Return rotations (n, 3, 3), uniform on the group, from normal numbers (n, 4)."""
+    return from_quaternion(normal / np.linalg.norm(normal, axis=1)[:, None])
+
+
+def _points(normal: Array, u: Array) -> Array:
+    """Return centres of mass (n, 3) of bodies that weigh 1 N, m."""
+    low, high = MOMENT
+    return normal * ((low + (high - low) * u) / np.linalg.norm(normal, axis=1))[:, None]

@@ -1,0 +1,172 @@
+"""Ways of running many bodies: at once as a method offers it, or one at a time; on one thread or on several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from conservative.errors import BadInput, IntegrationFailed, MissingEngine
+from conservative.method import Grid, Method, Role
+from conservative.methods.many import Block, Bodies, RunMany
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.client import time_limit
+
+from ..measures.timing import prepare_and_run, wall_time
+
+BLOCK = 1024
+"""Bodies that are prepared, and run, at a time."""
+COMPILED = 1.0
+"""Time, s, of a preparation that is done again: it may have compiled."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A method, and how it runs many bodies.
+
+    Attributes
+    ----------
+    method
+        The method.
+    together
+        Whether bodies run at once as `Method.prepare_many` has them; else each has a run of its own, in a loop.
+    threads
+        How many of ours blocks of bodies are spread over; an engine's own threads are a setting of it.
+    """
+
+    method: Method
+    together: bool = True
+    threads: int = 1
+
+    @property
+    def text(self) -> str:
+        """How it differs from the usual: "" for bodies at once, on one thread."""
+        alone = [] if self.together else ["one at a time"]
+        return ", ".join([*alone, *([f"{self.threads} threads"] if self.threads > 1 else [])])
+
+
+def list_ways(method: Method) -> tuple[Way, ...]:
+    """Return the ways of a method that are compared: of ours one at a time and two threads as well."""
+    if not takes_many(method):
+        return (Way(method, together=False),)
+    return (Way(method), Way(method, together=False), Way(method, threads=2)) if method.role == Role.OURS else (Way(method),)
+
+
+def takes_many(method: Method) -> bool:
+    """Return whether a method offers to run many bodies at once, at least those of some scenes."""
+    return type(method).prepare_many is not Method.prepare_many and bool(method.many_settings())
+
+
+class RunBlocks:
+    """The run of many bodies, block by block, which keeps what the last block gave."""
+
+    def __init__(self, way: Way, runs: list[RunMany]) -> None:
+        self._way, self._runs = way, runs
+        self._pool = ThreadPoolExecutor(way.threads) if way.threads > 1 else None
+
+    def __call__(self) -> Block:
+        if self._pool is None:
+            for run in self._runs[:-1]:
+                run()
+            return self._runs[-1]()
+        return list(self._pool.map(_call, self._runs))[-1]
+
+    def wall_time(self, calls: int) -> float:
+        """Return the wall time of calls, s, without the way to engines in other processes."""
+        if self._pool is None:
+            return sum(wall_time(run, calls) for run in self._runs)
+        return wall_time(self.__call__, calls)
+
+
+def _call(run: RunMany) -> Block:
+    return run()
+
+
+def prepare_blocks(way: Way, bodies: Bodies, grid: Grid) -> RunBlocks:
+    """Return the run of bodies, which is prepared block by block."""
+    blocks = (bodies[first : first + BLOCK] for first in range(0, len(bodies), BLOCK))
+    return RunBlocks(way, [_prepare_block(way, block, grid) for block in blocks])
+
+
+def _prepare_block(way: Way, bodies: Bodies, grid: Grid) -> RunMany:
+    found: RunMany | None = way.method.prepare_many(bodies, grid) if way.together else None
+    return _Loop([way.method.prepare(bodies.take(i), grid) for i in range(len(bodies))], grid) if found is None else found
+
+
+class _Loop:
+    """A run for each body, in turn."""
+
+    def __init__(self, runs: list[Callable[[], Any]], grid: Grid) -> None:
+        self._runs, self._samples = runs, grid.n_samples
+
+    def __call__(self) -> Block:
+        n, samples = len(self._runs), self._samples
+        R_WB, w_WB_B = np.full((n, samples, 3, 3), np.nan), np.full((n, samples, 3), np.nan)
+        for i, run in enumerate(self._runs):
+            found = run()
+            R_WB[i, : len(found)], w_WB_B[i, : len(found)] = found.R_WB, found.w_WB_B
+        return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)))
+
+    def wall_time(self, calls: int) -> float:
+        """Return the wall time of calls, s, without the way to engines in other processes."""
+        own = [run for run in self._runs if hasattr(run, "wall_time")]
+        return sum(wall_time(run, calls) for run in own) if own else _time_here(self, calls)
+
+
+def _time_here(run: Callable[[], Any], calls: int) -> float:
+    return wall_time(lambda: run(), calls)
+
+
+@dataclass(frozen=True, eq=False)
+class ManyDone:
+    """A run of many bodies, which can be called again: what it gave, and what its preparation and a call cost, s."""
+
+    run: RunBlocks
+    block: Block
+    prepare: float
+    spent: float
+
+
+def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone | Outcome:
+    """Return the run of bodies after a first call and a second, which is timed; or how that ends.
+
+    Exceptions out of our own methods are bugs and are not caught.
+
+    Raises
+    ------
+    MissingEngine
+        The engine is not installed.
+    """
+    if reason := way.method.unsupported(bodies.take(0)):
+        return Outcome(OutcomeKind.UNSUPPORTED, reason)
+    try:
+        with time_limit(limit):
+            run, block, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
+            if cost.prepare > COMPILED:
+                _, _, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
+            return ManyDone(run, block, cost.prepare, wall_time(run))
+    except MissingEngine:
+        raise
+    except BadInput as error:  # a step that the method does not have
+        return Outcome(OutcomeKind.UNSUPPORTED, str(error))
+    except IntegrationFailed as failure:
+        return failure.outcome
+    except Exception as error:  # an engine may raise anything
+        if way.method.role != Role.ENGINE:
+            raise
+        return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+
+
+def settings(method: Method) -> tuple[Method, ...]:
+    """Return the settings that a family's name stands for, where its throughput is compared; none of what runs single bodies."""
+    return method.many_settings() if takes_many(method) else ()
+
+
+def families(methods: tuple[Method, ...]) -> Iterator[Method]:
+    """Yield those settings of each family among some methods, once."""
+    for family in dict.fromkeys(type(method) for method in methods):
+        first = next(method for method in methods if type(method) is family)
+        yield from settings(first)

@@ -1,0 +1,102 @@
+"""How the attitudes of many bodies are distributed, found block by block, in memory or on a disk.
+
+Source: the mean attitude is the rotation nearest to the mean of all matrices (M. Moakher, Means and averaging in the group of
+rotations, 2002); quantiles are read off counts in narrow bins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+
+QUANTILES = (0.05, 0.5, 0.95)
+"""Shares of the bodies whose attitudes are nearer to the mean than an angle."""
+_LEAST = 1e-9
+"""Angle, rad, below which all are 0: nobody's attitudes are better than that, and sums of a million are rounded as much."""
+_WIDTH = 0.005
+"""Width of a bin, relative to its angle: quantiles are right to half of it."""
+_BINS = math.ceil(math.log(math.pi / _LEAST) / _WIDTH)
+_BLOCK = 1 << 24
+"""Bytes of attitudes that are read at once."""
+
+
+def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
+    """Yield the attitudes (b, s, 3, 3) of one block of bodies after the other, of all samples or of those chosen.
+
+    Those of all, (n, s, 3, 3), are a NumPy array, or what gives one when it is sliced, as an array on a disk does: then along
+    the blocks in which it is stored.
+    """
+    n, count = R_WB.shape[:2]
+    stored = getattr(R_WB, "chunks", None)
+    fitting = max(1, _BLOCK // (72 * count))
+    size = stored[0] * max(1, fitting // stored[0]) if stored else fitting
+    for start in range(0, n, size):
+        block = np.asarray(R_WB[start : start + size])
+        yield block if samples is None else block[:, list(samples)]
+
+
+def mean_attitudes(R_WB: Any, samples: Sequence[int] | None = None) -> Array:
+    """Return the mean attitudes (s, 3, 3) of bodies (n, s, 3, 3) at each sample; bodies that are not finite are left out."""
+    total = sum(np.nansum(block, axis=0) for block in blocks(R_WB, samples))
+    U, _, Vt = np.linalg.svd(np.asarray(total))
+    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
+    return np.asarray(U @ Vt)
+
+
+def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = None) -> Array:
+    """Return `QUANTILES` (s, 3) of the angles, rad, of bodies (n, s, 3, 3) from attitudes (s, 3, 3), one for each sample.
+
+    Right to a quarter of a percent, or to 1e-9 rad. Bodies that are not finite are left out; of none, not a number.
+    """
+    counts = np.zeros((len(centre), _BINS + 1), dtype=np.int64)
+    for block in blocks(R_WB, samples):
+        counts += _count_angles(block, centre)
+    reached = counts.cumsum(axis=1)
+    ranks = np.array(QUANTILES) * reached[:, -1:]
+    bins = (reached[:, None, :] < np.maximum(ranks, 0.5)[:, :, None]).sum(axis=2)
+    angles = np.where(bins == 0, 0.0, np.minimum(_LEAST * np.exp(_WIDTH * (bins - 0.5)), math.pi))
+    return np.where(reached[:, -1:] > 0, angles, math.nan)
+
+
+def _count_angles(R_WB: Array, centre: Array) -> Any:
+    """Return how many angles lie in each bin, (s, bins): the first has those below `_LEAST`."""
+    off = R_WB - centre
+    square = np.einsum("nsij,nsij->ns", off, off)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = 2 * np.arcsin(np.sqrt(np.minimum(square / 8, 1.0)))
+        bins = np.ceil(np.log(angle / _LEAST) / _WIDTH)
+    sample = np.broadcast_to(np.arange(len(centre)), bins.shape)
+    finite = ~np.isnan(bins)
+    places = sample[finite] * (_BINS + 1) + np.clip(bins[finite], 0, _BINS).astype(np.int64)
+    return np.bincount(places, minlength=len(centre) * (_BINS + 1)).reshape(len(centre), -1)
+
+
+def directions(R_WB: Any, axis_B: Array, samples: Sequence[int]) -> Array:
+    """Return where a unit vector (3,) of the body points, (samples, n, 3), world axes, at samples of bodies (n, s, 3, 3).
+
+    Bodies that are not finite at one of them are left out.
+    """
+    found = np.concatenate([block @ axis_B for block in blocks(R_WB, samples)])
+    return np.asarray(np.moveaxis(found[np.isfinite(found).all(axis=(1, 2))], 1, 0))
+
+
+def project(directions_W: Array) -> tuple[Array, Array]:
+    """Return unit vectors (n, 3) as points (n, 2) of a disc, and their mean direction (3,), which is its centre.
+
+    The disc is Lambert's equal-area projection of the sphere, seen from outside with the world's z axis up (x, where the mean
+    is near z): a point at an angle a from the mean is 2 sin(a/2) from the centre, dimensionless.
+    """
+    mean = directions_W.sum(axis=0)
+    size = np.linalg.norm(mean)
+    mean = mean / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    beside = np.eye(3)[2 if abs(mean[2]) < 0.99 else 0]
+    up = beside - beside @ mean * mean
+    up /= np.linalg.norm(up)
+    across = directions_W @ np.stack([np.cross(up, mean), up], axis=1)
+    # 2 sin(a/2) over sin(a): finite for all but the point opposite the centre
+    return across / np.sqrt(np.maximum((1 + directions_W @ mean) / 2, 1e-30))[:, None], mean

@@ -1,0 +1,193 @@
+"""How an ensemble looks: where a body axis points, how far attitudes are apart over time, what drifted. Altair when asked for.
+
+Charts have a few thousand rows at most, of any number of bodies: counts and quantiles, computed block by block.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import Array
+from ..check import finite_array
+from ..errors import BadInput, IntegrationFailed, require_extra
+from ..methods.many import Bodies
+from .discs import BLUE, draw_pointing, frame
+from .distributions import angle_quantiles, directions, mean_attitudes
+
+if TYPE_CHECKING:
+    import altair
+    import pandas
+
+LEAST_DRAWN = 1e-17
+"""Relative drift at which smaller ones are drawn, 0 too: a tenth of the round-off of one number."""
+MOST_TIMES = 200
+"""Samples that a line over time has at most, evenly chosen."""
+_PER_DECADE = 4
+_WIDTH, _HEIGHT = 560, 170
+_COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
+"""Those of Okabe and Ito, which colour-blind readers tell apart."""
+
+
+class Distributed(Protocol):
+    """What is drawn: an `Ensemble`, whose file imports this one, so that naming the class would close a circle."""
+
+    @property
+    def bodies(self) -> Bodies:
+        """What was integrated."""
+
+    @property
+    def t(self) -> Array:
+        """Times (m,) of the samples, s."""
+
+    @property
+    def R_WB(self) -> Any:
+        """Attitudes (n, m, 3, 3), body to world, in memory or on a disk."""
+
+    @property
+    def drifts(self) -> Mapping[str, Array]:
+        """Largest drift (n,) of each body by the name of what drifts, dimensionless."""
+
+    @property
+    def label(self) -> str:
+        """Who made it."""
+
+    @property
+    def failures(self) -> Mapping[int, IntegrationFailed]:
+        """What ended runs early, by the number of the body."""
+
+    def __len__(self) -> int: ...
+
+
+def draw_ensemble(ensemble: Distributed, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
+    """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
+
+    Parameters
+    ----------
+    ensemble
+        What is drawn.
+    axis_B
+        The axis, a direction (3,) in body axes; default the axis of symmetry of body and field, else the third axis.
+
+    Raises
+    ------
+    BadInput
+        The axis is no direction.
+    MissingExtra
+        Altair or pandas, of the extra `report`, is not installed.
+    """
+    require_extra("Ensemble.plot", "report", "altair", "pandas")
+    import altair as alt
+
+    axis, shown = _read_axis(ensemble, axis_B), choose_samples(len(ensemble.t))
+    discs = [
+        draw_pointing(found, f"{_name_axis(axis)} at t = {ensemble.t[sample]:.6g} s")
+        for sample, found in zip(ends(ensemble), directions(ensemble.R_WB, axis, ends(ensemble)), strict=True)
+    ]
+    quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, shown), shown)
+    beside = alt.hconcat(*discs, spacing=40).resolve_scale(color="independent")
+    rows = [beside, draw_spread(ensemble.t[shown], quantiles), draw_drifts(ensemble.drifts)]
+    failed = f", {len(ensemble.failures):,} failed" if ensemble.failures else ""
+    title = alt.Title(ensemble.bodies.scene.name, subtitle=[f"{len(ensemble):,} bodies{failed}", ensemble.label])
+    chart: altair.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
+    return chart
+
+
+def choose_samples(m: int) -> list[int]:
+    """Return which of m samples a line over time has."""
+    return np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
+
+
+def ends(ensemble: Distributed) -> list[int]:
+    """Return the numbers of the first and of the last sample."""
+    return sorted({0, len(ensemble.t) - 1})
+
+
+def _read_axis(ensemble: Distributed, axis_B: ArrayLike | None) -> Array:
+    if axis_B is None:
+        found = ensemble.bodies.take(0).symmetry_axis_B
+        return np.array([0.0, 0.0, 1.0]) if found is None else found
+    allowed = "a direction of three finite numbers (3,), body axes, not all 0"
+    axis = finite_array("axis_B", axis_B, ((3,),), allowed)
+    if not axis.any():
+        raise BadInput("axis_B", axis.tolist(), allowed)
+    return axis / np.linalg.norm(axis)
+
+
+def _name_axis(axis_B: Array) -> str:
+    along = np.flatnonzero(axis_B == 1)
+    named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis_B)})"
+    return f"Body axis {named}"
+
+
+def draw_spread(t: Array, quantiles: Array) -> altair.LayerChart:
+    """Return the median and the band of 90 % of angles from the mean attitude, (s, 3), rad, over times (s,), s."""
+    import altair as alt
+
+    low, middle, high = np.degrees(quantiles).T
+    data = frame(t=t, low=low, middle=middle, high=high)
+    positive = low[low > 0]
+    wide = len(positive) == len(low) and high.max() > 1000 * positive.min()
+    scale = alt.Scale(type="log" if wide else "linear")
+    base = alt.Chart(data, width=_WIDTH, height=_HEIGHT).encode(x=alt.X("t:Q", title="time, s"))
+    y = alt.Y("low:Q", title="angle from the mean, °", scale=scale)
+    band = base.mark_area(opacity=0.25, color=BLUE).encode(y=y, y2="high:Q")
+    line = base.mark_line(color=BLUE, point=len(t) == 1).encode(
+        y=alt.Y("middle:Q", scale=scale), tooltip=[alt.Tooltip(f"{each}:Q", format=".4g") for each in data.columns]
+    )
+    title = alt.Title("Spread of attitude", subtitle="line: median; band: 5 to 95 % of the bodies")
+    chart: altair.LayerChart = (band + line).properties(title=title)
+    return chart
+
+
+def draw_drifts(drifts: Mapping[str, Array]) -> altair.Chart:
+    """Return how many bodies have which largest drift of each invariant, (n,) by its name, relative; both axes logarithmic."""
+    import altair as alt
+    import pandas as pd
+
+    edges = _edges(drifts.values())
+    data = pd.concat([_drift_rows(name, values, edges) for name, values in drifts.items()])
+    x = alt.X("drift:Q", title="largest drift, relative", scale=_log(nice=False), axis=_power_axis(edges[0], edges[-1], "~e"))
+    y = alt.Y("bodies:Q", scale=_log(domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
+    colour = alt.Color("of:N", title="drift of", sort=list(drifts), scale=alt.Scale(range=list(_COLOURS)))
+    chart: altair.Chart = (
+        alt.Chart(data, width=_WIDTH, height=_HEIGHT, title="Drifts over the run")
+        .mark_line(interpolate="step-after", strokeWidth=1.8)
+        .encode(x=x, y=y, color=colour, tooltip=["of:N", "bodies:Q"])
+    )
+    return chart
+
+
+def _log(**settings: Any) -> Any:
+    import altair as alt
+
+    return alt.Scale(type="log", **settings)
+
+
+def _power_axis(low: float, high: float, form: str) -> Any:
+    """Return a logarithmic axis with a label at each power of ten, or at every second or third where they are many."""
+    import altair as alt
+
+    first, last = math.floor(math.log10(low) + 1e-9), math.floor(math.log10(high) + 1e-9)
+    return alt.Axis(format=form, values=[10.0**k for k in range(first, last + 1, 1 + (last - first) // 12)])
+
+
+def _edges(drifts: Iterable[Array]) -> Array:
+    """Return edges of bins, `_PER_DECADE` in each, of whole decades that all drifts (n,) are in."""
+    found = [np.maximum(values[np.isfinite(values)], LEAST_DRAWN) for values in drifts]
+    least = min((values.min() for values in found if len(values)), default=LEAST_DRAWN)
+    most = max((values.max() for values in found if len(values)), default=LEAST_DRAWN)
+    first = math.floor(math.log10(least))
+    last = max(math.floor(math.log10(most)) + 1, first + 1)
+    return np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
+
+
+def _drift_rows(name: str, values: Array, edges: Array) -> pandas.DataFrame:
+    """Return the number of bodies from each edge on to the next; half a body where there is none, below the axis."""
+    finite = np.clip(values[np.isfinite(values)], edges[0], edges[-1])
+    counts, _ = np.histogram(finite, edges)
+    return frame(of=np.full(len(edges), name), drift=edges, bodies=np.maximum([*counts, 0], 0.5))

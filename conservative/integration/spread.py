@@ -1,0 +1,207 @@
+"""Random starts and bodies about those of a scene, for `integrate_many`.
+
+Every quantity has a stream of random numbers of its own, drawn body by body: the first bodies of many are those of few, and the
+spread of one quantity changes no other. Source: definitions; turns of any kind are evenly distributed as K. Shoemake, Uniform
+random rotations (1992), draws them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from numbers import Integral
+from typing import Any, TypedDict
+
+import numpy as np
+
+from ..attitude import Array, from_quaternion
+from ..check import describe, positive_integer
+from ..errors import BadInput, nearest
+from ..potentials.turning import static_part
+from ..scene import Scene
+from . import inputs
+from .deviation import Deviation, read_angle, read_number, read_rate, read_share
+
+_PIECE = 1 << 16
+"""Bodies whose attitudes are computed at once: what that takes besides stays below 50 MB."""
+_ROUND_OFF = 1e-12
+"""What a second moment of mass may be below 0, relative to the largest moment of inertia: a plate's is 0."""
+
+
+class Starts(TypedDict, total=False):
+    """What `integrate_many` is given: attitudes and rates, and where they vary inertia and numbers of the potential."""
+
+    R_WB0: Array
+    w_WB_B0: Array
+    inertia: Array
+    parameters: dict[str, Array]
+
+
+def spread(
+    scene: Scene,
+    n: int,
+    attitude: float | str | None = None,
+    rate: float | str | None = None,
+    inertia: str | None = None,
+    parameters: Mapping[str, float | str] | None = None,
+    seed: int = 0,
+) -> Starts:
+    """Return n random starts and bodies about those of a scene: `integrate_many(scene, **spread(scene, n, ...))`.
+
+    All are normally distributed about the scene's. A number is a standard deviation in SI units, of a vector that of each
+    component; a text such as `"2%"` is one relative to the scene's value, of a vector relative to its length. What is not given
+    is the scene's. The same seed gives the same bodies, with one version of NumPy, and the first of many are those of few.
+
+    Parameters
+    ----------
+    scene, n
+        What they are about, and how many.
+    attitude
+        Standard deviation of each component of a rotation vector, body axes, by which the attitude is turned: a number in rad,
+        or `"5deg"`; `"any"` for attitudes evenly distributed over all there are.
+    rate
+        That of each component of the angular velocity, body axes: a number in rad/s, `"5deg/s"`, or `"10%"` of its size;
+        `"any"` for directions evenly distributed, at the scene's size.
+    inertia
+        That of each second moment of mass about a principal plane (int x^2 dm), which are above 0 for every body there is, such
+        as `"1%"`. Of these the principal moments are the sums of two, so that they vary by 0.71 to 1 times as much; the
+        principal axes stay. A share that would not be above 0 is drawn again (of 30 %, one in 2,300).
+    parameters
+        That of numbers of the scene's potential by the names of its fields, such as `{"weight": "2%"}`, or of its vectors; of a
+        direction (3,) that of its components before it is made a unit vector.
+    seed
+        Any integer of 0 or more.
+
+    Returns
+    -------
+    Starts
+        `R_WB0` (n, 3, 3), `w_WB_B0` (n, 3), rad/s, body axes; `inertia`, kg m^2, moments (n, 3) or tensors (n, 3, 3), and
+        `parameters`, (n, ...), in SI units, where these vary.
+
+    Raises
+    ------
+    BadInput
+        A spread cannot be read, or is one of nothing, such as 2 % of a body's rate at rest; the potential has no such number;
+        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no such integer.
+    """
+    if not isinstance(scene, Scene):
+        raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
+    count, seed = positive_integer("n", n), _read_seed(seed)
+    found = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
+    varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
+    if inertia is not None:
+        found["inertia"] = _draw_inertia(scene, count, read_share("inertia", inertia), seed)
+        varied |= _follow_inertia(scene, found["inertia"])
+    if varied:
+        found["parameters"] = varied
+    return found
+
+
+def list_parameters(scene: Scene) -> list[str]:
+    """Return the names of what `spread` can vary of a scene's potential: its numbers and vectors."""
+    return [name for name, shape in inputs.list_parameters(scene.potential).items() if shape in ((), (3,))]
+
+
+def _read_seed(seed: object) -> int:
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
+        raise BadInput("seed", describe(seed), "an integer of 0 or more")
+    return int(seed)
+
+
+def _stream(seed: int, name: str, again: int = 0) -> np.random.Generator:
+    """Return the random numbers of one quantity; `again` says how often some were drawn before."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(*name.encode(), again)))
+
+
+def _pieces(n: int) -> Iterator[slice]:
+    yield from (slice(start, min(start + _PIECE, n)) for start in range(0, n, _PIECE))
+
+
+def _draw_attitudes(scene: Scene, n: int, value: object, seed: int) -> Array:
+    """Return attitudes (n, 3, 3), body to world."""
+    found = np.empty((n, 3, 3))
+    found[:] = scene.R_WB0
+    if value is None:
+        return found
+    deviation, stream = read_angle("attitude", value), _stream(seed, "attitude")
+    for part in _pieces(n):
+        many = part.stop - part.start
+        if deviation is None:
+            q = stream.standard_normal((many, 4))
+            found[part] = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
+        else:
+            found[part] = scene.R_WB0 @ _turns(deviation.size * stream.standard_normal((many, 3)))
+    return found
+
+
+def _turns(vectors: Array) -> Array:
+    """Return the rotations (n, 3, 3) of rotation vectors (n, 3), rad."""
+    half = np.linalg.norm(vectors, axis=1, keepdims=True) / 2
+    return from_quaternion(np.hstack([np.cos(half), np.sinc(half / math.pi) / 2 * vectors]))
+
+
+def _draw_rates(scene: Scene, n: int, value: object, seed: int) -> Array:
+    """Return angular velocities (n, 3), rad/s, body axes."""
+    if value is None:
+        return np.tile(scene.w_WB_B0, (n, 1))
+    deviation, drawn = read_rate("rate", value), _stream(seed, "rate").standard_normal((n, 3))
+    if deviation is None:
+        size = Deviation(1.0, True).of("rate", value, scene.w_WB_B0, "rad/s")
+        return drawn * (size / np.linalg.norm(drawn, axis=1, keepdims=True))
+    return scene.w_WB_B0 + deviation.of("rate", value, scene.w_WB_B0, "rad/s") * drawn
+
+
+def _draw_shares(seed: int, name: str, shape: tuple[int, ...], deviation: Deviation) -> Array:
+    """Return shares (n, ...), normally distributed about 1; those that are not above 0 are drawn again."""
+    found, again = 1 + deviation.size * _stream(seed, name).standard_normal(shape), 0
+    while (wrong := found <= 0).any():
+        again += 1
+        found[wrong] = 1 + deviation.size * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
+    return found
+
+
+def _draw_inertia(scene: Scene, n: int, deviation: Deviation, seed: int) -> Array:
+    """Return principal moments (n, 3), where the body axes are the principal ones, or tensors (n, 3, 3), kg m^2."""
+    moments, R_BP = scene.body.moments, scene.body.R_BP
+    planes = moments.sum() / 2 - moments
+    if planes.min() < -_ROUND_OFF * moments.max():
+        got = f"a spread for principal moments {moments.tolist()}"
+        raise BadInput("inertia", got, "moments of a body, of which none is larger than the sum of the others")
+    varied = planes * _draw_shares(seed, "inertia", (n, 3), deviation)
+    drawn = varied.sum(axis=1, keepdims=True) - varied
+    return drawn if np.array_equal(R_BP, np.eye(3)) else (R_BP * drawn[:, None, :]) @ R_BP.T
+
+
+def _follow_inertia(scene: Scene, inertia: Array) -> dict[str, Array]:
+    """Return the inertia for a potential that has the body's, as tensors (n, 3, 3), kg m^2."""
+    if scene.potential is not static_part(scene.potential) and hasattr(static_part(scene.potential), "inertia"):
+        got = "a spread in a field that turns, and has the inertia of the scene's body itself"
+        raise BadInput("inertia", got, "none: all bodies of such a field have the scene's inertia")
+    if not hasattr(scene.potential, "inertia"):
+        return {}
+    return {"inertia": inertia if inertia.ndim == 3 else inertia[:, :, None] * np.eye(3)}
+
+
+def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -> Array:
+    """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
+    argument, known = f"potential.{name}", list_parameters(scene)
+    if name not in known:
+        allowed = nearest(name, known) if known else "none: the scene's potential has no numbers, or it has no potential"
+        raise BadInput("parameters", repr(name), allowed)
+    centre = np.asarray(getattr(scene.potential, name))
+    deviation = read_number(argument, value)
+    if deviation.relative and not centre.ndim:
+        deviation.of(argument, value, centre, "its unit")  # 0 has no shares
+        share = read_share(argument, value)
+        return np.asarray(centre * _draw_shares(seed, argument, (n,), share))
+    drawn = _stream(seed, argument).standard_normal((n, *centre.shape))
+    found = centre + deviation.of(argument, value, centre, "its unit") * drawn
+    return found / np.linalg.norm(found, axis=1, keepdims=True) if _is_direction(scene, name) else found
+
+
+def _is_direction(scene: Scene, name: str) -> bool:
+    """Return whether the potential makes a unit vector of what it is given for a field."""
+    potential: Any = scene.potential
+    value = getattr(potential, name)
+    return np.ndim(value) == 1 and np.allclose(getattr(replace(potential, **{name: 2 * value}), name), value, rtol=1e-12)
