@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import sphere_curves
-from conservative.benchmarks.studies.studies import ENGINES, RANDOM
+from conservative.benchmarks.studies.studies import ENGINES, RANDOM, THROUGHPUT
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -30,6 +30,7 @@ from .tables import (
     random_ratios,
     runs,
     scene,
+    throughput,
     work_precision,
 )
 from .tables.cells import Table
@@ -105,6 +106,8 @@ class View:
         The measurements, a row each.
     random
         What was found on random bodies; None where the report has no such study.
+    throughput
+        What many bodies cost; None where the report has no such study.
     headline
         Where an engine beats us on the scenes, and where it does not.
     failed
@@ -119,6 +122,7 @@ class View:
     quick: bool
     table: pd.DataFrame
     random: random_ratios.RandomView | None
+    throughput: throughput.ThroughputView | None
     headline: tuple[headline.Statement, ...]
     failed: tuple[str, ...]
     verdict: Table
@@ -139,13 +143,14 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     """Return the view of measurements; every number that a report shows is computed here, and once."""
     every, samples = with_names(measurements.table), with_names(measurements.samples)
     of_engines = every["study"].isin(ENGINES)
-    table = every[~every["study"].isin((*ENGINES, RANDOM))].reset_index(drop=True)
+    table = every[~every["study"].isin((*ENGINES, RANDOM, THROUGHPUT))].reset_index(drop=True)
     builder = _Builder.of(table, samples, plan.methods)
     return View(
         source=source,
         quick=plan.quick,
         table=measurements.table,
         random=random_ratios.view(every, plan.bodies, plan.seed) if RANDOM in plan.names else None,
+        throughput=throughput.view(every) if THROUGHPUT in plan.names else None,
         headline=tuple(headline.statements(builder.contests)),
         failed=tuple(runs.failures_of_ours(table)),
         verdict=overview.verdict(table, builder.points),

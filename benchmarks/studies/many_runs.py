@@ -19,6 +19,8 @@ from ..measures.timing import prepare_and_run, wall_time
 
 BLOCK = 1024
 """Bodies that are prepared, and run, at a time."""
+COMPILED = 1.0
+"""Time, s, of a preparation that is done again: it may have compiled."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,8 @@ def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone
     try:
         with time_limit(limit):
             run, block, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
+            if cost.prepare > COMPILED:
+                _, _, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
             return ManyDone(run, block, cost.prepare, wall_time(run))
     except MissingEngine:
         raise

@@ -65,18 +65,19 @@ def sine_and_cosine(x):
 def find_means(mc):
     """Return what `jacobi` needs to know of the complementary parameter mc in [0, 1]: means of 1 and sqrt(mc), and their limit.
 
-    Rows of `means` hold arithmetic and geometric means by turns; `last` is the level, a float, at which both agree. Each lane
-    stops at a level of its own, so that none changes with its neighbours.
+    Of every level `means` has the arithmetic mean, one over it, and the geometric mean; `last` is the level, a float, at which
+    both agree. Each lane stops at a level of its own, so that none changes with its neighbours.
     """
-    means = np.empty(2 * LEVELS * WIDTH)
+    means = np.empty(3 * LEVELS * WIDTH)
     one = fill_like(1.0, mc)
     a, b, limit, last, levels = one, max(mc, TINIEST), one, -1.0 * one, 0
     going = one > 0.0
     for i in range(LEVELS):
         levels = i
         b = math.sqrt(b)
-        save(means, 2 * i * WIDTH, a)
-        save(means, (2 * i + 1) * WIDTH, b)
+        save(means, 3 * i * WIDTH, a)
+        save(means, (3 * i + 1) * WIDTH, 1.0 / a)
+        save(means, (3 * i + 2) * WIDTH, b)
         last, limit = choose(going, float(i) * one, last), choose(going, 0.5 * (a + b), limit)
         going = going & (abs(a - b) > 1e-9 * a)
         if not some(going):
@@ -96,11 +97,15 @@ def jacobi(u, found):
     a = cosine / choose(at_rest, one, sine)
     c, dn = limit * a, one
     for i in range(levels, -1, -1):
-        larger, smaller = load(means, 2 * i * WIDTH, u), load(means, (2 * i + 1) * WIDTH, u)
+        larger, over, smaller = (
+            load(means, 3 * i * WIDTH, u),
+            load(means, (3 * i + 1) * WIDTH, u),
+            load(means, (3 * i + 2) * WIDTH, u),
+        )
         passed = last >= float(i)
         a_new = a * c
         c, dn = choose(passed, c * dn, c), choose(passed, (smaller + a_new) / (larger + a_new), dn)
-        a = choose(passed, c / larger, a)
-    over = 1.0 / math.sqrt(c * c + 1.0)
-    sn = choose(sine >= 0.0, over, -over)
+        a = choose(passed, c * over, a)
+    n = 1.0 / math.sqrt(c * c + 1.0)
+    sn = choose(sine >= 0.0, n, -n)
     return choose(at_rest, 0.0 * one, sn), choose(at_rest, one, c * sn), choose(at_rest, one, dn)

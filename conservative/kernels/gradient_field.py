@@ -12,7 +12,7 @@ import numpy as np
 from . import kernel, traced
 from .axial import axial_constants, axial_energy, start_series
 from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body
-from .series import History, outwards
+from .series import History
 from .traced import join
 from .vector import add, cross, dot, scale
 
@@ -91,10 +91,8 @@ class GradientSeries:
         emit, (r, s) = self._emit, self._u
         for u, (by_r, by_s, by_g) in zip(self._u, self._rows, strict=True):
             u.push(emit.add(emit.add(emit.times(by_g, c.newest[0]), by_r, c[n, 0]), by_s, c[n, 1]))
-        plus = minus = None
-        for i in outwards(n):
-            plus, minus = emit.add(plus, c[n - i, 0], s[i]), emit.add(minus, c[n - i, 1], r[i])
-        return emit.minus(plus, minus)
+        g_r, g_s = c.turned(0)
+        return emit.convolve(n, 0, n, ((s, g_r), (r, g_s)))[0]
 
 
 @axial_constants.register(Gradient)

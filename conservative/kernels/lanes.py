@@ -20,6 +20,7 @@ if COMPILED:
         load,
         load_rows,
         save,
+        save_columns,
         save_rows,
         some,
         with_lane,
@@ -35,6 +36,7 @@ else:
         load,
         load_rows,
         save,
+        save_columns,
         save_rows,
         some,
         with_lane,
@@ -44,4 +46,4 @@ WIDTH = 2 * REGISTER if COMPILED else 1
 """Bodies that most kernels take at once."""
 
 __all__ = ["REGISTER", "WIDTH", "choose", "every", "fill_like", "fuse", "lane_of", "load", "load_rows", "save", "save_rows"]
-__all__ += ["some", "with_lane"]
+__all__ += ["save_columns", "some", "with_lane"]

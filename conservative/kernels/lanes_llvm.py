@@ -3,8 +3,8 @@
 Functions of `small` that are written for floats and branch on nothing compile for lanes as they are: + - * / between lanes, and
 between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max` are LLVM's vector instructions. Comparisons give a
 `Mask`, a truth value for each lane, joined by & | ~; `choose(mask, a, b)` takes a or b, numbers or tuples of lanes, in each
-lane, `every(mask)` and `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one source serves a single
-body and lanes.
+lane, `every(mask)` and `some(mask)` are truth values of the whole. These three take a plain truth value as well, so that one
+source serves a single body and lanes.
 
 A number is made of whole registers, `REGISTER` floats each, and every operation is written once for each of them, so that
 results do not depend on the width: in a wider vector LLVM fuses other products with sums.
@@ -354,6 +354,33 @@ def save_rows(typing, array, index, stride, values):
         for number in cgutils.unpack_tuple(builder, args[3]):
             _save(context, builder, sig.args[0], args[0], at, sig.args[3][0], number)
             at = builder.add(at, args[2])
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, types.intp, values), build
+
+
+def _transpose(builder, numbers):
+    """Out of up to four registers, one for each number, four registers, one for each lane."""
+    pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, REGISTER), at))  # noqa: E731
+    a, b, c, d = (*numbers, *[ir.Constant(numbers[0].type, ir.Undefined)] * (REGISTER - len(numbers)))
+    ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
+    near, far = (0, 1, 4, 5), (2, 3, 6, 7)
+    return pick(ab[0], cd[0], near), pick(ab[1], cd[1], near), pick(ab[0], cd[0], far), pick(ab[1], cd[1], far)
+
+
+@intrinsic
+def save_columns(typing, array, index, stride, values):
+    """Store up to four numbers, those of a body one after the other: of the first at index, of the next at index + stride."""
+
+    def build(context, builder, sig, args):
+        numbers, at = cgutils.unpack_tuple(builder, args[3]), args[1]
+        kept = ir.Constant(ir.VectorType(_INDEX, len(numbers)), list(range(len(numbers))))
+        for registers in _parts(builder, *numbers):
+            for lane in _transpose(builder, registers):
+                place = _float_address(context, builder, sig.args[0], args[0], at)
+                found = builder.shuffle_vector(lane, lane, kept)
+                builder.store(found, builder.bitcast(place, found.type.as_pointer()), align=8)
+                at = builder.add(at, args[2])
         return context.get_dummy_value()
 
     return types.none(array, types.intp, types.intp, values), build

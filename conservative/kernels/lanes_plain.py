@@ -59,3 +59,8 @@ def save_rows(array, index, stride, values):
     """Store numbers at index, index + stride and so on."""
     for i, value in enumerate(values):
         array[index + i * stride] = value
+
+
+def save_columns(array, index, stride, values):
+    """Store numbers one after the other, the first at index."""
+    array[index : index + len(values)] = values

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from . import small
-from .lanes import WIDTH, save
+from .lanes import save_columns
 from .vector import dot
-
-ROOM = 12 * WIDTH
-"""Floats that `store_sample` needs room for."""
 
 
 @small
@@ -23,18 +20,16 @@ def rotation(q):
 
 
 @small
-def store_sample(q, w, rows, first, sample, room, R_WB, w_WB_B):
-    """Write a sample of the bodies from number `first` on, as many as there are, to R_WB (n, s, 3, 3) and w_WB_B (n, s, 3).
+def store_sample(q, w, axes, place, samples, R_WB, w_WB_B):
+    """Write one sample of all bodies of a number; their next ones are `samples` samples further on.
 
-    q (4) and w (3) are attitude and rate in axes of the kernel, `rows` those of the matrix R that turns these to the body's.
+    q (4) and w (3) are attitude and rate in axes of the kernel, `axes` (9) the rows of the matrix from these to the body's.
+    R_WB and w_WB_B are flat; `place` is the number of the sample among all in them.
     """
-    R, count = rotation(q), min(WIDTH, len(R_WB) - first)
-    for k in range(3):
-        for j in range(3):
-            save(room, (3 * j + k) * WIDTH, dot(R[j], rows[k]))
-        save(room, (9 + k) * WIDTH, dot(w, rows[k]))
-    for lane in range(count):
-        for j in range(3):
-            for k in range(3):
-                R_WB[first + lane, sample, j, k] = room[(3 * j + k) * WIDTH + lane]
-            w_WB_B[first + lane, sample, j] = room[(9 + j) * WIDTH + lane]
+    r0, r1, r2 = rotation(q)
+    a, b, c = axes[0:3], axes[3:6], axes[6:9]
+    R, w_B = 9 * place, 3 * place
+    save_columns(R_WB, R, 9 * samples, (dot(r0, a), dot(r0, b), dot(r0, c), dot(r1, a)))
+    save_columns(R_WB, R + 4, 9 * samples, (dot(r1, b), dot(r1, c), dot(r2, a), dot(r2, b)))
+    save_columns(R_WB, R + 8, 9 * samples, (dot(r2, c),))
+    save_columns(w_WB_B, w_B, 3 * samples, (dot(w, a), dot(w, b), dot(w, c)))

@@ -29,7 +29,8 @@ from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
 from .vector import product
 
-NODES, WEIGHTS = (tuple(float(x) for x in part) for part in np.polynomial.legendre.leggauss(16))
+NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.legendre.leggauss(16), strict=True) if x > 0)
+"""Nodes and weights of Gauss's quadrature with 16 nodes on [-1, 1], those above 0."""
 TERMS = 12
 PAUSE = 2**20
 """Steps between two calls of handlers of signals."""
@@ -167,11 +168,15 @@ def exact_step(p, h):
     rests = p.l == 0.0
     size = choose(rests, one, p.l)
     a3, rate, w3 = p.A3 / size, 2.0 * p.E / size, p.A3 / p.J3
+    middle = 0.25 * h
+    s, c, d = jacobi(p.nu * middle, means)
     f = 0.0 * one
-    for k in range(16):
-        part = 0.25 * h
-        d = jacobi(p.nu * (part * (1.0 + NODES[k])), means)[2]
-        f = f + part * WEIGHTS[k] * (rate + w3 * d) / (1.0 + a3 * d)
+    for x, weight in NODES:
+        # Two nodes, as far before the middle as after it, by the addition theorem.
+        s_x, c_x, d_x = jacobi(p.nu * (middle * x), means)
+        below, shift = 1.0 / (1.0 - p.m * (s * s) * (s_x * s_x)), p.m * (s * s_x) * (c * c_x)
+        d0, d1 = (d * d_x + shift) * below, (d * d_x - shift) * below
+        f = f + middle * weight * ((rate + w3 * d0) / (1.0 + a3 * d0) + (rate + w3 * d1) / (1.0 + a3 * d1))
     x, y, z = p.A1 * C / size, p.A2 * S / size, a3 * D
     sine, cosine = sine_and_cosine(f)
     r0 = (x * x + z + z * z) * cosine - x * y * sine

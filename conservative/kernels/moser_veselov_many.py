@@ -1,7 +1,7 @@
 """Discrete Moser-Veselov steps of many free bodies, each in a lane of its own, by the functions of `moser_veselov`.
 
-What a body is made of is a column of a table of floats, whose rows `prepare` fills and `march` reads. Columns are as many as
-whole lanes need: the last ones are copies of the last body.
+What `prepare` makes of a body is a column of each of two tables of floats, of what stays and of what `march` changes. Columns
+are as many as whole lanes need: the last ones are copies of the last body.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from . import entry, kernel
-from .lanes import WIDTH, choose, fill_like, load, load_rows, save, save_rows
-from .lanes_samples import ROOM, store_sample
+from . import entry, kernel, small
+from .lanes import WIDTH, choose, fill_like, load_rows, save, save_rows
+from .lanes_samples import store_sample
 from .moser_veselov import (
     Polhode,
     Shift,
@@ -31,9 +31,9 @@ from .vector import dot, product
 
 GIVEN = 24
 """Numbers that a body is given by: `gather`."""
-SHIFT, STATE, LEFT, RATES, AXES, FINISHED = 0, 15, 20, 24, 27, 36
-"""First rows of: `Shift`, `State`, the turn in front, amplitudes of the rate, R from the polhode's axes to the body's, 0 or 1."""
-ROWS = 37
+SHIFT, LEFT, RATES, AXES, FINISHED = 0, 15, 19, 22, 31
+"""First rows: of `Shift`, the turn in front, amplitudes of the rate, the polhode's axes in those of the body, and 0 or 1."""
+ROWS, STATE_ROWS = 32, 5
 SLOWEST = 1e-60
 """Limit of |w| dt below which bodies that turn are left to be run alone: squares of squares would be no floats."""
 
@@ -101,6 +101,16 @@ def quaternion(x, y, z):
 
 
 @kernel
+def turn(R, a):
+    """The direction of an axis, turned by the matrix with rows R."""
+    return (
+        R[0] * a[2] + R[1] * a[3] + R[2] * a[4],
+        R[3] * a[2] + R[4] * a[3] + R[5] * a[4],
+        R[6] * a[2] + R[7] * a[3] + R[8] * a[4],
+    )
+
+
+@kernel
 def step_of_order(p, h, order, room):
     """`preprocessed_step` of each body, one after the other."""
     save_rows(room, 0, WIDTH, p)
@@ -118,14 +128,15 @@ def has_step(p, step, h, w, longest, longest_shift, smallest_cn):
     """Whether there is a step h, below the limits, with which no square leaves the range of floats."""
     angle = math.sqrt(dot(w, w)) * h
     known = (angle == 0.0) | ((angle > SLOWEST) & (angle < longest))
-    return known & (abs(p.nu) * h < longest_shift) & (step.C > smallest_cn) & (step.r0 - step.r0 == 0.0)
+    return known & (abs(p.nu) * h < longest_shift) & (smallest_cn < step.C) & (step.r0 - step.r0 == 0.0)
 
 
 @entry
-def prepare(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table):
-    """Fill `table` (ROWS, columns) for steps dt, in units `time`, of an order, 0 for the exact one; see `gather`.
+def prepare(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table, states):
+    """Fill `table` (ROWS, columns) and `states` (STATE_ROWS, columns) for steps dt of an order, 0 for the exact one.
 
-    `limits` are those of |w| dt, of nu dt and of cn: bodies beyond them, or without a step, get 0 in the row FINISHED.
+    Bodies are given as `gather` takes them; dt is in units `time`. `limits` are those of |w| dt, of nu dt and of cn: bodies
+    beyond them, or without a step, get 0 in the row FINISHED.
     """
     columns, flat, room = table.shape[1], table.reshape(-1), np.empty(GIVEN * WIDTH)
     for first in range(0, columns, WIDTH):
@@ -146,33 +157,33 @@ def prepare(moments, R_BP, R_WB0, w_WB_B0, time, dt, order, limits, table):
         axes = (x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4])
         finished = choose(has_step(p, step, h, w, limits[0], limits[1], limits[2]), 1.0, 0.0 * h)
         save_rows(flat, first + SHIFT * columns, columns, k)
-        save_rows(flat, first + STATE * columns, columns, at)
+        save_rows(states.reshape(-1), first, columns, at)
         save_rows(flat, first + LEFT * columns, columns, left)
         save_rows(flat, first + RATES * columns, columns, rates)
         save_rows(flat, first + AXES * columns, columns, axes)
         save(flat, first + FINISHED * columns, finished)
 
 
-@kernel
-def turn(R, a):
-    """The direction of an axis, turned by the matrix with rows R."""
-    return (
-        R[0] * a[2] + R[1] * a[3] + R[2] * a[4],
-        R[3] * a[2] + R[4] * a[3] + R[5] * a[4],
-        R[6] * a[2] + R[7] * a[3] + R[8] * a[4],
-    )
+@small
+def store_state(flat, columns, k, at, first, row, R_WB, w_WB_B):
+    """Write sample number `row` of the bodies of a number."""
+    q = product(load_rows(flat, first + LEFT * columns, columns, 4, WIDTH), own_quaternion(k, at))
+    a = load_rows(flat, first + RATES * columns, columns, 3, WIDTH)
+    axes, samples = load_rows(flat, first + AXES * columns, columns, 9, WIDTH), R_WB.shape[1]
+    rates = (a[0] * at.c, a[1] * at.s, a[2] * at.d)
+    store_sample(q, rates, axes, first * samples + row, samples, R_WB.reshape(-1), w_WB_B.reshape(-1))
 
 
 @entry
-def march(table, done, last, n_steps, every, R_WB, w_WB_B):
+def march(table, states, done, last, n_steps, every, R_WB, w_WB_B):
     """Take the steps of all bodies from number `done` to `last` of `n_steps`, and store the samples that fall among them.
 
-    R_WB (n, s, 3, 3) and w_WB_B (n, s, 3), rad/s, in body axes, get the start, every `every`-th step, and the last.
+    R_WB (columns, s, 3, 3) and w_WB_B (columns, s, 3), rad/s, in body axes, get the start, every `every`-th step, and the last.
     """
-    columns, flat, room = table.shape[1], table.reshape(-1), np.empty(ROOM)
+    columns, flat = table.shape[1], table.reshape(-1)
     for first in range(0, columns, WIDTH):
         k = Shift(*load_rows(flat, first + SHIFT * columns, columns, 15, WIDTH))
-        at = State(*load_rows(flat, first + STATE * columns, columns, 5, WIDTH))
+        at = State(*load_rows(states.reshape(-1), first, columns, STATE_ROWS, WIDTH))
         row, here = (done // every + 1 if done > 0 else 0), done
         while here < last or row == 0:
             sample = min(row * every, n_steps)
@@ -180,16 +191,6 @@ def march(table, done, last, n_steps, every, R_WB, w_WB_B):
             at = take_steps(k, at, here, end)
             here = end
             if here == sample:
-                store_state(flat, columns, k, at, first, row, room, R_WB, w_WB_B)
+                store_state(flat, columns, k, at, first, row, R_WB, w_WB_B)
                 row += 1
-        save_rows(flat, first + STATE * columns, columns, at)
-
-
-@kernel
-def store_state(flat, columns, k, at, first, row, room, R_WB, w_WB_B):
-    """Write a sample of the bodies of one number."""
-    q = product(load_rows(flat, first + LEFT * columns, columns, 4, WIDTH), own_quaternion(k, at))
-    a = load_rows(flat, first + RATES * columns, columns, 3, WIDTH)
-    R = load_rows(flat, first + AXES * columns, columns, 9, WIDTH)
-    rows = ((R[0], R[1], R[2]), (R[3], R[4], R[5]), (R[6], R[7], R[8]))
-    store_sample(q, (a[0] * at.c, a[1] * at.s, a[2] * at.d), rows, first, row, room, R_WB, w_WB_B)
+        save_rows(states.reshape(-1), first, columns, at)

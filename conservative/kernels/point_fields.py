@@ -19,7 +19,7 @@ import numpy as np
 from . import kernel, traced
 from .axial import axial_constants, axial_energy, start_series
 from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body, turned_moment
-from .series import TURNED, TWICE, History, outwards
+from .series import History
 from .traced import join, over_root, root, where_above
 from .vector import cross, dot, scale, subtract
 
@@ -146,24 +146,17 @@ class PointSeries:
         Q.push(emit.subtract(emit.add(None, self._M2, c[n, 0]), self._M1, c[n, 1]))
         self._push_distance(c, n)
         y.push(self._next_power(n) if n else self._y0)
-        total = Q[n] if self._base else None
-        for i in outwards(n):
-            total = emit.add(total, y[i], Q[n - i])
-        return total
+        return emit.convolve(n, 0, n, ((y, Q),), start=Q[n] if self._base else None)[0]
 
     def _push_distance(self, c, n):
         emit = self._emit
-        t = emit.times(self._S, c[n, 0])
-        s = emit.plus(emit.plus(t, emit.shuffle(t, TURNED)), emit.shuffle(t, TWICE))
+        s = emit.add_up(emit.times(self._S, c[n, 0]))
         self._s.push(s)
         self._ks.push(emit.times(emit.constant(float(n)), s))
 
     def _next_power(self, n):
-        emit, plain, weighted = self._emit, None, None
-        for k in outwards(n):
-            if k:
-                plain = emit.add(plain, self._s[k], self._y[n - k])
-                weighted = emit.add(weighted, self._ks[k], self._y[n - k])
+        emit = self._emit
+        plain, weighted = emit.convolve(n, 1, n, ((self._s, self._y),), ((self._ks, self._y),))
         return emit.minus(emit.times(emit.constant((self._alpha + 1) / n), weighted), plain)
 
 

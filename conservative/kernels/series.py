@@ -6,15 +6,17 @@ sum, for n = 0, 1, ...
     (n+1) g'[n+1] = h sum of g'[i] x w'[n-i]       (n+1) a'[n+1] = h sum of a'[i] x w'[n-i]
     (n+1) w'[n+1] = h (K sum of w2'[i] w3'[n-i] and its kin + J^-1 T'[n])        K = (J2 - J3)/J1 and its kin
 
-A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run from
-the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
-constants that hold the factor h/(n+1). Where the axes of the rows turn at a rate u about their second one, g' gains u a, and
-a' loses u g.
+A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. For one body,
+sums run from the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short
+chains, with constants that hold the factor h/(n+1). Where the axes of the rows turn at a rate u about their second one, g'
+gains u a, and a' loses u g.
 
 What a field adds is its own: an object whose `accelerate` returns J^-1 T'[n], made next to the field's torque. All arithmetic
-is that of an `emit`: `add(c, a, b)` is c + a b, where c may be None for 0, `subtract(c, a, b)` is c - a b, and `store` and
-`load` keep old coefficients in memory. Source: D. Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems
-of ordinary differential equations by the method of Taylor series (1971); the arrangement is our own.
+is that of an `emit`: `add(c, a, b)` is c + a b, where c may be None for 0, `subtract(c, a, b)` is c - a b, `store` and `load`
+keep old coefficients in memory, `convolve` forms sums of products, and `find_next` says how all this is arranged. That of one
+body (`Straight`) waits for as little as possible, that of several (`series_lanes`) does as little as possible. Source: D.
+Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems of ordinary differential equations by the method of
+Taylor series (1971); the arrangement is our own.
 """
 
 from __future__ import annotations
@@ -26,18 +28,18 @@ TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
 
 
 class History:
-    """Coefficients of one quantity: the newest and the first are at hand, all others come out of memory."""
+    """Coefficients of one quantity: the newest and the first are at hand, all others come out of memory, from `places`."""
 
     def __init__(self, emit):
-        self._emit, self._values, self._places = emit, [], []
+        self._emit, self._values, self.places = emit, [], []
 
     def push(self, value):
         """Take the next coefficient."""
         self._values.append(value)
-        self._places.append(self._emit.store(value))
+        self.places.append(self._emit.store(value))
 
     def __getitem__(self, n):
-        return self._emit.load(self._places[n]) if 0 < n < len(self._values) - 1 else self._values[n]
+        return self._emit.load(self.places[n]) if 0 < n < len(self._values) - 1 else self._values[n]
 
 
 class Vectors:
@@ -59,10 +61,22 @@ class Vectors:
         n, part = key
         return self._parts[part][n]
 
+    def turned(self, k):
+        """The histories of r and s of vector k."""
+        return self._parts[2 * k], self._parts[2 * k + 1]
 
-def outwards(n, first=0):
-    """The indices i = first ... n - first of a sum over products of i with n - i: from the middle, and large i first."""
-    return sorted(range(first, n + 1 - first), key=lambda i: (abs(2 * i - n), -i))
+
+def outwards(n, first, last):
+    """The indices i = first ... last of a sum over products of i with n - i: from the middle, and large i first."""
+    return sorted(range(first, last + 1), key=lambda i: (abs(2 * i - n), -i))
+
+
+def load_once(loaded, history, i):
+    """Coefficient i of a history, out of memory only if it has not been `loaded` yet."""
+    key = id(history), i
+    if key not in loaded:
+        loaded[key] = history[i]
+    return loaded[key]
 
 
 class FreeSeries:
@@ -87,23 +101,13 @@ class TurningSeries:
         return self._inner.accelerate(c, n)
 
 
-def _sum_inner(emit, c, n):
-    """Sums without the newest: both halves of g x w, both of a x w, and w2 w3 and its kin; None where there are no terms."""
-    sums = [None] * 5
-    for i in outwards(n, 1):
-        r, s = c[n - i, 4], c[n - i, 5]
-        for k, other in enumerate((s, r, s, r, s)):
-            sums[k] = emit.add(sums[k], c[i, k], other)
-    return sums
-
-
 def _add_optional(emit, a, b):
     return b if a is None else a if b is None else emit.plus(a, b)
 
 
-def _next_row(emit, c, n, k, plus, minus, f, f1, f2):
-    """f times coefficient n of the cross product with w of the vector whose r is number k."""
-    old = None if plus is None else emit.times(f, emit.minus(plus, minus))
+def _next_row(emit, c, n, k, old, f, f1, f2):
+    """f times coefficient n of the cross product with w of the vector whose r is number k; `old` is its sum without newest."""
+    old = None if old is None else emit.times(f, old)
     new = emit.subtract(emit.add(old, c[n, k], f2), c[n, k + 1], f1)
     if n == 0:
         return new
@@ -119,26 +123,82 @@ def _next_rates(emit, c, n, sums, f, f1, f2, K, field):
     return emit.add(new, emit.times(f2, K), c[n, 4]) if n else new
 
 
-def next_coefficients(emit, c, n, h, K, field):
-    """The coefficients n + 1 of g, a and w."""
+def _products(c):
+    """What `convolve` takes for g x w, a x w and w2 w3 and its kin."""
+    (g_r, g_s), (a_r, a_s), (w_r, w_s) = (c.turned(k) for k in range(3))
+    return ((g_r, w_s), (g_s, w_r)), ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
+
+
+def _turn_rows(emit, c, f, field, g, a):
+    """The rows where their axes turn with a field."""
+    by = emit.times(f, field.turn)
+    return emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
+
+
+def next_in_short_chains(emit, c, n, h, K, field):
+    """The coefficients n + 1 of g, a and w, with few operations after the newest."""
     f = emit.times(h, emit.constant(1.0 / (n + 1)))
-    g_plus, g_minus, a_plus, a_minus, ww = _sum_inner(emit, c, n)
+    gw, aw, ww = emit.convolve(n, 1, n - 1, *_products(c))
     f1, f2 = emit.times(f, c[0, 4]), emit.times(f, c[0, 5])
-    g = _next_row(emit, c, n, 0, g_plus, g_minus, f, f1, f2)
-    a = _next_row(emit, c, n, 2, a_plus, a_minus, f, f1, f2)
+    g = _next_row(emit, c, n, 0, gw, f, f1, f2)
+    a = _next_row(emit, c, n, 2, aw, f, f1, f2)
     if isinstance(field, TurningSeries):
-        by = emit.times(f, field.turn)
-        g, a = emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
+        g, a = _turn_rows(emit, c, f, field, g, a)
     return g, a, _next_rates(emit, c, n, ww, f, f1, f2, K, field)
+
+
+def next_by_sums(emit, c, n, h, K, field):
+    """The coefficients n + 1 of g, a and w, with few operations in all."""
+    f = emit.times(h, emit.constant(1.0 / (n + 1)))
+    gw, aw, ww = emit.convolve(n, 0, n, *_products(c))
+    torque = field.accelerate(c, n)
+    rates = emit.times(K, ww) if torque is None else emit.add(torque, K, ww)
+    g, a = emit.times(f, gw), emit.times(f, aw)
+    if isinstance(field, TurningSeries):
+        g, a = _turn_rows(emit, c, f, field, g, a)
+    return g, a, emit.times(f, rates)
+
+
+class Straight:
+    """Sums term by term, in what emits single operations on fours."""
+
+    def find_next(self, *given):
+        """The next coefficients: nothing else is there to be done while a sum waits for the newest."""
+        return next_in_short_chains(self, *given)
+
+    def add_up(self, v):
+        """The sum of three lanes, in all of them."""
+        return self.plus(self.plus(v, self.shuffle(v, TURNED)), self.shuffle(v, TWICE))
+
+    def convolve(self, n, first, last, *sums, start=None):
+        """Sums over i = first ... last of x[i] y[n-i], less those of another pair, of which each sum has two or one.
+
+        What the first begins with is `start`; None where there are no terms.
+        """
+        found = [[start if k == 0 else None] + [None] * (len(pairs) - 1) for k, pairs in enumerate(sums)]
+        for i in outwards(n, first, last):
+            loaded = {}
+            for k, pairs in enumerate(sums):
+                for j, (x, y) in enumerate(pairs):
+                    a, b = (load_once(loaded, *each) for each in ((x, i), (y, n - i)))
+                    found[k][j] = self.add(found[k][j], a, b)
+        return [parts[0] if len(parts) == 1 or parts[0] is None else self.minus(*parts) for parts in found]
+
+
+def find_terms(emit, h, start, K, field):
+    """Yield, for each order up to the highest, its term of a step: of g, a and w."""
+    c = Vectors(emit)
+    c.push(start)
+    for n in range(HIGHEST):
+        term = emit.find_next(c, n, h, K, field)
+        yield term
+        c.push(term)
 
 
 def sum_orders(emit, h, start, K, field):
     """Yield, for each order up to the highest, three times (g, a, w): what a step adds, the last term of it, the one before."""
-    c, total, before = Vectors(emit), None, None
-    c.push(start)
-    for n in range(HIGHEST):
-        term = next_coefficients(emit, c, n, h, K, field)
+    total = before = None
+    for term in find_terms(emit, h, start, K, field):
         total = term if total is None else tuple(emit.plus(s, x) for s, x in zip(total, term, strict=True))
         yield total, term, before
-        c.push(term)
         before = term

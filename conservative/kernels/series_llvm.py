@@ -5,7 +5,7 @@ from __future__ import annotations
 from llvmlite import ir
 from numba.core import cgutils
 
-from .series import HIGHEST, LOWEST, sum_orders
+from .series import HIGHEST, LOWEST, Straight, sum_orders
 from .simd_llvm import LANES
 
 MOST_STORED = 12 * HIGHEST
@@ -15,16 +15,16 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _INDEX = ir.IntType(32)
 
 
-class _VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
+class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite has no types
     """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
 
     def descr(self, buf):
         (pointer,) = self.operands
         kind = pointer.type
-        buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align 32\n")
+        buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {8 * kind.pointee.count}\n")
 
 
-class Emitter:
+class Emitter(Straight):
     """Vector instructions by name, and memory for vectors."""
 
     def __init__(self, builder):
@@ -77,7 +77,7 @@ class Emitter:
 
     def load(self, at):
         """What was stored there."""
-        found = _VolatileLoad(self._builder.block, at, "")
+        found = VolatileLoad(self._builder.block, at, "")
         self._builder._insert(found)
         return found
 

@@ -6,11 +6,11 @@ from itertools import islice
 
 import numpy as np
 
-from .series import sum_orders
+from .series import Straight, sum_orders
 from .simd_numpy import LANES
 
 
-class Emitter:
+class Emitter(Straight):
     """Arithmetic by name; what is stored stays where it is."""
 
     def constant(self, x):

@@ -28,9 +28,10 @@ from .protocol import Result, Workspace, find_ends, loosen
 from .series import FreeSeries, TurningSeries
 from .series_numpy import sum_to_order as sum_to_order_numpy
 from .signals import call_handlers, end_of_block
-from .traced import Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
+from .traced import Lanes, Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
 
 if COMPILED:
+    from .series_lanes import sum_to_order as sum_to_order_lanes
     from .series_llvm import sum_to_order as sum_to_order_llvm
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
@@ -136,8 +137,7 @@ def turning_values(field, constants, L, n, g, upright, w):
     return energy - dot(L, o), momentum, slope, o
 
 
-@trace
-def begin(model):
+def find_beginning(model):
     """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
     J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
     constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
@@ -152,10 +152,23 @@ def begin(model):
 
 
 @trace
+def begin(model):
+    """`find_beginning`"""
+    return find_beginning(model)
+
+
+def choose_series(order, x):
+    """What forms the series: for plain Python, for lanes or for one body."""
+    if not isinstance(order, Value):
+        return sum_to_order_numpy
+    return sum_to_order_lanes if isinstance(x, Lanes) else sum_to_order_llvm
+
+
+@trace
 def take_step(field, constants, order, h, K, g, a, w):
     """The state after one step, not projected, and its last two terms as fours."""
     first = tuple(join(*v, 0.0) for v in (g, a, w))
-    sum_to_order = sum_to_order_llvm if isinstance(order, Value) else sum_to_order_numpy
+    sum_to_order = choose_series(order, w[0])
     added, last, before = sum_to_order(*start_series(field, constants, g), order, h, first, K)
     return tuple(split(v + d) for v, d in zip(first, added, strict=True)), last, before
 
@@ -247,8 +260,7 @@ def correct_revolving(field, constants, body, kept, scales, g, a, w):
     return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + off, flat * over
 
 
-@trace
-def correct(field, constants, body, kept, scales, g, a, w):
+def find_correction(field, constants, body, kept, scales, g, a, w):
     """Return (g, a, w, relative defect before, share left) of a state brought closer to orthonormality and to what is `kept`.
 
     `body` is (J, J_inverse, loose) of `Model`; the share is what regularisation leaves of the defect.
@@ -258,6 +270,18 @@ def correct(field, constants, body, kept, scales, g, a, w):
     if isinstance(field, Revolving):
         return correct_revolving(field, constants, body, kept, scales, g, a, w)
     return correct_in_field(field, constants, body, kept, scales, g, a, w)
+
+
+@trace
+def correct(field, constants, body, kept, scales, g, a, w):
+    """Return (g, a, w) of `find_correction`, the relative defect before, and what is left of it afterwards."""
+    g, a, w, defect, rest = find_correction(field, constants, body, kept, scales, g, a, w)
+    return g, a, w, defect, find_left(defect, rest)
+
+
+def find_left(defect, rest):
+    """What a correction leaves of a relative defect: its square, and the share `rest` of what is no round-off."""
+    return defect * defect + where_above(rest, rest, 1.0, 1.0) * where_above(defect - NOISE, NOISE, defect)
 
 
 @small
@@ -287,8 +311,7 @@ def project(field, constants, body, kept, scales, g, a, w):
     corrections = 0
     defect, left = 1.0, 1.0
     while corrections == 0 or (corrections < MOST_CORRECTIONS and left > ENOUGH and defect < FAR):
-        g, a, w, defect, rest = correct(field, constants, body, kept, scales, g, a, w)
-        left = defect * defect + min(rest, 1.0) * max(defect - NOISE, 0.0)
+        g, a, w, defect, left = correct(field, constants, body, kept, scales, g, a, w)
         corrections += 1
     return g, a, w, corrections, left
 

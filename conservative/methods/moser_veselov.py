@@ -17,6 +17,8 @@ from ..method import Grid, Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
+from .columns import find_unit_of_time, find_units_of_moments, take_pieces
+from .many import Block, Bodies, RunMany
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
 from .units import convert_scene, find_units, in_own_units
@@ -26,6 +28,8 @@ LONGEST, LONGEST_EXACT = 1.5, 6.0
 """Limit of |w| dt at the start, rad: of an order 2 to 10, whose step exists for short steps only, and of the exact step."""
 SMALLEST_CN = 0.2
 """cn of half a step must be above this: at 0, after half a period of the polhode, the form of the quaternion breaks down."""
+BODY_STEP, BODY_SAMPLE = 3e-9, 25e-9
+"""Seconds that a step of a body among many, and a sample, take, about: how often a run can be stopped follows from them."""
 LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
 """Limit of nu dt of the exact step, nu being the polhode's frequency: below it cn is above SMALLEST_CN."""
 
@@ -111,6 +115,9 @@ class MoserVeselov(_Fields, Method):
         except BadInput:  # in units of our own
             raise BadInput("dt", f"{grid.dt:g}, for which {self.name} has no step", "a shorter step") from None
 
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        return prepare_lanes(self, bodies, grid)
+
     @in_own_units
     def _prepare(self, scene: Scene, grid: Grid) -> Run:
         label, start, model, coefficients = scene.derive(calibrate, self, grid.dt)
@@ -130,6 +137,48 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, Princ
     if not (math.isfinite(step.r0) and step.C > SMALLEST_CN):
         raise BadInput("dt", f"{dt:g}", "a shorter step")
     return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
+
+
+def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany | None:
+    """Return the run of many bodies with `conservative.kernels.moser_veselov_many`."""
+    kernel, n, s = kernels("moser_veselov_many"), len(bodies), grid.n_samples
+    time = find_unit_of_time(grid)
+    longest = LONGEST_EXACT if method.order is None else LONGEST
+    limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
+    columns = -(-n // kernel.WIDTH) * kernel.WIDTH
+    table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
+    try:
+        kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
+    except (ArithmeticError, ValueError):  # in plain Python only: compiled, a body without a step has nan
+        return None
+    finished = table[kernel.FINISHED, :n] == 1
+
+    def run() -> Block:
+        states, R_WB, w_WB_B = start.copy(), np.empty((columns, s, 3, 3)), np.empty((columns, s, 3))
+
+        def take(done: int, last: int) -> None:
+            kernel.march(table, states, done, last, grid.n_steps, grid.every, R_WB, w_WB_B)
+
+        take_pieces(grid.n_steps, n * (BODY_STEP + BODY_SAMPLE / grid.every), take)
+        return Block(R_WB[:n], w_WB_B[:n], finished)
+
+    return run
+
+
+def find_given(bodies: Bodies) -> tuple[Array, Array, Array, Array]:
+    """Return moments and R_BP of all bodies, or of one where it is for all, and R_WB0 and w_WB_B0, rad/s, of all.
+
+    The largest moment of each body is of order one.
+    """
+    body = bodies.scene.body
+    moments, R_BP = (body.moments[None], body.R_BP[None]) if bodies.inertia is None else bodies.principal
+    moments = moments / find_units_of_moments(moments)[:, None]
+    return moments, writable(R_BP), writable(bodies.R_WB0), writable(bodies.w_WB_B0)
+
+
+def writable(values: Array) -> Array:
+    """Return the values as an array of the one kind that kernels are compiled for; a copy where it is not that."""
+    return np.require(values, np.float64, ("C", "W"))
 
 
 def require_short_step(scene: Scene, dt: float, exact: bool) -> None:

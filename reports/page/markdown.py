@@ -11,10 +11,10 @@ from conservative.benchmarks.studies import long_runs
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
-from ..tables import engine_tables, random_ratios
+from ..tables import engine_tables, random_ratios, throughput
 from ..tables.cells import CONSERVED, SMALL, Table, markdown
 from ..view import PaperView, View
-from . import random_bodies
+from . import many_bodies, random_bodies
 from .scene_charts import SceneCharts
 
 Draw = Callable[[str, Any], str]
@@ -38,6 +38,8 @@ def render(
         view=view,
         random_picture=draw(random_bodies.NAME, of_random) if of_random is not None else "",
         random_terms=random_ratios.TERMS,
+        many_picture=draw(many_bodies.NAME, picture) if (picture := many_bodies.chart(view.throughput)) is not None else "",
+        many_terms=throughput.TERMS,
         pictures={name: _pictures(name, of_scene, draw) for name, of_scene in charts.items()},
         default_method=DEFAULT_METHOD,
         durations=f"{long_runs.DURATIONS:g}",

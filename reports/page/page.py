@@ -18,10 +18,10 @@ from conservative.benchmarks.studies import long_runs
 from ..charts import spheres
 from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
 from ..charts.vega_embed import PageFigure
-from ..tables import engine_tables, overview, random_ratios
+from ..tables import engine_tables, overview, random_ratios, throughput
 from ..tables.cells import CONSERVED, SMALL
 from ..view import View
-from . import engines, random_bodies
+from . import engines, many_bodies, random_bodies
 from .figures import scene_figures
 from .scene_charts import SceneCharts
 
@@ -38,9 +38,14 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
     engine_figures = engines.figures(view.engines, of_engines)
     random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
+    many = many_bodies.chart(view.throughput)
+    many_figure = None if many is None else many_bodies.figure(many)
+    alone = [figure for figure in (random_figure, many_figure) if figure is not None]
     return _template().render(
         view=view,
         random_figure=random_figure,
+        many_figure=many_figure,
+        many_terms=throughput.TERMS,
         random_terms=random_ratios.TERMS,
         figures=figures,
         engine_figures=engine_figures,
@@ -49,11 +54,7 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         conserved=f"{CONSERVED:.0e}",
         small=f"{SMALL:.0e}",
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(
-            _charts(
-                [*([random_figure] if random_figure else []), *chain.from_iterable(figures.values()), *engine_figures.values()]
-            )
-        ),
+        charts=_in_script(_charts([*alone, *chain.from_iterable(figures.values()), *engine_figures.values()])),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,

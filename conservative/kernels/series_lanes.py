@@ -1,0 +1,244 @@
+"""Series steps (`series`) for several bodies at once: LLVM's vector code in which every lane is a body.
+
+A value is the registers of x, y and z, or one register where it is a scalar, so that shuffles are other names and no
+instructions. A processor that has nothing to wait for wants few operations: sums have one total for products that are added and
+for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body: after 100
+steps attitudes differ by some 1e-14, and as much faster as the motion itself lets two of them part.
+
+Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has a
+loop of its own, whose end the processor learns.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import cgutils
+
+from .lanes_llvm import REGISTER
+from .series import HIGHEST, LOWEST, find_terms, load_once, next_by_sums, outwards
+from .series_llvm import VolatileLoad
+from .traced import Axes
+
+LOOPS_FROM = 6
+MOST_STORED = 24 * (HIGHEST + 1)
+"""Registers that a step may keep in memory."""
+
+_VECTOR = ir.VectorType(ir.DoubleType(), REGISTER)
+_BYTES = 8 * REGISTER
+_INDEX = ir.IntType(64)
+
+
+class Emitter:
+    """Vector instructions by name, and memory for registers."""
+
+    def __init__(self, builder):
+        self._builder, self._stored, self._places = builder, 0, {}
+        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        self._fma = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fma.v{REGISTER}f64")
+        with builder.goto_entry_block():
+            memory = builder.alloca(_VECTOR, MOST_STORED)
+            memory.align = _BYTES
+            self._memory = builder.bitcast(memory, ir.IntType(8).as_pointer())
+
+    def find_next(self, *given):
+        """The next coefficients: another order's sums are formed while one waits for the newest."""
+        return next_by_sums(self, *given)
+
+    def _each(self, build, *values):
+        """What `build` makes of every component; a scalar has one for all of them."""
+        count = max(map(len, values))
+        return tuple(build(*parts) for parts in zip(*(v * (count // len(v)) for v in values), strict=True))
+
+    def constant(self, x):
+        """The number x."""
+        return (ir.Constant(_VECTOR, [x] * REGISTER),)
+
+    def plus(self, a, b):
+        """a + b"""
+        return self._each(self._builder.fadd, a, b)
+
+    def minus(self, a, b):
+        """a - b"""
+        return self._each(self._builder.fsub, a, b)
+
+    def times(self, a, b):
+        """a b"""
+        return self._each(self._builder.fmul, a, b)
+
+    def _fuse(self, a, b, c):
+        return self._builder.call(self._fma, [a, b, c])
+
+    def add(self, c, a, b):
+        """c + a b; c is None for 0."""
+        return self.times(a, b) if c is None else self._each(self._fuse, a, b, c)
+
+    def subtract(self, c, a, b):
+        """c - a b"""
+        return self._each(lambda a, b, c: self._fuse(self._builder.fneg(a), b, c), a, b, c)
+
+    def shuffle(self, v, places):
+        """The components of v at the first three of these places."""
+        return tuple(v[place] for place in places[:3])
+
+    def add_up(self, v):
+        """The sum of the components."""
+        x, y, z = ((part,) for part in v)
+        return self.plus(self.plus(x, y), z)
+
+    def store(self, v):
+        """Keep v; returns where: a place for each component, however often it is stored."""
+        return tuple(self._keep(part) for part in v)
+
+    def _keep(self, part):
+        if id(part) not in self._places:
+            place = self._stored
+            self._stored += 1
+            assert self._stored <= MOST_STORED
+            self._builder.store(part, self._address(_bytes(place * _BYTES)), align=_BYTES)
+            self._places[id(part)] = place, part
+        return self._places[id(part)][0]
+
+    def _address(self, byte):
+        return self._builder.bitcast(self._builder.gep(self._memory, [byte]), _VECTOR.as_pointer())
+
+    def load(self, places):
+        """What was stored there."""
+        return tuple(self._load_once(place) for place in places)
+
+    def _load_once(self, place):
+        found = VolatileLoad(self._builder.block, self._address(_bytes(place * _BYTES)), "")
+        self._builder._insert(found)
+        return found
+
+    def convolve(self, n, first, last, *sums, start=None):
+        """As `Straight.convolve`, with one total for both pairs of a sum, and old coefficients in a loop."""
+        totals, rest = [start] + [None] * (len(sums) - 1), outwards(n, first, last)
+        if n >= LOOPS_FROM:
+            totals, rest = self._sum_old(n, sums, totals), [i for i in (n, 0) if first <= i <= last]
+        for i in rest:
+            loaded = {}
+            totals = [
+                self._add_product(total, [tuple(load_once(loaded, *each) for each in ((x, i), (y, n - i))) for x, y in pairs])
+                for total, pairs in zip(totals, sums, strict=True)
+            ]
+        return totals
+
+    def _add_product(self, total, pairs):
+        total = self.add(total, *pairs[0])
+        return total if len(pairs) == 1 else self.subtract(total, *pairs[1])
+
+    def _sum_old(self, n, sums, totals):
+        """The totals with the products of i and n - i for i = 1 ... n-1."""
+        builder, step = self._builder, _line(sums[0][0][0])[1] * _BYTES
+        totals = [total or self.constant(0.0) * _width(*pairs[0]) for total, pairs in zip(totals, sums, strict=True)]
+        before, body, after = builder.block, *(builder.append_basic_block(f"{name}_{n}") for name in ("loop", "after"))
+        builder.branch(body)
+        builder.position_at_end(body)
+        i, phis = self._phi(_bytes(step), before), [self._phis(total, before) for total in totals]
+        j, loaded = builder.sub(_bytes(n * step), i), {}
+        found = [
+            self._add_product(total, [(self._load_at(loaded, x, i), self._load_at(loaded, y, j)) for x, y in pairs])
+            for total, pairs in zip(phis, sums, strict=True)
+        ]
+        following = builder.add(i, _bytes(step))
+        for phi, value in ((i, following), *zip(sum(phis, ()), sum(found, ()), strict=True)):
+            phi.add_incoming(value, body)
+        _keep_rolled(builder.module, builder.cbranch(builder.icmp_unsigned("<", following, _bytes(n * step)), body, after))
+        builder.position_at_end(after)
+        return found
+
+    def _phi(self, value, block):
+        phi = self._builder.phi(value.type)
+        phi.add_incoming(value, block)
+        return phi
+
+    def _phis(self, values, block):
+        return tuple(self._phi(value, block) for value in values)
+
+    def _load_at(self, loaded, history, byte):
+        """The coefficient of an order that varies, of which `byte` is the place behind order 0."""
+        return self.load_places(loaded, _line(history)[0], byte)
+
+    def load_places(self, loaded, places, byte):
+        """What lies behind the places by a number of bytes that varies; `loaded` has what was loaded before."""
+        for key in ((place, id(byte)) for place in places):
+            if key not in loaded:
+                at = self._address(self._builder.add(byte, _bytes(key[0] * _BYTES)))
+                loaded[key] = self._builder.load(at, align=_BYTES)
+        return tuple(loaded[place, id(byte)] for place in places)
+
+    def sum_terms(self, p, first, second):
+        """The sum of terms 1 to p, which varies, the last of them and the one before; the places of two terms are given."""
+        builder, step = self._builder, (second[0] - first[0]) * _BYTES
+        places = tuple(place - step // _BYTES for place in first)
+        before, body, after = builder.block, *(builder.append_basic_block(name) for name in ("sum", "sum_end"))
+        totals = self.load_places({}, first, _bytes(0))
+        last = builder.mul(p, _bytes(step))
+        builder.branch(body)
+        builder.position_at_end(body)
+        at, phis = self._phi(_bytes(2 * step), before), self._phis(totals, before)
+        found = self.plus(phis, self.load_places({}, places, at))
+        following = builder.add(at, _bytes(step))
+        for phi, value in ((at, following), *zip(phis, found, strict=True)):
+            phi.add_incoming(value, body)
+        _keep_rolled(builder.module, builder.cbranch(builder.icmp_unsigned("<=", following, last), body, after))
+        builder.position_at_end(after)
+        return found, self.load_places({}, places, last), self.load_places({}, first, builder.sub(last, _bytes(2 * step)))
+
+
+def _bytes(count):
+    return ir.Constant(_INDEX, count)
+
+
+def _width(x, y):
+    """How many components a product of two histories has."""
+    return max(len(x.places[1]), len(y.places[1]))
+
+
+def _line(history):
+    """Where order 0 of a history would lie if it lay like the others, and the distance of two orders."""
+    step = history.places[2][0] - history.places[1][0]
+    zero = tuple(place - step for place in history.places[1])
+    assert all(places == tuple(k + i * step for k in zero) for i, places in enumerate(history.places) if i)
+    return zero, step
+
+
+def _keep_rolled(module, branch):
+    """Let LLVM leave the loop that this branch ends as it is."""
+    rolled = module.add_metadata([ir.MetaDataString(module, "llvm.loop.unroll.disable")])
+    branch.set_metadata("llvm.loop", _Distinct(module, [rolled]))
+
+
+class _Distinct(ir.MDValue):  # type: ignore[misc]  # llvmlite has no types
+    """Metadata whose first operand is itself, as LLVM's loops have it."""
+
+    def __init__(self, module, rest):
+        super().__init__(module, rest, name=str(len(module.metadata)))
+
+    def descr(self, buf):
+        operands = ", ".join([f"!{self.name}", *(each.get_reference() for each in self.operands)])
+        buf += (f"distinct !{{ {operands} }}", "\n")
+
+
+def sum_to_order(series, numbers, p, h, start, K):
+    """What a step of order p and length h adds to g, a and w, and its last two terms (`series_llvm`); all of `traced`."""
+    builder, emit, end = p.builder, Emitter(p.builder), p.builder.append_basic_block("series_end")
+    field = series(emit, *map(_registers, numbers))
+    terms = find_terms(emit, _registers(h), tuple(map(_registers, start)), _registers(K), field)
+    places = []
+    for order, term in enumerate(terms, 1):
+        places.append(tuple(place for v in term for place in emit.store(v)))
+        if order == HIGHEST:
+            builder.branch(end)
+            break
+        if order >= LOWEST:
+            proceed = builder.append_basic_block(f"order_{order + 1}")
+            builder.cbranch(builder.icmp_signed("<=", p.ir, p.ir.type(order)), end, proceed)
+            builder.position_at_end(proceed)
+    builder.position_at_end(end)
+    found = emit.sum_terms(p.ir, *places[:2])
+    return tuple(tuple(Axes(*map(h.make, nine[k : k + 3])) for k in (0, 3, 6)) for nine in found)
+
+
+def _registers(v):
+    return tuple(part.ir for part in v) if isinstance(v, Axes) else (v.ir,)
