@@ -61,7 +61,7 @@ def _counting(name: str, kind: str) -> Callable[..., Any]:
 for _kind, _names in KINDS.items():
     for _name in _names:
         setattr(Counted, f"__{_name}__", _counting(_name, _kind))
-Counted.__neg__ = lambda self: Counted(float.__neg__(self))  # type: ignore[method-assign,assignment]
+Counted.__neg__ = lambda self: Counted(float.__neg__(self))  # type: ignore[method-assign]
 
 
 def count_value(value: Any) -> Any:

@@ -5,46 +5,49 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from time import thread_time
+from typing import Any
 
 import numpy as np
 
+from conservative.deferred_imports import kernels
 from conservative.kernels import kernel
-from conservative.kernels.lanes import WIDTH, fuse, load, save
 
+lanes: Any = kernels("lanes")
+WIDTH = lanes.WIDTH
 REPEATS = 200_000
 MEGABYTES = 256
 VALUES = 5
 """Values of two registers that a loop works on: enough to wait for none of them, and few enough to stay in registers."""
 
 
-@kernel
-def fuse_often(room, repeats):
+@kernel  # type: ignore[untyped-decorator]
+def fuse_often(room: Any, repeats: int) -> None:
     """VALUES products and sums, rounded once, as often as asked for."""
-    b, c = load(room, 0, WIDTH), load(room, WIDTH, WIDTH)
+    b, c = lanes.load(room, 0, WIDTH), lanes.load(room, WIDTH, WIDTH)
     v, w, x, y, z = c, c + c, c * c, b + c, b * c
     for _ in range(repeats):
-        v, w, x, y, z = fuse(v, b, c), fuse(w, b, c), fuse(x, b, c), fuse(y, b, c), fuse(z, b, c)
-    save(room, 0, v + w + x + y + z)
+        v, w, x, y, z = lanes.fuse(v, b, c), lanes.fuse(w, b, c), lanes.fuse(x, b, c), lanes.fuse(y, b, c), lanes.fuse(z, b, c)
+    lanes.save(room, 0, v + w + x + y + z)
 
 
-@kernel
-def divide_often(room, repeats):
+@kernel  # type: ignore[untyped-decorator]
+def divide_often(room: Any, repeats: int) -> None:
     """VALUES divisions, as often as asked for."""
-    b, c = load(room, 0, WIDTH), load(room, WIDTH, WIDTH)
+    b, c = lanes.load(room, 0, WIDTH), lanes.load(room, WIDTH, WIDTH)
     v, w, x, y, z = c, c + c, c * c, b + c, b * c
     for _ in range(repeats):
         v, w, x, y, z = b / v, b / w, b / x, b / y, b / z
-    save(room, 0, v + w + x + y + z)
+    lanes.save(room, 0, v + w + x + y + z)
 
 
-@kernel
-def root_often(room, repeats):
+@kernel  # type: ignore[untyped-decorator]
+def root_often(room: Any, repeats: int) -> None:
     """VALUES square roots, as often as asked for."""
-    b, c = load(room, 0, WIDTH), load(room, WIDTH, WIDTH)
+    b, c = lanes.load(room, 0, WIDTH), lanes.load(room, WIDTH, WIDTH)
     v, w, x, y, z = c, c + c, c * c, b + c, b * c
     for _ in range(repeats):
         v, w, x, y, z = math.sqrt(v), math.sqrt(w), math.sqrt(x), math.sqrt(y), math.sqrt(z)
-    save(room, 0, v + w + x + y + z)
+    lanes.save(room, 0, v + w + x + y + z)
 
 
 LOOPS = {"an FMA": fuse_often, "a division": divide_often, "a square root": root_often}

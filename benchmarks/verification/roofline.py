@@ -17,7 +17,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +100,7 @@ def count_all() -> dict[tuple[str, str, float], Work]:
     command = [sys.executable, "-W", "ignore", "-m", operations.__name__]
     printed = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
     found = {(name, kind, dt): read_work(counted) for name, kind, _, dt, counted in json.loads(printed)}
-    ((name, kind, dt), rest) = found.popitem()  # of Taylor, without its series
+    ((_, kind, dt), rest) = found.popitem()  # of Taylor, without its series
     for order in ORDERS:
         series = count_series(order)
         found[f"taylor:order={order}", kind, dt] = Work(
@@ -112,7 +112,8 @@ def count_all() -> dict[tuple[str, str, float], Work]:
 def reach(cases: Any, every: int = STEPS) -> dict[Any, float]:
     """Return the time, s, of a body-step of each case among `BODIES`, samples every so many steps."""
     runs = {
-        (name, kind, dt): registry.method(name).prepare_many(draw(kind, BODIES), Grid(dt, STEPS, every)) for name, kind, dt in cases
+        (name, kind, dt): registry.method(name).prepare_many(draw(kind, BODIES), Grid(dt, STEPS, every))
+        for name, kind, dt in cases
     }
     least = dict.fromkeys(runs, math.inf)
     for _ in range(1 + ROUNDS):
@@ -175,7 +176,7 @@ def machine() -> dict[str, str]:
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     load = os.getloadavg()[0]
-    date = datetime.now(timezone.utc).date().isoformat()
+    date = datetime.now(UTC).date().isoformat()
     return {"date": date, "processor": names[0] if names else "unknown", "load": f"{load:.1f}", "cores": str(os.cpu_count())}
 
 
@@ -185,9 +186,9 @@ Operations of one step of one body among many, what this processor could do with
 
     python -m conservative.benchmarks.verification.roofline --out benchmarks/roofline.md
 
-on {date}, on one of {cores} cores of a processor that calls itself {processor}, {width} doubles a register, with a load of {load}
-from all that ran on the machine. Times are processor time of one thread, the fastest of interleaved rounds; on a busy machine
-the shares mean more than the times.
+on {date}, on one of {cores} cores of a processor that calls itself {processor}, {width} doubles a register, while the load of
+the machine was {load}. Times are processor time of one thread, the fastest of interleaved rounds; on a busy machine the shares
+mean more than the times.
 
 ## What the processor could do
 
@@ -196,22 +197,22 @@ Loops of nothing but one operation, on ten registers:"""
 REACHED = f"""## What a step needs, and what it takes
 
 Multiplications (×), additions (+), divisions (÷) and square roots (√) of a step of one body, counted by running the kernels as
-plain Python on numbers that count; those of Taylor's series, in uniform gravity, by a formula: 15 products for each of p (p + 1)/2
-pairs of orders, and 18 an order. The bound is the time of as many FMAs as there are multiplications or additions, whichever are
-more, and of the divisions and square roots, as if nothing waited for anything, nothing was loaded or stored, and every addition
-went with a multiplication. Reached: {BODIES} bodies, {STEPS} steps, of which start and end are kept."""
+plain Python on numbers that count; those of Taylor's series, in uniform gravity, by a formula: 15 products for each of the
+p (p + 1)/2 pairs of orders, and 18 an order. The bound is the time of as many FMAs as there are multiplications or additions,
+whichever are more, and of the divisions and square roots, as if nothing waited for anything, nothing was loaded or stored, and
+every addition went with a multiplication. Reached: {BODIES} bodies, {STEPS} steps, of which start and end are kept."""
 
 SAMPLES = """## Samples
 
-A sample is {bytes} bytes, nine numbers of the attitude and three rates; writing them takes at least {bound:.1f} ns, by the bandwidth
-above. What keeping every step takes beside the step:"""
+A sample is {bytes} bytes, nine numbers of the attitude and three rates; writing them takes at least {bound:.1f} ns, by the
+bandwidth above. What keeping every step takes beside the step, which is a small difference where steps are long:"""
 
 GPU = """## What a GPU would give, on paper
 
 The same count at the published peak of two cards in double precision, in picoseconds a body-step, and, by their bandwidth, a
 sample. A division or a square root is taken for {dear} FMAs. Nothing of this was run: it leaves out what limits such cards in
-practice, bodies that need more corrections than their neighbours above all. A consumer card has a 64th of its units for double
-precision, so that a few dozen cores of a processor do as much; where samples are kept, memory is the limit of both."""
+practice, bodies that need more corrections than their neighbours above all. A consumer card does one operation in double
+precision for 64 in single; where every sample is kept, memory is the limit of both."""
 
 
 def main() -> None:

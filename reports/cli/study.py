@@ -40,7 +40,9 @@ COLUMNS = 7
 @click.option(
     "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="Engines in environments, too."
 )
-@click.option("--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each field, or of each kind.  [default: 10, 64]")
+@click.option(
+    "--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each field, or of each kind.  [default: 10, 64]"
+)
 @click.option("--seed", type=click.IntRange(0), metavar="S", help="Of the random bodies.  [default: 0]")
 @click.option("--sizes", multiple=True, metavar="N,M", help="Of throughput: numbers of bodies.  [default: 1,10,...,1e6]")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")

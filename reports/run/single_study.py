@@ -60,7 +60,9 @@ def plan_study(name: str, extent: Extent) -> Study:
 def _random(extent: Extent) -> Study:
     _require_drawn(extent)
     if extent.sizes:
-        raise BadInput("sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies")
+        raise BadInput(
+            "sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
+        )
     bodies = DEFAULT_BODIES if extent.bodies is None else extent.bodies
     found = selection.methods(extent.methods or None, extent.skip_missing, random.settings)
     methods = tuple(dict.fromkeys((*found, *_engines(extent))))
@@ -84,7 +86,7 @@ def _require_drawn(extent: Extent) -> None:
 
 
 def read_count(argument: str, text: str) -> int:
-    """Return the number that a text such as `1000` or `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
+    """Return the number that a text such as `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
     with suppress(ValueError, OverflowError):
         if (number := float(text)) >= 1 and number == int(number):
             return int(number)
