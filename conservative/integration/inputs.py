@@ -19,6 +19,11 @@ from ..scene import Scene
 RATES = "three finite rates (3,), rad/s"
 
 
+def only_body(scene: Scene) -> Bodies:
+    """Return the body of a scene as one of one."""
+    return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
+
+
 def read_bodies(
     scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
 ) -> Bodies:

@@ -1,11 +1,12 @@
 """Series steps (`series`) for several bodies at once: LLVM's vector code in which every lane is a body.
 
 A value is the registers of x, y and z, or one register where it is a scalar, so that shuffles are other names and no
-instructions. Sums run in the order of those for one body, which makes their rounding the same.
+instructions. A processor that has nothing to wait for wants few operations: sums have one total for products that are added and
+for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body: after 100
+steps attitudes differ by some 1e-14, and as much faster as the motion itself lets two of them part.
 
-Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has loops
-of its own, whose end the processor learns. In a loop the indices i and n - i are taken together, from the middle outwards, so
-that a coefficient which is loaded serves two products; and a loop forms no more sums than registers hold.
+Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has a
+loop of its own, whose end the processor learns.
 """
 
 from __future__ import annotations

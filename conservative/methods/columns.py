@@ -21,6 +21,8 @@ from .many import Block, Bodies, pause
 
 PIECE = 0.03
 """About how long a call of compiled code may take, s: between two of them, threads can be stopped."""
+LINE = 8
+"""Numbers in a line of the processor's first cache."""
 
 
 def find_unit_of_time(grid: Grid) -> float:
@@ -37,6 +39,13 @@ def fill_columns(rows: Array, width: int) -> Array:
     """Return the numbers (n, k) of n bodies as columns (k, m), m the next multiple of `width`, filled up with the last body."""
     missing = -len(rows) % width
     return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
+
+
+def make_room(rows: int, width: int) -> Array:
+    """Return room (rows, width) that begins where a line of the cache does: loading a number across two lines costs two."""
+    room = np.empty(rows * width + LINE)
+    first = -(room.ctypes.data // room.itemsize) % LINE
+    return room[first : first + rows * width].reshape(rows, width)
 
 
 def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
@@ -65,13 +74,14 @@ def take_pieces(n_steps: int, cost: float, take: Callable[[int, int], object]) -
         pause()
 
 
-def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array | None, R_BP: Array, finished: Array) -> Block:
-    """Return the samples in body axes.
+def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array | None, R_BP: Array, places: Any, n: int) -> Block:
+    """Return the samples of n bodies in body axes; those of k of them are known, which are at `places` (k,) among all.
 
-    Attitudes q (n, s, 4) and momenta L (n, s, 3) are in axes R_BP (n, 3, 3); L times J_inverse (n, 3) are rates, rad/s. `spin`
-    (n, 2) is what `PrincipalStart` has, of each body, or None.
+    Attitudes q (m, s, 4) and momenta L (m, s, 3), m not below k, are in axes R_BP (k, 3, 3); L times J_inverse (k, 3) are
+    rates, rad/s. `spin` (k, 2) is what `PrincipalStart` has, of each body, or None.
     """
-    n, s = q.shape[:2]
-    R_WB, w_WB_B = np.empty((n, s, 3, 3)), np.empty((n, s, 3))
-    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, np.require(R_BP, np.float64, ("C", "W")), R_WB, w_WB_B)
-    return Block(R_WB, w_WB_B, finished)
+    s = grid.n_samples
+    R_WB, w_WB_B = np.full((n, s, 3, 3), np.nan), np.full((n, s, 3), np.nan)
+    R_BP = np.require(R_BP, np.float64, ("C", "W"))
+    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, R_BP, places, R_WB, w_WB_B)
+    return Block(R_WB, w_WB_B, np.isin(np.arange(n), places))

@@ -47,6 +47,13 @@ class Bodies:
         parameters = {name: values[part] for name, values in self.parameters.items()}
         return Bodies(self.scene, self.R_WB0[part], self.w_WB_B0[part], inertia, parameters)
 
+    @cached_property
+    def first(self) -> Scene:
+        """The scene of body number 0, with what it keeps where it is the scene itself."""
+        scene = self.scene
+        same = self.R_WB0.base is scene.R_WB0 and self.w_WB_B0.base is scene.w_WB_B0
+        return scene if same and self.inertia is None and not self.parameters else self.take(0)
+
     def take(self, i: int) -> Scene:
         """Return the scene of body number i."""
         inertia = None if self.inertia is None else self.inertia[i]
