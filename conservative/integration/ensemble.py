@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -19,7 +20,9 @@ from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
 from . import pictures, tables
+from .blocks import BlockResult
 from .drifts import find_drifts, list_drifts
+from .store import open_store
 
 if TYPE_CHECKING:
     import altair
@@ -141,6 +144,27 @@ class Ensemble:
             drifts={name: values[part] for name, values in self.drifts.items()},
             failures={k: self.failures[i] for k, i in enumerate(numbers) if i in self.failures},
         )
+
+    def to_zarr(self, path: str | Path) -> None:
+        """Write the ensemble to a new folder, from which `open_ensemble(path)` reads it: see `conservative.integration.store`.
+
+        Raises
+        ------
+        BadInput
+            There is something.
+        NotWritten
+            It cannot be written, or the disk is full.
+        MissingExtra
+            Zarr, of the extra `ensembles`, is not installed.
+        """
+        with open_store(path, self.label, self.bodies, self.grid) as store:
+            for first in range(0, len(self), store.block):
+                store.write(first, self._take_block(slice(first, first + store.block)))
+
+    def _take_block(self, part: slice) -> BlockResult:
+        drifts = np.stack([values[part] for values in self.drifts.values()], axis=1)
+        failures = {i - part.start: failure for i, failure in self.failures.items() if part.start <= i < part.stop}
+        return BlockResult(self.R_WB[part], self.w_WB_B[part], drifts, failures)
 
     def __len__(self) -> int:
         return len(self.bodies)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import entry, kernel
+from . import entry, kernel, small
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
 from .twofold import minus, over, plus, scale, times, two
@@ -157,7 +157,7 @@ def split_step(g2, g3, B, h):
             call_handlers()
 
 
-@kernel
+@small
 def turn(a, b, gamma, w):
     """Quaternion d of the step, q1 = q d, where alpha1 = a[0] alpha + b[0] alpha' and beta1 = a[1] beta + b[1] beta'.
 
@@ -174,7 +174,7 @@ def turn(a, b, gamma, w):
     return (m + z, n * w0 - y, n * w1 + x, n * w2 - r)
 
 
-@kernel
+@small
 def unit_vertical(q):
     """The last row of the matrix of a unit quaternion."""
     return (
@@ -184,7 +184,7 @@ def unit_vertical(q):
     )
 
 
-@kernel
+@small
 def restore_invariants(E, z, k, rate, gamma, w):
     """Smallest change (dw0, dw1) of w and small turn (3,) of the attitude that bring w.gamma back to z and the energy to E.
 
@@ -205,35 +205,88 @@ def restore_invariants(E, z, k, rate, gamma, w):
     ab = a0 * w0 + a1 * w1 + a2 * b2 + a3 * b3
     bb = w0 * w0 + w1 * w1 + b2 * b2 + b3 * b3
     damping = DAMPING * rate * rate
-    aa += damping
-    bb += damping
+    aa, bb = aa + damping, bb + damping
     inverse = 1.0 / (aa * bb - ab * ab)
     m, n = inverse * (bb * r - ab * s), inverse * (aa * s - ab * r)
     return (rate * (m * a0 + n * w0), rate * (m * a1 + n * w1)), (m * a2 + n * b2, m * a3 + n * b3, m * a4)
 
 
+class Part(NamedTuple):
+    """Constants of a part of a step: of the motion (E to w2, and `rate`, which residuals are scaled by), then of the length."""
+
+    E: Any
+    z: Any
+    k: Any
+    nu: Any
+    x0: Any
+    w2: Any
+    rate: Any
+    p_h: Any
+    dp_h: Any
+    ya: Any
+    da: Any
+    yb: Any
+    db: Any
+    ym: Any
+    dm: Any
+    ca: Any
+    cb: Any
+    cm: Any
+    cos: Any
+    sin: Any
+
+
 @kernel
-def march(model, coefficients, workspace):
-    """Take the steps (`protocol`), each in as many equal parts as `split_step` says, which count as stages."""
-    J, kappa, q0, L0 = model
-    h = coefficients.h
-    n_steps, every, pause, q_out, L_out = workspace
-    gamma = unit_vertical(q0)
-    E_, z_, spin_, nu_, x0_, g2, g3, B = curve(J, kappa, gamma, L0)
+def divide_step(model, h):
+    """How many equal parts a step is taken in (`split_step`), and the constants of one."""
+    J, kappa, q, L = model
+    E, z, spin, nu, x0, g2, g3, B = curve(J, kappa, unit_vertical(q), L)
     parts, p_h, dp_h, f = split_step(g2, g3, B, h)
     h /= parts
-    E, z, w2, nu, x0 = E_[0], z_[0], spin_[0], nu_[0], x0_[0]
-    k = kappa / J
     rate = scale_of(g2, g3, B)
     rate = rate if rate > 0.0 else 1.0 / h
     (ya, da), (yb, db), (ym, dm) = (f[0, 0], f[0, 1]), (f[1, 0], f[1, 1]), (f[2, 0], f[2, 1])
     ca, cb, cm = p_h + B[0, 0], p_h + B[1, 0], p_h + B[2, 0]
-    third = 1.0 / 3.0
+    w2 = spin[0]
     half = 0.5 * w2
     cos, sin = math.cos(half * h), math.sin(half * h)
-    q = q0
+    return parts, Part(E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin)
+
+
+@small
+def advance(c, q, gamma, w0, w1):
+    """Take a part of a step: of the attitude q, the vertical gamma in its axes, and the rates across the axis."""
+    third, half = 1.0 / 3.0, 0.5 * c.w2
+    g0, g1, g2 = gamma
+    x = c.nu * g2 + c.x0
+    S = 0.5 * (c.nu * (g0 * w1 - g1 * w0) - c.dp_h) / (x - c.p_h)
+    a = ((c.ya * (c.ca + x) - c.da * S) * third, (c.yb * (c.cb + x) - c.db * S) * third)
+    b = ((c.da - c.ya * S) * third, (c.db - c.yb * S) * third)
+    d = turn(a, b, gamma, (w0, w1, c.w2))
+    am, bm = (c.ym * (c.cm + x) - c.dm * S) * third, (c.dm - c.ym * S) * third
+    m0, m1 = am * w0 + bm * (c.k * g1 - half * w1), am * w1 + bm * (half * w0 - c.k * g0)
+    w0, w1 = c.cos * m0 + c.sin * m1, c.cos * m1 - c.sin * m0
+    q = product(q, d)
+    gamma = unit_vertical(q)
+    dw, t = restore_invariants(c.E, c.z, c.k, c.rate, gamma, (w0, w1, c.w2))
+    w0, w1 = w0 + dw[0], w1 + dw[1]
+    # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
+    # gamma must be of unit length: left alone, an error of its length would grow from step to step.
+    size = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    half_size = 0.5 * size
+    q = product(q, (size, half_size * t[0], half_size * t[1], half_size * t[2]))
+    return q, scale_vector(size * size, add(gamma, cross(gamma, t))), w0, w1
+
+
+@kernel
+def march(model, coefficients, workspace):
+    """Take the steps (`protocol`), each in as many equal parts as `split_step` says, which count as stages."""
+    J, _, q, L0 = model
+    n_steps, every, pause, q_out, L_out = workspace
+    gamma = unit_vertical(q)
+    parts, c = divide_step(model, coefficients.h)
     w0, w1 = L0[0] / J, L0[1] / J
-    q_out[0, :] = q0
+    q_out[0, :] = q
     L_out[0, :] = L0
     row = 0
     done, block = 0, -(-pause // parts)
@@ -241,25 +294,7 @@ def march(model, coefficients, workspace):
         last = end_of_block(done, n_steps, block)
         for step in range(done + 1, last + 1):
             for _ in range(parts):
-                g0, g1, g2_ = gamma
-                x = nu * g2_ + x0
-                S = 0.5 * (nu * (g0 * w1 - g1 * w0) - dp_h) / (x - p_h)
-                a = ((ya * (ca + x) - da * S) * third, (yb * (cb + x) - db * S) * third)
-                b = ((da - ya * S) * third, (db - yb * S) * third)
-                d = turn(a, b, gamma, (w0, w1, w2))
-                am, bm = (ym * (cm + x) - dm * S) * third, (dm - ym * S) * third
-                m0, m1 = am * w0 + bm * (k * g1 - half * w1), am * w1 + bm * (half * w0 - k * g0)
-                w0, w1 = cos * m0 + sin * m1, cos * m1 - sin * m0
-                q = product(q, d)
-                gamma = unit_vertical(q)
-                dw, t = restore_invariants(E, z, k, rate, gamma, (w0, w1, w2))
-                w0, w1 = w0 + dw[0], w1 + dw[1]
-                # Normalised and turned at once, and gamma turned along: t is a rounding error, its square is nothing.
-                # gamma must be of unit length: left alone, an error of its length would grow from step to step.
-                size = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-                half_size = 0.5 * size
-                q = product(q, (size, half_size * t[0], half_size * t[1], half_size * t[2]))
-                gamma = scale_vector(size * size, add(gamma, cross(gamma, t)))
+                q, gamma, w0, w1 = advance(c, q, gamma, w0, w1)
             if step % every == 0 or step == n_steps:
                 row += 1
                 q_out[row, :] = q

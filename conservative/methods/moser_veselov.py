@@ -115,7 +115,7 @@ class MoserVeselov(_Fields, Method):
         except BadInput:  # in units of our own
             raise BadInput("dt", f"{grid.dt:g}, for which {self.name} has no step", "a shorter step") from None
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany:
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
         return prepare_lanes(self, bodies, grid)
 
     @in_own_units
@@ -139,7 +139,7 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, Princ
     return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
-def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany:
+def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany | None:
     """Return the run of many bodies with `conservative.kernels.moser_veselov_many`."""
     kernel, n, s = kernels("moser_veselov_many"), len(bodies), grid.n_samples
     time = find_unit_of_time(grid)
@@ -147,7 +147,10 @@ def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany:
     limits = longest, (LONGEST_SHIFT if method.order is None else math.inf), SMALLEST_CN
     columns = -(-n // kernel.WIDTH) * kernel.WIDTH
     table, start = np.empty((kernel.ROWS, columns)), np.empty((kernel.STATE_ROWS, columns))
-    kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
+    try:
+        kernel.prepare(*find_given(bodies), time, grid.dt / time, method.order or 0, limits, table, start)
+    except (ArithmeticError, ValueError):  # in plain Python only: compiled, a body without a step has nan
+        return None
     finished = table[kernel.FINISHED, :n] == 1
 
     def run() -> Block:

@@ -21,6 +21,7 @@ from .columns import (
     find_unit_of_time,
     find_units_of_moments,
     in_gravity_or_free,
+    make_room,
     moments_of_gravity,
     take_pieces,
     turn_samples,
@@ -157,16 +158,18 @@ def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
     J, L0 = moments / units, bodies.L_P0 / units * time
     columns = fill_columns(np.concatenate([J, 1 / J], axis=1), kernel.WIDTH)
     field = None if bodies.scene.free else fill_columns(moments_of_gravity(bodies, R_BP) / units * time * time, kernel.WIDTH)
-    states, q, L = np.empty((kernel.ROWS, columns.shape[1])), np.empty((n, s, 4)), np.empty((n, s, 3))
+    starts, room = np.zeros((kernel.ROWS, columns.shape[1])), make_room(kernel.ROOM, kernel.WIDTH)
+    starts[:7] = fill_columns(np.concatenate([bodies.q_WP0, L0], axis=1), kernel.WIDTH)
+    q, L = np.empty((columns.shape[1], s, 4)), np.empty((columns.shape[1], s, 3))
+    q[:n, 0], L[:n, 0] = bodies.q_WP0, L0
 
     def run() -> Block:
-        finished = np.ones(columns.shape[1], dtype=bool)
-        kernel.start(bodies.q_WP0, L0, states, q, L)
+        states, finished = starts.copy(), np.ones(columns.shape[1], dtype=bool)
 
         def take(done: int, last: int) -> None:
-            kernel.enter(lengths, tol, columns, field, states, done, last, grid.n_steps, grid.every, q, L, finished)
+            kernel.march(lengths, tol, columns, field, states, room, done, last, grid.n_steps, grid.every, q, L, finished)
 
         take_pieces(grid.n_steps, BODY_STEP * len(lengths) * n, take)
-        return turn_samples(grid, q, L, 1 / J / time, None, R_BP, finished[:n])
+        return replace(turn_samples(grid, q, L, (1 / J / time, None, R_BP), np.arange(n), n), finished=finished[:n])
 
     return run

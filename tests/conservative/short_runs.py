@@ -19,11 +19,13 @@ import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
 from conservative.method import Grid, Method
+from conservative.methods.many import Block, Bodies
 
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in ("signals", "simd", "simd_llvm", "series_llvm")))
+MACHINE_CODE = ("signals", "simd", "simd_llvm", "series_llvm", "lanes_llvm")
+OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in MACHINE_CODE))
 """Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
 BASES = ("at_time", "axial_constants", "axial_energy", "start_series", "finite_torque", "energy", "body_torque")
 BASES += ("finite_derivative", "slope", "implements")
@@ -75,7 +77,7 @@ METHODS: tuple[Method, ...] = (
 )
 
 
-def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
+def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
     """Yield names and runs: short steps, and steps so long that a branch must be continued or ends."""
     for scene in scenes():
         for method in METHODS:
@@ -84,13 +86,26 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory]]]:
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
+            for factor, n in ((1, 33), (40, 3)):
+                dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
+                yield f"{scene.name}, {method.name}, many, {factor}", partial(run_many, scene, method, Grid(dt, n, 16))
         yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_eval=(0.3 * scene.dt, 7.7 * scene.dt))
 
 
-def numbers(trajectory: cv.Trajectory) -> np.ndarray:
-    """Attitudes and rates, relative to the largest, and steps, as one array."""
-    size = np.linalg.norm(trajectory.w_WB_B, axis=1).max() or 1.0
-    return np.concatenate([trajectory.R_WB.ravel(), trajectory.w_WB_B.ravel() / size, [trajectory.counters.steps]])
+def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
+    """Three bodies at once, which start at rates of their own; None where the method runs them one by one."""
+    bodies = Bodies(scene, np.tile(scene.R_WB0, (3, 1, 1)), np.outer((1.0, 0.9, -1.1), scene.w_WB_B0), None, {})
+    run = method.prepare_many(bodies, grid)
+    return run and run()
+
+
+def numbers(found: cv.Trajectory | Block | None) -> np.ndarray:
+    """Attitudes and rates, relative to the largest, and steps, or who finished, as one array."""
+    if found is None:
+        return np.empty(0)
+    size = np.linalg.norm(found.w_WB_B, axis=-1).max() or 1.0
+    ends = found.finished if isinstance(found, Block) else [found.counters.steps]
+    return np.concatenate([found.R_WB.ravel(), found.w_WB_B.ravel() / size, ends])
 
 
 def functions() -> dict[str, str]:
