@@ -205,8 +205,7 @@ def restore_invariants(E, z, k, rate, gamma, w):
     ab = a0 * w0 + a1 * w1 + a2 * b2 + a3 * b3
     bb = w0 * w0 + w1 * w1 + b2 * b2 + b3 * b3
     damping = DAMPING * rate * rate
-    aa += damping
-    bb += damping
+    aa, bb = aa + damping, bb + damping
     inverse = 1.0 / (aa * bb - ab * ab)
     m, n = inverse * (bb * r - ab * s), inverse * (aa * s - ab * r)
     return (rate * (m * a0 + n * w0), rate * (m * a1 + n * w1)), (m * a2 + n * b2, m * a3 + n * b3, m * a4)
@@ -251,9 +250,7 @@ def divide_step(model, h):
     w2 = spin[0]
     half = 0.5 * w2
     cos, sin = math.cos(half * h), math.sin(half * h)
-    return parts, Part(
-        E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin
-    )
+    return parts, Part(E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin)
 
 
 @small

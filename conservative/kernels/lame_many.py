@@ -8,64 +8,60 @@ from __future__ import annotations
 
 from . import entry, small
 from .lame import Model, Part, advance, divide_step, unit_vertical
-from .lanes import WIDTH, choose, load, load_rows, save_rows
-from .vector import choose_vector
+from .lanes import WIDTH, choose, load, load_rows, save_columns, save_rows
 
-CONSTANTS = 22
-"""A body's constants: those of `Part`, the number of parts of a step, and the moment across the axis."""
-ROWS = 32
-"""Numbers of a body: its constants, attitude (4), vertical (3), rates across the axis (2), and momentum along it."""
+PARTS, CONSTANTS, ROWS = 20, 22, 32
+"""Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across
+the axis, then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
+constants, and all."""
 
 
 @entry
 def prepare(J, kappa, q, L, h, table):
     """Fill the table (ROWS, m) of n bodies, m not below n: moments J (n,), kappa (n,), q (n, 4) and L (n, 3) as in `Model`.
 
-    The columns that are left repeat the last body. Returns the largest number of parts of a step.
+    The columns that are left repeat the last body.
     """
-    most, n = 1, len(J)
+    n = len(J)
     for i in range(n):
         q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
         parts, part = divide_step(Model(J[i], kappa[i], q0, L0), h)
-        most = max(most, parts)
         gamma = unit_vertical(q0)
-        state = (*q0, *gamma, L0[0] / J[i], L0[1] / J[i], L0[2])
-        row = 0
-        for x in (*part, float(parts), J[i], *state):
+        state = q0 + gamma + (L0[0] / J[i], L0[1] / J[i], L0[2])
+        for row, x in enumerate((*part[:], float(parts), J[i], *state)):
             table[row, i] = x
-            row += 1
     for i in range(n, table.shape[1]):
         for row in range(ROWS):
             table[row, i] = table[row, n - 1]
-    return most
 
 
 @small
 def take_step(c, parts, least, most, q, gamma, w0, w1):
     """Take a step of so many parts, which differ from lane to lane: `least` of them at least, `most` at most."""
-    for _ in range(least):
-        q, gamma, w0, w1 = advance(c, q, gamma, w0, w1)
-    for part in range(least, most):
-        left = parts > float(part)
+    for part in range(most):
         q1, gamma1, v0, v1 = advance(c, q, gamma, w0, w1)
-        q = (*choose_vector(left, q1[:3], q[:3]), choose(left, q1[3], q[3]))
-        gamma, w0, w1 = choose_vector(left, gamma1, gamma), choose(left, v0, w0), choose(left, v1, w1)
+        if part < least:
+            q, gamma, w0, w1 = q1, gamma1, v0, v1
+        else:
+            left = parts > float(part)
+            q, gamma, w0, w1 = choose(left, q1, q), choose(left, gamma1, gamma), choose(left, v0, w0), choose(left, v1, w1)
     return q, gamma, w0, w1
 
 
 @entry
-def march(table, done, last, n_steps, every, room, q_out, L_out):
+def march(table, done, last, n_steps, every, q_out, L_out):
     """Take the steps after `done` up to `last` of n_steps: of all bodies of the table of `prepare`, WIDTH at a time.
 
-    Samples of the first bodies go to q_out (., samples, 4) and L_out (., samples, 3), by way of `room` (8, WIDTH).
+    Samples go to q_out (n, samples, 4) and L_out (n, samples, 3).
     """
-    n, flat, place = table.shape[1], table.reshape(-1), room.reshape(-1)
+    n, flat = table.shape[1], table.reshape(-1)
+    q_flat, L_flat, samples = q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
     for i in range(0, n, WIDTH):
-        c = Part(*load_rows(flat, i, n, 20, WIDTH))
-        parts, J = load(flat, i + 20 * n, WIDTH), load(flat, i + 21 * n, WIDTH)
-        least, most = table[20, i], table[20, i]
+        c = Part(*load_rows(flat, i, n, PARTS, WIDTH))
+        parts, J = load(flat, i + PARTS * n, WIDTH), load(flat, i + (PARTS + 1) * n, WIDTH)
+        least, most = table[PARTS, i], table[PARTS, i]
         for lane in range(1, WIDTH):
-            least, most = min(least, table[20, i + lane]), max(most, table[20, i + lane])
+            least, most = min(least, table[PARTS, i + lane]), max(most, table[PARTS, i + lane])
         state = load_rows(flat, i + CONSTANTS * n, n, 10, WIDTH)
         q, gamma, w0, w1, L2 = state[:4], state[4:7], state[7], state[8], state[9]
         row, until_sample = done // every, every - done % every
@@ -75,10 +71,7 @@ def march(table, done, last, n_steps, every, room, q_out, L_out):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                save_rows(place, 0, WIDTH, (*q, J * w0, J * w1, L2))
-                for lane in range(min(WIDTH, len(q_out) - i)):
-                    for k in range(4):
-                        q_out[i + lane, row, k] = room[k, lane]
-                    for k in range(3):
-                        L_out[i + lane, row, k] = room[4 + k, lane]
-        save_rows(flat, i + CONSTANTS * n, n, (*q, *gamma, w0, w1, L2))
+                to = i * samples + row
+                save_columns(q_flat, 4 * to, 4 * samples, q)
+                save_columns(L_flat, 3 * to, 3 * samples, (J * w0, J * w1, L2))
+        save_rows(flat, i + CONSTANTS * n, n, q + gamma + (w0, w1, L2))

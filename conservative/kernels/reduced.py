@@ -28,7 +28,7 @@ from .fields import body_torque, finite_torque
 from .lanes import choose, every, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
-from .vector import accumulate, add, apply, choose_vector, cross, dot, inverse, invert, scale, subtract, times, turn
+from .vector import accumulate, add, apply, cross, dot, inverse, invert, scale, subtract, times, turn
 
 FAILURE = "no continuous solution"
 """Why a step fails."""
@@ -171,7 +171,7 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
     while iterations < FEW and not every(enough):
         new_rows, new_over = invert(tangent(h, J, field, q, a))
         correction = apply(new_rows, residual(h, J, field, q, L, a))
-        a = choose_vector(enough, a, subtract(a, correction))
+        a = choose(enough, a, subtract(a, correction))
         rows = choose_rows(enough, rows, new_rows)
         over = choose(enough, over, new_over)
         square = dot(correction, correction)
@@ -186,7 +186,7 @@ def newton_solve(h, J, field, q, L, carry, guess, near, tolerance):
 @small
 def choose_rows(mask, a, b):
     """The rows of one matrix or the other, in each lane."""
-    return choose_vector(mask, a[0], b[0]), choose_vector(mask, a[1], b[1]), choose_vector(mask, a[2], b[2])
+    return choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2])
 
 
 @kernel
@@ -308,10 +308,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
     for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
             h = lengths[stage]
-            if known >= 6:
-                a = guess_ahead(past)
-            else:
-                a = explicit_guess(h, J_inverse, field, q, L)
+            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, field, q, L)
             a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:

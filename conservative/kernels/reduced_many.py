@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from . import entry, kernel, small
 from .fields import Uniform
-from .lanes import WIDTH, choose, every, fill_like, lane_of, load_rows, save_rows, with_lane
+from .lanes import WIDTH, choose, every, fill_like, lane_of, load_rows, save_columns, save_rows, with_lane
 from .reduced import NEAR, SMOOTH, add_momentum, continue_branch, explicit_guess, guess_ahead, newton_solve, turn_attitude
-from .vector import choose_vector, dot, subtract
+from .vector import dot, subtract
 
 ROWS = 33
 """Numbers of a body's state: q (4), L (3), what their sums lost (4, 3), how many solutions fit on each other, and the last six
 of them (18), newest first."""
-ROOM = 37
-"""Rows of a room that a run works in: those solutions twice but for the newest, and samples."""
-PAST = 5
-"""Solutions that are kept in a ring, from the second newest on."""
+PAST, ROOM = 5, 30
+"""Solutions that are kept in a ring, from the second newest on, and its rows: all of them are there twice."""
 
 
 @small
@@ -75,13 +73,13 @@ def march(lengths, tolerance, moments, moment, states, room, done, last, n_steps
     """Take the steps after `done` up to `last` of n_steps: of all bodies, WIDTH at a time.
 
     lengths (stages,) are those of a step, s; moments (6, n) the principal moments, kg m^2, and their inverses, moment (3, n)
-    that of uniform gravity, N m, or None; states (ROWS, n). Samples of the first bodies go to q_out (., samples, 4) and L_out
-    (., samples, 3), by way of `room` (ROOM, WIDTH), and `finished` (n,) is made False where a body has no solution.
+    that of uniform gravity, N m, or None; states (ROWS, n); `room` (ROOM, WIDTH) is worked in. Samples go to q_out (n, samples,
+    4) and L_out (n, samples, 3), and `finished` (n,) is made False where a body has no solution.
     """
     n, stages = moments.shape[1], len(lengths)
     tolerance = tolerance ** (2.0 / 3.0)
     all_moments, all_states = moments.reshape(-1), states.reshape(-1)
-    ring, samples = room.reshape(-1), 6 * PAST
+    ring, q_flat, L_flat, samples = room.reshape(-1), q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
     for i in range(0, n, WIDTH):
         J_and_inverse = load_rows(all_moments, i, n, 6, WIDTH)
         J, J_inverse = J_and_inverse[:3], J_and_inverse[3:]
@@ -103,7 +101,7 @@ def march(lengths, tolerance, moments, moment, states, room, done, last, n_steps
                 enough = known >= 6.0
                 a = guess_ahead(load_past(ring, place, newest))
                 if not every(enough):
-                    a = choose_vector(enough, a, explicit_guess(h, J_inverse, field, q, L))
+                    a = choose(enough, a, explicit_guess(h, J_inverse, field, q, L))
                 a, gain, _, _, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
                 if not every(trusted):
                     a, gain, L, L_carry = solve_alone(
@@ -121,11 +119,8 @@ def march(lengths, tolerance, moments, moment, states, room, done, last, n_steps
             if until_sample == 0 or step == n_steps:
                 until_sample = every_step
                 row += 1
-                save_rows(ring, samples * WIDTH, WIDTH, q + L)
-                for lane in range(min(WIDTH, len(q_out) - i)):
-                    for k in range(4):
-                        q_out[i + lane, row, k] = room[samples + k, lane]
-                    for k in range(3):
-                        L_out[i + lane, row, k] = room[samples + 4 + k, lane]
+                to = i * samples + row
+                save_columns(q_flat, 4 * to, 4 * samples, q)
+                save_columns(L_flat, 3 * to, 3 * samples, L)
         save_rows(all_states, i, n, q + L + q_carry + L_carry + (known,) + newest)
         save_rows(all_states, i + 18 * n, n, load_rows(ring, 3 * place * WIDTH, WIDTH, 15, WIDTH))

@@ -56,8 +56,14 @@ def to_body_axes(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
 
 
 @entry
-def of_many(t, q, L, J_inverse, spin, R_BP, R_WB, w_WB_B):
-    """`to_body_axes` of n bodies: all arrays have one more axis in front; spin is (n, 2) or None."""
-    for i in range(len(q)):
-        own = None if spin is None else (spin[i, 0], spin[i, 1])
-        to_body_axes(t, q[i], L[i], J_inverse[i], own, R_BP[i], R_WB[i], w_WB_B[i])
+def of_many(t, q, L, J_inverse, spin, R_BP, places, R_WB, w_WB_B):
+    """`to_body_axes` of k bodies, whose places among n are `places` (k,): all other arrays have one more axis in front.
+
+    R_WB and w_WB_B are of all n bodies, q and L of k or more; spin is (k, 2) or None.
+    """
+    for i in range(len(places)):
+        J, to = (J_inverse[i, 0], J_inverse[i, 1], J_inverse[i, 2]), places[i]
+        if spin is None:
+            to_body_axes(t, q[i], L[i], J, None, R_BP[i], R_WB[to], w_WB_B[to])
+        else:
+            to_body_axes(t, q[i], L[i], J, (spin[i, 0], spin[i, 1]), R_BP[i], R_WB[to], w_WB_B[to])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from . import small
-from .lanes import choose, fuse
+from .lanes import fuse
 
 
 @small
@@ -62,12 +62,6 @@ def turn(q, v):
         fuse(q[0], v[1], fuse(q[3], v[0], -(q[1] * v[2]))),
         fuse(q[0], v[2], fuse(q[1], v[1], -(q[2] * v[0]))),
     )
-
-
-@small
-def choose_vector(mask, a, b):
-    """a or b, in each lane if these are lanes."""
-    return (choose(mask, a[0], b[0]), choose(mask, a[1], b[1]), choose(mask, a[2], b[2]))
 
 
 @small

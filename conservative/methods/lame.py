@@ -31,7 +31,7 @@ rotations and kicks have a truncation error and bound the energy only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -45,11 +45,10 @@ from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
-from .columns import fill_columns, find_unit_of_time, find_units_of_moments, in_gravity_or_free, make_room, moments_of_gravity
-from .columns import take_pieces, turn_samples
+from .columns import find_unit_of_time, find_units_of_moments, in_gravity_or_free, moments_of_gravity, take_pieces, turn_samples
 from .many import Block, Bodies, RunMany
 from .non_spinning import frame_unsupported
-from .principal_axes import PrincipalStart, principal_start
+from .principal_axes import PrincipalStart, principal_start, slow_axes, spin_rate, start_along
 from .run_kernel import prepare_run
 from .units import bound_rate, in_own_units
 
@@ -131,38 +130,111 @@ PART = 1.5e-8
 
 @dataclass(frozen=True, eq=False)
 class Tops:
-    """Starts of n tops in the frame that does not spin, as `PrincipalStart` has them, and the weight times lever arm, N m."""
+    """n tops at the start, in the frame that does not spin.
 
-    J: Array
+    Attributes
+    ----------
+    places
+        Which of the bodies (n,) they are.
+    J1, J3
+        Moments (n,) across and along the axis, kg m^2.
+    kappa
+        Weights times lever arms (n,), N m.
+    q, L
+        Attitudes (n, 4), scalar first, and momenta (n, 3), kg m^2/s.
+    R_BP
+        Rotations (n, 3, 3) from the frame's axes to those of the body.
+    """
+
+    places: Any
+    J1: Array
+    J3: Array
     kappa: Array
     q: Array
     L: Array
     R_BP: Array
-    spin: Array
+
+    def __getitem__(self, part: Any) -> Tops:
+        return Tops(*(getattr(self, each.name)[part] for each in fields(self)))
+
+    @property
+    def spin(self) -> Array:
+        """Rates (n, 2) about the axis that the frame lacks, rad/s, and 1/J3."""
+        return np.stack([spin_rate(self.J1, self.J3, self.L[:, 2]), 1 / self.J3], axis=1)
+
+    @property
+    def rate(self) -> Array:
+        """Rates (n,), rad/s, as `bound_rate` has them of scenes."""
+        kinetic = (self.L[:, 0] ** 2 + self.L[:, 1] ** 2) / self.J1 + self.L[:, 2] ** 2 / self.J3
+        return np.sqrt((kinetic + 2 * np.abs(self.kappa)) / np.minimum(self.J1, self.J3))
+
+    def convert(self, units: Array, time: float) -> Tops:
+        """Return them in other units of moments (n,), kg m^2, and of time, s."""
+        kappa, L = self.kappa / units * time * time, self.L / units[:, None] * time
+        return Tops(self.places, self.J1 / units, self.J3 / units, kappa, self.q, L, self.R_BP)
 
 
 def prepare_lanes(method: Lame, bodies: Bodies, grid: Grid) -> RunMany | None:
     """Return the run of many tops with `conservative.kernels.lame_many`; None where none of them has such a step."""
-    kernel, n, s = kernels("lame_many"), len(bodies), grid.n_samples
-    chosen, tops = find_tops(bodies, method, grid)
-    if not len(chosen):
+    kernel, n, time = kernels("lame_many"), len(bodies), find_unit_of_time(grid)
+    tops, h = find_tops(method, bodies), grid.dt / time
+    if tops is not None:
+        with np.errstate(all="ignore"):  # whose numbers overflow is not among the tops that are left
+            tops = tops.convert(find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1)), time)
+            tops = tops[tops.rate * h <= MOST_RADIANS]
+    if tops is None or not len(tops.places):
         return None
-    time, units = find_unit_of_time(grid), find_units_of_moments(tops.J[:, None])
-    J, L0, m = tops.J / units, tops.L / units[:, None] * time, -(-len(chosen) // kernel.WIDTH) * kernel.WIDTH
-    table = np.empty((kernel.ROWS, m))
-    most = kernel.prepare(J, tops.kappa / units * time * time, tops.q, L0, grid.dt / time, table)
+    table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
+    kernel.prepare(tops.J1, tops.kappa, tops.q, tops.L, h, table)
+    # Those with as many parts of a step side by side, so that few lanes wait for others.
+    order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
+    tops, table[:, : len(order)] = tops[order], table[:, order]
+    return march_tops(tops, table, grid, n)
+
+
+def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
+    """Return the run of prepared tops, of n bodies; moments are in units of their own, times in those of the step."""
+    kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
-    q[: len(chosen), 0], L[: len(chosen), 0] = tops.q, L0
-    finished = np.isin(np.arange(n), chosen)
+    q[:k, 0], L[:k, 0] = tops.q, tops.L
+    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
+    cost = PART * m * float(table[kernel.PARTS].max())
 
     def run() -> Block:
         states = table.copy()
-
-        def take(done: int, last: int) -> None:
-            kernel.march(states, done, last, grid.n_steps, grid.every, q, L)
-
-        take_pieces(grid.n_steps, PART * most * n, take)
-        rates = np.repeat(1 / J / time, 3).reshape(-1, 3)
-        return spread(turn_samples(grid, q, L, rates, tops.spin, tops.R_BP), finished)
+        take_pieces(grid.n_steps, cost, lambda done, last: kernel.march(states, done, last, grid.n_steps, grid.every, q, L))
+        return turn_samples(grid, q, L, turn, tops.places, n)
 
     return run
+
+
+def find_tops(method: Lame, bodies: Bodies) -> Tops | None:
+    """Return those of the bodies that the method supports, as tops; None where there are none."""
+    if has_one_axis(bodies):
+        return find_alike(method, bodies)
+    found = []
+    for i in range(len(bodies)):
+        scene = bodies.take(i)
+        if method.unsupported(scene) is None:
+            axes, J1, J3 = slow_axes(scene)
+            start = start_along(scene, axes, np.array((J1, J1, J3)))
+            found.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
+    return Tops(*(np.array(column) for column in zip(*found, strict=True))) if found else None
+
+
+def has_one_axis(bodies: Bodies) -> bool:
+    """Whether all bodies have the same axis of symmetry for certain, as inertia and the direction of their moments are."""
+    weights = bodies.parameters.get("weight", np.ones(1))
+    return bodies.inertia is None and "com_B" not in bodies.parameters and bool((weights > 0).all() or (weights < 0).all())
+
+
+def find_alike(method: Lame, bodies: Bodies) -> Tops | None:
+    """Return what `find_tops` does, of bodies with the same axis."""
+    scene, n = bodies.take(0), len(bodies)
+    if method.unsupported(scene) is not None:
+        return None
+    axes, J1, J3 = slow_axes(scene)
+    R_BP = np.tile(axes, (n, 1, 1))
+    kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
+    q, L = to_quaternion(bodies.R_WB0 @ R_BP), (bodies.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * (J1, J1, J3)
+    return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)

@@ -62,15 +62,31 @@ def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
     """
     if frame == "body":
         return start_along(scene, scene.body.R_BP, scene.body.moments)
+    axes, J1, J3 = slow_axes(scene)
+    start = start_along(scene, axes, np.array((J1, J1, J3)))
+    upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis but for round-off
+    spin = (spin_rate(J1, J3, start.L[2]), 1 / J3)
+    return replace(start, J=(J1, J1, J1), J_inverse=(1 / J1, 1 / J1, 1 / J1), field=upright, spin=spin)
+
+
+def slow_axes(scene: Scene) -> tuple[Array, float, float]:
+    """Return axes (3, 3) of the frame that does not spin, in body axes, and the moments across and along its third, kg m^2.
+
+    Raises
+    ------
+    BadInput
+        Body and field are not symmetric about one axis.
+    """
     axis_B = scene.symmetry_axis_B
     if axis_B is None:
         raise BadInput("frame", f"'non_spinning' for the scene {scene.name!r}", "a scene symmetric about one axis")
     J = np.roll(scene.body.moments, 2 - int(np.argmax(np.abs(axis_B @ scene.body.R_BP))))
-    J1, J3 = float(J[0] + J[1]) / 2, float(J[2])
-    start = start_along(scene, axes_about(axis_B), np.array((J1, J1, J3)))
-    upright = start.field and start.field._replace(x=0.0, y=0.0)  # along the axis but for round-off
-    spin = ((J1 - J3) / (J1 * J3) * start.L[2], 1 / J3)
-    return replace(start, J=(J1, J1, J1), J_inverse=(1 / J1, 1 / J1, 1 / J1), field=upright, spin=spin)
+    return axes_about(axis_B), float(J[0] + J[1]) / 2, float(J[2])
+
+
+def spin_rate(J1: Any, J3: Any, L3: Any) -> Any:
+    """Return the rate about the axis, rad/s, that the frame lacks, of moments, kg m^2, and momentum along it, kg m^2/s."""
+    return (J1 - J3) / (J1 * J3) * L3
 
 
 def start_along(scene: Scene, R_BP: Array, moments: Array) -> PrincipalStart:

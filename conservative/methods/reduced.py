@@ -160,8 +160,8 @@ def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
     field = None if bodies.scene.free else fill_columns(moments_of_gravity(bodies, R_BP) / units * time * time, kernel.WIDTH)
     starts, room = np.zeros((kernel.ROWS, columns.shape[1])), make_room(kernel.ROOM, kernel.WIDTH)
     starts[:7] = fill_columns(np.concatenate([bodies.q_WP0, L0], axis=1), kernel.WIDTH)
-    q, L = np.empty((n, s, 4)), np.empty((n, s, 3))
-    q[:, 0], L[:, 0] = bodies.q_WP0, L0
+    q, L = np.empty((columns.shape[1], s, 4)), np.empty((columns.shape[1], s, 3))
+    q[:n, 0], L[:n, 0] = bodies.q_WP0, L0
 
     def run() -> Block:
         states, finished = starts.copy(), np.ones(columns.shape[1], dtype=bool)
@@ -170,6 +170,6 @@ def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
             kernel.march(lengths, tol, columns, field, states, room, done, last, grid.n_steps, grid.every, q, L, finished)
 
         take_pieces(grid.n_steps, BODY_STEP * len(lengths) * n, take)
-        return turn_samples(grid, q, L, 1 / J / time, None, R_BP, finished[:n])
+        return replace(turn_samples(grid, q, L, (1 / J / time, None, R_BP), np.arange(n), n), finished=finished[:n])
 
     return run
