@@ -181,7 +181,10 @@ class ChoiceForMany(Choice):
     Attributes
     ----------
     bodies
-        On how many bodies it was estimated, the hardest among them. Of the others nothing is known but that they turn no faster.
+        On how many bodies it was estimated, those that turn fastest among them. Others may be further off.
+    grid
+        The `Grid` of steps that all bodies have.
     """
 
     bodies: int = 1
+    grid: Any = None  # a `Grid`, whose file is above this one

@@ -1,10 +1,10 @@
-"""What a call costs beside the compiled code, us: a prepared run, its check, `solve` and `integrate`. Nothing is asserted.
+"""What a call costs beside the compiled code, us: a prepared run, its check, `solve`, `integrate` and `integrate_many`.
 
     python -m conservative.benchmarks.verification.call_cost --steps 1 --steps 1000
 
 Times are those of this thread alone, the smallest of many rounds in which all calls take turns. A busy machine makes them
 longer all the same, so that what counts is what the calls add, in the same rounds, to the bare entries. These are the kernel's
-and that of the conversion to body axes, with outputs that are there already.
+and that of the conversion to body axes, with outputs that are there already. Nothing is asserted.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import click
 
 from conservative import registry
 from conservative.deferred_imports import kernels
+from conservative.integration.many import integrate_many
 from conservative.integration.one import integrate
 from conservative.method import Grid, Method
 from conservative.scene import Scene
@@ -57,6 +58,7 @@ def calls_of(method: Method, scene: Scene, grid: Grid) -> dict[str, Call]:
         "run, checked": lambda: method.check(scene, grid, run()),
         "solve": lambda: method.solve(scene, grid),
         "integrate": lambda: integrate(scene, grid.dt, method, end, grid.every),
+        "integrate_many": lambda: integrate_many(scene, dt=grid.dt, t_end=end, method=method, sample_every=grid.every),
     }
     for call in found.values():
         call()

@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
+from ..check import choice as require_choice
 from ..errors import IntegrationFailed
 from ..method import Grid
 from ..methods.many import Bodies
+from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..trajectory import Trajectory
-from . import pictures
+from . import pictures, tables
+from .blocks import BlockResult
+from .drifts import find_drifts, list_drifts
+from .store import open_store
 
 if TYPE_CHECKING:
     import altair
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
     """Samples of the motions of n bodies, each of which moves by itself, at the same m times.
+
+    `len` is the number of bodies, `ensemble[i]` the trajectory of body number i, `ensemble[:10]` an ensemble of the first ten.
 
     Attributes
     ----------
@@ -55,7 +65,7 @@ class Ensemble:
     failures: Mapping[int, IntegrationFailed]
     choice: Choice | None = None
 
-    @property
+    @cached_property
     def t(self) -> Array:
         """Times (m,) of the samples, s."""
         return self.grid.t
@@ -69,7 +79,28 @@ class Ensemble:
 
     def outcome(self, i: int) -> Outcome:
         """Return how the run of body number i ended."""
+        i = range(len(self))[i]
         return self.failures[i].outcome if i in self.failures else OK
+
+    def to_pandas(self, rows: Literal["samples", "bodies"] = "samples") -> pandas.DataFrame:
+        """Return a table with a row for each body and sample, or for each body.
+
+        Parameters
+        ----------
+        rows
+            "samples": the number of the body, and what `Trajectory.to_pandas` has: t, R_WB (by rows), w_WB_B, energy,
+            momentum_W. Samples after a failure are left out. A million rows take about 140 MB: `ensemble[:100].to_pandas()` is
+            a part. "bodies": outcome, the time reached, s, and the largest drifts, with the number of the body as index.
+
+        Raises
+        ------
+        BadInput
+            rows is neither.
+        MissingExtra
+            pandas, of the extra `report`, is not installed.
+        """
+        require_choice("rows", rows, ("samples", "bodies"))
+        return tables.sample_table(self) if rows == "samples" else tables.body_table(self)
 
     def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
         """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
@@ -85,18 +116,102 @@ class Ensemble:
         """
         return pictures.draw_ensemble(self, axis_B)
 
-    def __getitem__(self, i: int) -> Trajectory:
-        failure, scene = self.failures.get(range(len(self))[i]), self.bodies.take(i)
-        m = len(self.t) if failure is None else int(np.isfinite(self.w_WB_B[i]).all(axis=1).sum())
-        samples = self.t[:m], self.R_WB[i, :m], self.w_WB_B[i, :m]
-        return Trajectory(scene, *samples, self.label, Counters(self.grid.n_steps), failure, self.choice)
+    def _repr_html_(self) -> str:
+        return tables.card(self)
+
+    @overload
+    def __getitem__(self, i: int) -> Trajectory: ...
+
+    @overload
+    def __getitem__(self, i: slice) -> Ensemble: ...
+
+    def __getitem__(self, i: int | slice) -> Trajectory | Ensemble:
+        return self._take_part(i) if isinstance(i, slice) else self._take(range(len(self))[i])
+
+    def _take(self, i: int) -> Trajectory:
+        failure, R_WB, w_WB_B = self.failures.get(i), np.asarray(self.R_WB[i]), np.asarray(self.w_WB_B[i])
+        m = len(self.t) if failure is None else int(np.isfinite(w_WB_B).all(axis=1).sum())
+        counters = Counters(self.grid.n_steps if failure is None else max(0, m - 1) * self.grid.every)
+        return Trajectory(self.bodies.take(i), self.t[:m], R_WB[:m], w_WB_B[:m], self.label, counters, failure, self.choice)
+
+    def _take_part(self, part: slice) -> Ensemble:
+        numbers = range(len(self))[part]
+        return replace(
+            self,
+            bodies=self.bodies[part],
+            R_WB=self.R_WB[part],
+            w_WB_B=self.w_WB_B[part],
+            drifts={name: values[part] for name, values in self.drifts.items()},
+            failures={k: self.failures[i] for k, i in enumerate(numbers) if i in self.failures},
+        )
+
+    def to_zarr(self, path: str | Path) -> None:
+        """Write the ensemble to a new folder, from which `open_ensemble(path)` reads it: see `conservative.integration.store`.
+
+        Raises
+        ------
+        BadInput
+            There is something.
+        NotWritten
+            It cannot be written, or the disk is full.
+        MissingExtra
+            Zarr, of the extra `ensembles`, is not installed.
+        """
+        with open_store(path, self.label, self.bodies, self.grid) as store:
+            for first in range(0, len(self), store.block):
+                store.write(first, self._take_block(slice(first, first + store.block)))
+
+    def _take_block(self, part: slice) -> BlockResult:
+        drifts = np.stack([values[part] for values in self.drifts.values()], axis=1)
+        failures = {i - part.start: failure for i, failure in self.failures.items() if part.start <= i < part.stop}
+        return BlockResult(self.R_WB[part], self.w_WB_B[part], drifts, failures)
 
     def __len__(self) -> int:
         return len(self.bodies)
 
+    def __iter__(self) -> Iterator[Trajectory]:
+        return map(self._take, range(len(self)))
+
     def __repr__(self) -> str:
         name, samples = self.bodies.scene.name, f"{len(self.t)} samples to {self.t[-1]:g} s"
-        return f"Ensemble({name!r}, {self.label!r}, {len(self)} bodies, {samples}, {len(self.failures)} failed)"
+        return f"Ensemble({name!r}, {self.label!r}, {len(self)} bodies, {samples}, {tables.describe_outcomes(self)})"
+
+
+@dataclass(frozen=True, eq=False)
+class DriftsOnDemand(Mapping[str, Array]):
+    """The drifts of an ensemble of one body, whose `Method.solve` has a check of its own: they are found when asked for."""
+
+    bodies: Bodies
+    grid: Grid
+    R_WB: Array
+    w_WB_B: Array
+
+    @cached_property
+    def _values(self) -> dict[str, Array]:
+        found = find_drifts(self.bodies, self.grid.t, self.R_WB, self.w_WB_B).values
+        return dict(zip(list_drifts(self.bodies), found.T, strict=True))
+
+    def __getitem__(self, name: str) -> Array:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+
+def ensemble_of_one(bodies: Bodies, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
+    """Return the ensemble of one body whose trajectory is known."""
+    R_WB, w_WB_B, failures = found.R_WB[None], found.w_WB_B[None], {}
+    if found.failure is not None:
+        missing = ((0, 0), (0, grid.n_samples - len(found)))
+        R_WB = np.pad(R_WB, (*missing, (0, 0), (0, 0)), constant_values=np.nan)
+        w_WB_B = np.pad(w_WB_B, (*missing, (0, 0)), constant_values=np.nan)
+        failures[0] = found.failure
+    samples = {"bodies": bodies, "grid": grid, "R_WB": R_WB, "w_WB_B": w_WB_B}
+    drifts, rest = build_whole(DriftsOnDemand, samples), {"label": found.label, "failures": failures, "choice": choice}
+    return build_whole(Ensemble, {**samples, "drifts": drifts, **rest})
 
 
 class Memory:

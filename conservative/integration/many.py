@@ -15,18 +15,19 @@ from numpy.typing import ArrayLike
 from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, positive_number
 from ..errors import BadInput
 from ..method import Grid, Method, grid_for
-from ..methods.automatic import grid_of
 from ..methods.between import Samples
 from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
 from .blocks import BlockResult, count_left, list_blocks, run_blocks
-from .ensemble import Ensemble
-from .inputs import read_bodies
+from .ensemble import Ensemble, ensemble_of_one
+from .inputs import only_body, read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
 from .places import Place
-from .shared_choice import Goal, choose_for_all
+from .shared_choice import Goal, choose_for_all, pick_hardest
+
+Tell = Callable[[ProgressOfMany], object]
 
 
 class Details(TypedDict, total=False):
@@ -36,10 +37,13 @@ class Details(TypedDict, total=False):
     sample_every: int
     error: float | None
     threads: int | None
-    progress: Callable[[ProgressOfMany], object] | None
+    progress: Tell | None
     path: str | Path | None
     resume: bool
     client: Any
+
+
+_DETAILS, _PLACES = Details.__annotations__.keys(), {"path", "resume", "client"}
 
 
 def integrate_many(
@@ -84,6 +88,7 @@ def integrate_many(
         depend on it.
     progress
         Called with a `ProgressOfMany`, whose text is a line, after each block. `print` will do.
+
     path
         A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
         memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
@@ -109,13 +114,16 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    unknown = sorted(set(details) - set(Details.__annotations__))
-    if unknown:
-        raise TypeError(f"integrate_many() got an unexpected keyword argument {unknown[0]!r}")
-    progress, place = _read_progress(details.get("progress")), _read_place(details)
-    bodies = read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
+    if not details.keys() <= _DETAILS:
+        raise TypeError(f"integrate_many() got an unexpected keyword argument {min(details.keys() - _DETAILS)!r}")
+    progress = _read_progress(details.get("progress"))
+    alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
+    bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
-        method, grid, choice = _plan(bodies, dt, t_end, details)
+        method, grid, choice = make_plan(bodies, dt, t_end, details)
+        if len(bodies) == 1 and details.keys().isdisjoint(_PLACES):
+            return run_one(method, bodies, grid, choice, progress)
+        place = _read_place(details)
         if place.path is None:
             _require_memory(bodies, grid)
         return replace(run_all(method, bodies, grid, place, progress), choice=choice)
@@ -123,7 +131,7 @@ def integrate_many(
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
 
-def _read_progress(value: Any) -> Callable[[ProgressOfMany], object] | None:
+def _read_progress(value: Any) -> Tell | None:
     if value is not None and not callable(value):
         raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
     return value
@@ -140,21 +148,53 @@ def _read_threads(value: object) -> int:
     return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
 
 
-def _plan(bodies: Bodies, dt: float | None, t_end: float | None, details: Details) -> tuple[Method, Grid, ChoiceForMany | None]:
-    """Return the method and the grid of steps, s, as they are given or chosen for an error."""
-    first, error, every = bodies.take(0), details.get("error"), details.get("sample_every", 1)
-    if error is None:
-        method = read_method(details.get("method"), first)
-        grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
-        require_support(method, first)
-        return method, grid, None
-    positive_number("error", error, "a finite attitude error above 0, rad")
-    if details.get("method") is not None:
-        raise BadInput("method", describe(details["method"]), "None together with error, which chooses the method")
+def make_plan(
+    bodies: Bodies, dt: float | None, t_end: float | None, details: Details
+) -> tuple[Method, Grid, ChoiceForMany | None]:
+    """Return the method and the grid of steps, s, as they are given, or as they were chosen for an error.
+
+    Raises
+    ------
+    BadInput
+        An argument cannot be used, or the method has no step of that length for a body.
+    Unsupported
+        The method cannot do the scene.
+    """
+    first, every, error = bodies.first, details.get("sample_every", 1), details.get("error")
+    if error is not None:
+        choice = _choose(bodies, error, (dt, t_end, every), details.get("method"))
+        return choice.method, choice.grid, choice
+    method = read_method(details.get("method"), first)
+    grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
+    require_support(method, first)
+    if len(bodies) > 1:  # of one, the run says the same
+        require_steps(method, bodies, grid)
+    return method, grid, None
+
+
+def _choose(bodies: Bodies, error: object, steps: tuple[Any, ...], method: object) -> ChoiceForMany:
+    """Return what is chosen for an error, rad; steps are dt and t_end, s, and sample_every."""
+    (dt, t_end, every), first = steps, bodies.first
+    wanted = positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
     end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", every))
-    choice = choose_for_all(bodies, Goal(error, end, samples))
-    return choice.method, grid_of(choice.dt, end, samples), choice
+    return choose_for_all(bodies, Goal(wanted, end, samples))
+
+
+def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
+    """Raise `BadInput` where the method has no step of that length for one of the bodies that turn fastest.
+
+    A body of which only its own run shows it is `NotRun`.
+    """
+    for i in pick_hardest(bodies):
+        scene = bodies.take(i)
+        try:
+            if method.unsupported(scene) is None:
+                method.prepare(scene, grid)
+        except BadInput as refusal:
+            raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None
 
 
 def _require_memory(bodies: Bodies, grid: Grid) -> None:
@@ -162,17 +202,23 @@ def _require_memory(bodies: Bodies, grid: Grid) -> None:
     most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
     if samples > most:
         got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
-        raise BadInput("sample_every", got, f"a larger one: up to {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each")
+        raise BadInput("sample_every", got, f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory")
 
 
-def run_all(
-    method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Callable[[ProgressOfMany], object] | None
-) -> Ensemble:
+def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:
+    """Return what a single body gives, at next to no cost beside that of `integrate`."""
+    found = ensemble_of_one(bodies, grid, method.solve(bodies.first, grid), choice)
+    if progress is not None:
+        progress(ProgressOfMany(0.0, 1, 1))
+    return found
+
+
+def run_all(method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Tell | None) -> Ensemble:
     """Return what all blocks give, in memory or in a folder. Steps of the grid are in s."""
     what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
     with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
         results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
-        fill(sink, results, count_left(len(bodies), grid, sink.done), progress)
+        fill(sink, results, (count_left(len(bodies), grid, sink.done), len(bodies)), progress)
     return place.read(sink, *what)
 
 
@@ -188,16 +234,14 @@ class Sink(Protocol):
 
 
 def fill(
-    sink: Sink,
-    results: Generator[tuple[int, BlockResult], None, None],
-    total: int,
-    progress: Callable[[ProgressOfMany], object] | None,
+    sink: Sink, results: Generator[tuple[int, BlockResult], None, None], counts: tuple[int, int], progress: Tell | None
 ) -> None:
-    """Hand all results to a sink, and tell after each of them how many bodies are done, of those that are left."""
-    begun, done = perf_counter(), 0
+    """Hand all results to a sink, and tell after each of them how many bodies are done; counts are those left, and all."""
+    begun, (left, total) = perf_counter(), counts
+    done = total - left
     with closing(results):
         for first, result in results:
             sink.write(first, result)
             done += len(result)
             if progress is not None:
-                progress(ProgressOfMany(perf_counter() - begun, done, total))
+                progress(ProgressOfMany(perf_counter() - begun, done, total, total - counts[0]))

@@ -97,7 +97,7 @@ class _OnDisk:
         self._array, self.shape = array, array.shape
 
     def __len__(self) -> int:
-        return len(self._array)
+        return int(self.shape[0])
 
     def __getitem__(self, part: Any) -> Any:
         found = np.asarray(self._array[part])

@@ -67,11 +67,12 @@ def choose_for_all(bodies: Bodies, goal: Goal) -> ChoiceForMany:
     for _ in range(ROUNDS):
         tried = cut_step(bodies, chosen, method, dt, goal)
         attempts, dt = attempts + tried, tried[-1][0]
-        found, worst = find_worst(bodies, verified, method, grid_of(dt, goal.t_end, goal.samples))
+        grid = grid_of(dt, goal.t_end, goal.samples)
+        found, worst = find_worst(bodies, verified, method, grid)
         if found <= goal.error or tried[-1][1] > goal.error:
             break
         chosen, verified = [*chosen, worst], [i for i in verified if i != worst]
-    choice = ChoiceForMany(method, dt, goal.error, max(found, tried[-1][1]), attempts, len(numbers))
+    choice = ChoiceForMany(method, dt, goal.error, max(found, tried[-1][1]), attempts, len(numbers), grid)
     if not choice.reached:
         warnings.warn(AccuracyNotReached(goal.error, choice.estimate), stacklevel=4)
     return choice
@@ -79,10 +80,16 @@ def choose_for_all(bodies: Bodies, goal: Goal) -> ChoiceForMany:
 
 def pick(bodies: Bodies) -> list[int]:
     """Return the numbers of the bodies to look at: the hardest first, then random ones."""
+    most, hardest = HARDEST + RANDOM + VERIFIED, pick_hardest(bodies)
+    others = np.random.default_rng(SEED).permutation(len(bodies))[:most].tolist()
+    return [*hardest, *(i for i in others if i not in hardest)][:most]
+
+
+def pick_hardest(bodies: Bodies) -> list[int]:
+    """Return the numbers of the bodies that turn fastest with all their energy, the hardest first."""
     energy = np.sum(momenta_of(bodies) * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
-    hardest = np.argsort(-np.sqrt(energy) / np.sqrt(bodies.principal[0].min(axis=1)), kind="stable")[:HARDEST].tolist()
-    others = np.random.default_rng(SEED).permutation(len(bodies))[: HARDEST + RANDOM + VERIFIED].tolist()
-    return [*hardest, *(i for i in others if i not in hardest)][: HARDEST + RANDOM + VERIFIED]
+    rates = np.sqrt(energy) / np.sqrt(bodies.principal[0].min(axis=1))
+    return np.argsort(-rates, kind="stable")[:HARDEST].tolist()
 
 
 def cut_step(bodies: Bodies, chosen: Sequence[int], method: Method, dt: float, goal: Goal) -> Attempts:

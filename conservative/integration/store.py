@@ -71,9 +71,8 @@ class Store:
         columns = {"R_WB": result.R_WB, "w_WB_B": result.w_WB_B, "drifts": result.drifts}
         columns |= {f"failures/{name}": values for name, values in list_columns(n, failures).items()}
         try:
-            for name, values in columns.items():
-                _array(self.group, name)[first : first + n] = values
-            _array(self.group, "outcome")[first : first + n] = list_kinds(n, failures)
+            _write_columns(self.group, first, columns)
+            _write_columns(self.group, first, {"outcome": list_kinds(n, failures)})
         except OSError as error:
             raise NotWritten("path", self.place, error, _ROOM) from None
 
@@ -206,6 +205,11 @@ def _lock(place: Path, handle: int) -> None:
         raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own") from None
     except OSError:
         return  # a file system without locks
+
+
+def _write_columns(group: zarr.Group, first: int, columns: Mapping[str, Any]) -> None:
+    for name, values in columns.items():
+        _array(group, name)[first : first + len(values)] = values
 
 
 def _array(group: zarr.Group, name: str) -> Any:

@@ -1,10 +1,10 @@
 """Tuples of lanes, one in the other and named or not, out of columns of arrays and into them.
 
 In an array (rows, bodies) a number of one body follows the same number of the body before: a tuple is a column, row by row in
-the order of its parts. `load_tuple(like, array, at)` is the one that begins at element `at` of the first row, arranged as `like`,
-of floats; `save_tuple(array, at, values)` stores it; `save_samples(array, at, distance, values)` stores each body's numbers one
-after the other, those of the next body `distance` elements on. `any_above(x, limit)` is whether a lane is above a limit. In plain
-Python a float is the only lane.
+the order of its parts. `load_tuple(like, array, at)` is the one that begins at element `at` of the first row, arranged as
+`like`, of floats; `save_tuple(array, at, values)` stores it; `save_samples(array, at, distance, values)` stores each body's
+numbers one after the other, those of the next body `distance` elements on. `any_above(x, limit)` is whether a lane is above a
+limit. In plain Python a float is the only lane.
 """
 
 from __future__ import annotations

@@ -6,15 +6,17 @@ sum, for n = 0, 1, ...
     (n+1) g'[n+1] = h sum of g'[i] x w'[n-i]       (n+1) a'[n+1] = h sum of a'[i] x w'[n-i]
     (n+1) w'[n+1] = h (K sum of w2'[i] w3'[n-i] and its kin + J^-1 T'[n])        K = (J2 - J3)/J1 and its kin
 
-A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. Sums run from
-the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short chains, with
-constants that hold the factor h/(n+1). Where the axes of the rows turn at a rate u about their second one, g' gains u a, and
-a' loses u g.
+A vector x is kept as r = (x2, x3, x1) and s = (x3, x1, x2), so that x x y is r_x s_y - s_x r_y without shuffles. For one body,
+sums run from the middle outwards, as the newest coefficients come last; what depends on the newest is added in two short
+chains, with constants that hold the factor h/(n+1). Where the axes of the rows turn at a rate u about their second one, g'
+gains u a, and a' loses u g.
 
 What a field adds is its own: an object whose `accelerate` returns J^-1 T'[n], made next to the field's torque. All arithmetic
 is that of an `emit`: `add(c, a, b)` is c + a b, where c may be None for 0, `subtract(c, a, b)` is c - a b, `store` and `load`
-keep old coefficients in memory, and `convolve` forms the sums of products of these, term by term (`Straight`) or in a loop. Source: D. Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems
-of ordinary differential equations by the method of Taylor series (1971); the arrangement is our own.
+keep old coefficients in memory, `convolve` forms sums of products, and `find_next` says how all this is arranged. That of one
+body (`Straight`) waits for as little as possible, that of several (`series_lanes`) does as little as possible. Source: D.
+Barton, I. M. Willers and R. V. M. Zahar, The automatic solution of systems of ordinary differential equations by the method of
+Taylor series (1971); the arrangement is our own.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
 """Series steps (`series`) for several bodies at once: LLVM's vector code in which every lane is a body.
 
 A value is the registers of x, y and z, or one register where it is a scalar, so that shuffles are other names and no
-instructions. Sums run in the order of those for one body, which makes their rounding the same.
+instructions. A processor that has nothing to wait for wants few operations: sums have one total for products that are added and
+for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body. Of 32 random
+heavy tops the attitudes differ by 3e-16 from those of one body after 10 steps, by 1e-15 to 3e-15 after 100 (the worst by
+6e-14), by 4e-14 to 4e-13 after 1,000; from then on chaotic motions part, as those of any two starts that round-off tells apart.
 
-Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has loops
-of its own, whose end the processor learns. In a loop the indices i and n - i are taken together, from the middle outwards, so
-that a coefficient which is loaded serves two products; and a loop forms no more sums than registers hold.
+Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has a
+loop of its own, whose end the processor learns.
 """
 
 from __future__ import annotations

@@ -70,9 +70,8 @@ def correct_again(field, body, state, left, needed):
     """The same, of a state in which bodies that need no correction stay as they are."""
     g, a, w, failed = state
     *found, new_left, new_needed = find_correction_needed(field, body, g, a, w, failed)
-    g, a, w = (
-        tuple(where_above(x, ENOUGH, needed, y) for x, y in zip(*each, strict=True)) for each in zip(found, (g, a, w), strict=True)
-    )
+    pairs = zip(found, (g, a, w), strict=True)
+    g, a, w = (tuple(where_above(x, ENOUGH, needed, y) for x, y in zip(*pair, strict=True)) for pair in pairs)
     return g, a, w, where_above(new_left, ENOUGH, needed, left), where_above(new_needed, ENOUGH, needed, 0.0)
 
 
@@ -93,15 +92,15 @@ def find_sample(model, turn, g, a, w):
 
 
 @entry
-def enter(order, like, columns, states, turns, first, last, done, until, n_steps, every, R_WB, w_WB_B):
-    """Take the steps after `done` up to number `until` of bodies `first` to `last`, whole registers of them.
+def enter(order, like, columns, states, turns, done, until, n_steps, every, R_WB, w_WB_B):
+    """Take the steps after `done` up to number `until`.
 
-    `like` is a `Models` and a `State` of floats, of which `columns` (., n) and `states` (., n) have the numbers. Samples of every
-    `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,). `turns` (samples or 1, 2,
-    n) are cosines and sines of the angles of spins that are left out.
+    `like` is a `Models` and a `State` of floats, of which `columns` (., n) and `states` (., n) have the numbers. Samples of
+    every `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,), rad/s. `turns`
+    (samples or 1, 2, n) are cosines and sines of the angles of spins that are left out.
     """
     samples = 1 + (n_steps + every - 1) // every
-    for at in range(first, last, REGISTER):
+    for at in range(0, columns.shape[1], REGISTER):
         model, (g, a, w, failed) = load_tuple(like[0], columns, at), load_tuple(like[1], states, at)
         body, K = begin_body(model)
         step, row = done, done // every

@@ -3,8 +3,8 @@
 `trace(function)` is the function as kernels call it. It is run once with stand-ins for its arguments, `Value`, whose arithmetic
 writes LLVM's instructions, so that the types of its inner functions need not be found out one by one: numba takes a tenth of a
 second for each, which adds up to more than all that LLVM does. A product that is added at once is rounded once (FMA), as in
-`SMALL`. Arguments and results are floats, integers, fours (`simd`) and tuples of these, named or not. Where an argument is lanes
-(`lanes`), each of another body, floats are lanes and fours are `Axes`, three lanes.
+`SMALL`. Arguments and results are floats, integers, fours (`simd`) and tuples of these, named or not. Where an argument is
+lanes (`lanes`), each of another body, floats are lanes and fours are `Axes`, three of these.
 """
 
 from __future__ import annotations
@@ -94,9 +94,9 @@ class Lanes(Value):
         return ir.Constant(self.ir.type, [x] * self.ir.type.count)
 
     def _call(self, name):
-        kind = self.ir.type  # llvmlite has no names of intrinsics for vectors
-        function = ir.FunctionType(kind, [kind])
-        return self.make(self.builder.call(cgutils.get_or_insert_function(self.builder.module, function, f"{name}.v{kind.count}f64"), [self.ir]))
+        kind, module = self.ir.type, self.builder.module  # llvmlite has no names of intrinsics for vectors
+        function = cgutils.get_or_insert_function(module, ir.FunctionType(kind, [kind]), f"{name}.v{kind.count}f64")
+        return self.make(self.builder.call(function, [self.ir]))
 
 
 class Axes(NamedTuple):

@@ -14,6 +14,8 @@ from ..attitude import Array, to_quaternion
 from ..body import RigidBody
 from ..check import build_unchecked
 from ..potentials.potential import AnyPotential
+from ..potentials.turning import Turning, static_part
+from ..potentials.varied import OneByOne, Varied
 from ..scene import Scene
 
 
@@ -30,7 +32,8 @@ class Bodies:
     inertia
         Tensors (n, 3, 3), kg m^2, body axes; None where all have the scene's.
     parameters
-        Numbers (n, ...) of the scene's potential by the names of its fields, where they differ from body to body.
+        Numbers (n, ...) of the scene's potential by the names of its fields, where they differ from body to body; of one that
+        turns, those of the field in its axes.
     """
 
     scene: Scene
@@ -47,6 +50,13 @@ class Bodies:
         parameters = {name: values[part] for name, values in self.parameters.items()}
         return Bodies(self.scene, self.R_WB0[part], self.w_WB_B0[part], inertia, parameters)
 
+    @cached_property
+    def first(self) -> Scene:
+        """The scene of body number 0, with what it keeps where it is the scene itself."""
+        scene = self.scene
+        same = self.R_WB0.base is scene.R_WB0 and self.w_WB_B0.base is scene.w_WB_B0
+        return scene if same and self.inertia is None and not self.parameters else self.take(0)
+
     def take(self, i: int) -> Scene:
         """Return the scene of body number i."""
         inertia = None if self.inertia is None else self.inertia[i]
@@ -59,7 +69,16 @@ class Bodies:
         potential: Any = self.scene.potential
         if not self.parameters:
             return potential
-        return replace(potential, **{name: values[i] for name, values in self.parameters.items()})
+        own = replace(static_part(potential), **{name: values[i] for name, values in self.parameters.items()})
+        return Turning(own, potential.orbit) if isinstance(potential, Turning) else own
+
+    @cached_property
+    def varied(self) -> Varied:
+        """The fields of all bodies, where they have numbers of their own: those that turn as they are in their axes."""
+        vary = getattr(static_part(self.scene.potential), "vary", None)
+        if vary is not None:
+            return vary(self.parameters)
+        return OneByOne([static_part(self.take_potential(i)) for i in range(len(self))])
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from .bounds import bounds_of
 from .many import Bodies, RunMany
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple
 from .run_kernel import prepare_run
-from .taylor_many import prepare_run_many
+from .taylor_many import prepare_bodies
 from .units import in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
@@ -133,6 +133,10 @@ class Taylor(_Settings):
     def suite_settings(cls) -> tuple[Taylor, ...]:
         return (cls(14),)
 
+    @classmethod
+    def many_settings(cls) -> tuple[Taylor, ...]:
+        return tuple(cls(order) for order in (8, 10, 12, 14))
+
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("taylor"), scene.derive(convert, self)
@@ -141,7 +145,7 @@ class Taylor(_Settings):
         return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
 
     def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
-        return prepare_run_many(bodies, grid, self.terms) if self.tolerance is None else None
+        return prepare_bodies(bodies, grid, self.terms) if self.tolerance is None else None
 
 
 def turn_samples(run: Run, orbit: Orbit) -> Run:

@@ -1,14 +1,12 @@
-"""Many bodies for `Taylor`: their starts as columns of numbers, in units and axes of their own, and the run of them.
+"""Many bodies for `Taylor`: their starts as columns of numbers, in axes and units of their own, and the run of them.
 
-What a scene is converted to for the kernel of one body, many bodies are converted to at once: in principal axes, or in the frame
-that does not spin, in units in which each body is of order one, and with axes D whose third one is that of the field. Where
-fields turn, or steps are divided by a tolerance, bodies run alone. Source: our own layout.
+What `Taylor` makes of one scene is made of many at once: a start in principal axes, or in the frame that does not spin, with
+axes D whose third one is that of the field, in units in which the body is of order one. Source: our own layout.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -16,16 +14,13 @@ import numpy as np
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion
 from ..deferred_imports import kernels
 from ..method import Grid
-from ..potentials.gravity_gradient import GravityGradient
-from ..potentials.point_to_point import LinearSpring, PointAttraction
-from ..potentials.uniform_gravity import UniformGravity
+from .columns import fill_columns, take_pieces
+from .fields_of_many import Fields, find_fields, into_axes
 from .many import Block, Bodies, RunMany
 from .units import COARSE, SHORTEST
 
-PIECE = 0.03
-"""About how long a call of compiled code takes, s."""
 NEARLY_EQUAL = 4e-12
-"""Relative difference of two moments below which a body may be symmetric: no smaller than what `Scene.symmetry_axis_B` allows."""
+"""Relative difference of two moments below which a body may be symmetric: no less than `Scene.symmetry_axis_B` allows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +41,7 @@ class Frames:
     moments: Array
     J: Array
     R_BP: Array
-    spinning: Array
+    spinning: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,243 +57,156 @@ class Units:
         return self.moment / self.time / self.time
 
 
-def find_frames(bodies: Bodies) -> Frames:
-    """Return the axes of all bodies."""
-    moments, R_BP = (np.array(each) for each in bodies.principal)
-    gaps = np.abs(moments - np.roll(moments, 1, axis=1)).min(axis=1)
-    near = np.flatnonzero(gaps <= NEARLY_EQUAL * moments.max(axis=1))
-    spinning, J = np.zeros(len(bodies), bool), moments.copy()
-    shared = bodies.inertia is None and not bodies.parameters
-    for part in [near] if shared and len(near) else near[:, None]:
-        axis_B = bodies.take(part[0]).symmetry_axis_B
-        if axis_B is None:
-            continue
-        own = np.roll(moments[part[0]], 2 - int(np.argmax(np.abs(axis_B @ R_BP[part[0]]))))
-        J1 = (own[0] + own[1]) / 2
-        spinning[part], J[part], moments[part], R_BP[part] = True, J1, (J1, J1, own[2]), axes_about(axis_B)
-    return Frames(moments, J, R_BP, spinning)
-
-
-def find_units(moments: Array, energy: Array, dt: float) -> Units:
-    """Return the units of bodies of moments (n, 3), kg m^2, with energies (n,), J, for a step dt, s (`units.find_units`)."""
-    moment, step = np.frexp(moments.max(axis=1))[1], np.frexp(dt)[1]
-    rate = (np.frexp(energy)[1] - moment) // 2
-    time = np.where(energy > 0, np.minimum(-rate, step - SHORTEST), step)
-    return Units(*(np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)))
-
-
-def read_parameter(bodies: Bodies, name: str) -> Array:
-    """Return a number, or numbers, of the potential of each body, (n, ...), of its own unit."""
-    value = np.asarray(bodies.parameters.get(name, getattr(bodies.scene.potential, name)), dtype=float)
-    return value if name in bodies.parameters else np.broadcast_to(value, (len(bodies), *value.shape))
-
-
-@dataclass(frozen=True, eq=False)
-class Fields:
-    """The field of each body.
-
-    Attributes
-    ----------
-    like
-        The kernel's field, whatever its numbers.
-    numbers
-        These numbers (n, k), one row for each body; lengths in units of the longest.
-    energies
-        Those of them that are proportional to energy; J.
-    axis_W
-        Axes (n, 3), vectors of any length, world axes.
-    scale
-        Sizes (n,) of the potential, J.
-    """
-
-    like: Any
-    numbers: Array
-    energies: slice
-    axis_W: Array
-    scale: Array
-
-
-@singledispatch
-def find_fields(potential: Any, bodies: Bodies, R_BP: Array) -> Fields | None:
-    """Return the fields of bodies in axes R_BP (n, 3, 3); None where they have to run alone."""
-    return None
-
-
-@find_fields.register
-def _of_gravity(potential: UniformGravity, bodies: Bodies, R_BP: Array) -> Fields:
-    moments = into_axes(read_parameter(bodies, "weight")[:, None] * read_parameter(bodies, "com_B"), R_BP)
-    up = np.broadcast_to(potential.axis_W, moments.shape)
-    return Fields(kernels("fields").Uniform(0.0, 0.0, 0.0), moments, slice(3), up, np.linalg.norm(moments, axis=1))
-
-
-def _points(bodies: Bodies, R_BP: Array, *lengths: Array) -> tuple[Array, Array, Array]:
-    """Return the points of body and world (n, 3) in units, m, and these units (n,), powers of two."""
-    b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
-    longest = np.max(np.column_stack([np.abs(b), np.abs(A), *lengths]), axis=1)
-    unit = np.ldexp(1.0, np.frexp(longest)[1])
-    return b / unit[:, None], A / unit[:, None], unit
-
-
-@find_fields.register
-def _of_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Fields:
-    rest, stiffness = read_parameter(bodies, "rest_length"), read_parameter(bodies, "stiffness")
-    b, A, unit = _points(bodies, R_BP, rest)
-    stiffness, rest = stiffness * unit * unit, rest / unit
-    farthest = np.linalg.norm(b, axis=1) + np.linalg.norm(A, axis=1)
-    like = kernels("point_fields").Spring((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0)
-    return Fields(like, np.column_stack([b, A, stiffness, rest]), slice(6, 7), A, stiffness / 2 * np.maximum(farthest, rest) ** 2)
-
-
-@find_fields.register
-def _of_attractions(potential: PointAttraction, bodies: Bodies, R_BP: Array) -> Fields:
-    b, A, unit = _points(bodies, R_BP)
-    strength = read_parameter(bodies, "strength") / unit
-    like = kernels("point_fields").Attraction((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
-    scale = np.abs(strength) / np.hypot(np.linalg.norm(b, axis=1), np.linalg.norm(A, axis=1))
-    return Fields(like, np.column_stack([b, A, strength]), slice(6, 7), A, scale)
-
-
-@find_fields.register
-def _of_gradients(potential: GravityGradient, bodies: Bodies, R_BP: Array) -> Fields:
-    factor = 3 * read_parameter(bodies, "rate")[:, None, None] ** 2
-    rows = factor * (np.swapaxes(R_BP, 1, 2) @ read_parameter(bodies, "inertia") @ R_BP)
-    e, none = read_parameter(bodies, "direction_W"), (0.0, 0.0, 0.0)
-    scale = np.linalg.eigvalsh(rows)[:, -1] / 2
-    numbers = np.column_stack([rows.reshape(-1, 9), e])
-    return Fields(kernels("gradient_field").Gradient(none, none, none, none), numbers, slice(9), e, scale)
-
-
-def into_axes(v: Array, R_BP: Array) -> Array:
-    """Return vectors (n, 3) of any unit, body axes, in axes R_BP (n, 3, 3)."""
-    return np.asarray((v[:, None, :] @ R_BP)[:, 0, :])
-
-
-def axes_about_many(axes: Array) -> Array:
-    """Return rotations (n, 3, 3) whose third columns have the directions (n, 3): those of `axes_about`."""
-    third = axes / np.linalg.norm(axes, axis=1)[:, None]
-    first = np.cross(np.eye(3)[(np.argmax(np.abs(third), axis=1) + 2) % 3], third)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(third, first), third], axis=2)
-
-
 @dataclass(frozen=True, eq=False)
 class Start:
     """Bodies as the kernel `taylor_many` takes them.
 
     Attributes
     ----------
-    like, columns, states
-        `Models` and `State` of floats, and the numbers of them in columns (., m), one for each body and the last one again until
-        whole registers are full.
+    like
+        `Models` and `State` of floats, whatever they are.
+    columns, states
+        The numbers of these, (., m): a column for each body, and the last one again until whole registers are full.
     spin
-        Rates (n,), rad/s, of spins that are left out; None where all are 0.
+        Rates (n,), rad/s, of spins that are left out; None where no body has one.
     """
 
-    like: Any
+    like: tuple[Any, Any]
     columns: Array
     states: Array
     spin: Array | None
 
 
-def start_many(bodies: Bodies, grid: Grid) -> Start | None:
-    """Return the start of bodies; None where they have to run alone."""
-    frames = find_frames(bodies)
-    fields = free_fields(bodies, frames) if is_free(bodies) else find_fields(bodies.scene.potential, bodies, frames.R_BP)
-    if fields is None:
-        return None
-    w = into_axes(bodies.w_WB_B0, frames.R_BP)
-    energy = np.sum(frames.moments * w * w, axis=1) / 2 + fields.scale
-    units = find_units(frames.moments, energy, grid.dt)
-    return pack(bodies, grid, frames, fields, units, w, np.where(energy > 0, energy, 1.0))
-
-
-def is_free(bodies: Bodies) -> bool:
-    """Whether nothing acts on the bodies, or what has no axis."""
-    return bodies.scene.potential is None or bodies.scene.potential.axis_W is None
-
-
-def free_fields(bodies: Bodies, frames: Frames) -> Fields:
-    """Return what stands for the field of free bodies: the momentum, of which the size is the only number."""
-    L = into_axes(bodies.w_WB_B0, frames.R_BP) * frames.moments
-    l_W = (bodies.R_WB0 @ (frames.R_BP @ L[..., None]))[..., 0]
-    size = np.linalg.norm(L, axis=1)
-    scale = potential.scale() if (potential := bodies.scene.potential) else 0.0
-    axis = np.where(size[:, None] > 0, l_W, (0.0, 0.0, 1.0))
-    return Fields(kernels("taylor").Free(0.0), size[:, None], slice(0), axis, np.full(len(L), scale))
-
-
-def pack(bodies: Bodies, grid: Grid, frames: Frames, fields: Fields, units: Units, w: Array, energy: Array) -> Start:
-    """Return the start of bodies in these units: rates w (n, 3), rad/s, in their own axes, and energies (n,), J."""
-    one = np.ones(len(bodies))
-    moments, J = (each / units.moment[:, None] for each in (frames.moments, frames.J))
-    L, energy = w * units.time[:, None] * moments, energy / units.energy
-    numbers = fields.numbers.copy()
-    numbers[:, fields.energies] /= units.energy[:, None]
-    if is_free(bodies):
-        numbers = np.linalg.norm(L, axis=1)[:, None]
-    elif isinstance(fields.like, kernels("fields").Uniform):
-        numbers[frames.spinning, :2] = 0.0
-    R_WD = axes_about_many(fields.axis_W)
-    R_DP = np.swapaxes(R_WD, 1, 2) @ bodies.R_WB0 @ frames.R_BP
-    loose = np.column_stack([one, one, ~frames.spinning])
-    scales = np.column_stack([energy, np.sqrt(2 * energy * moments.max(axis=1))])
-    rates = np.column_stack([1 / units.time, 1 / units.time, J[:, 2] / moments[:, 2] / units.time])
-    h = grid.dt / units.time
-    rows = [J, 1 / J, numbers, loose, scales, R_DP[:, 2], R_DP[:, 0], L, h, R_WD.reshape(-1, 9), frames.R_BP.reshape(-1, 9), rates]
-    states = [R_DP[:, 2], R_DP[:, 0], L / J, 0 * one]
-    spin = (moments[:, 0] - moments[:, 2]) / (moments[:, 0] * moments[:, 2]) * L[:, 2] / units.time
-    found = np.where(frames.spinning, spin, 0.0) if frames.spinning.any() else None
-    return Start(likes(fields.like), fill(np.column_stack(rows)), fill(np.column_stack(states)), found)
-
-
-def likes(field: Any) -> tuple[Any, Any]:
-    """Return a `Models` and a `State` of floats in that field."""
-    kernel, three = kernels("taylor_many"), (0.0, 0.0, 0.0)
-    nine = (three, three, three)
-    model = kernel.Models(three, three, field, three, (0.0, 0.0), three, three, three, 0.0, nine, nine, three)
-    return model, kernel.State(three, three, three, 0.0)
-
-
-def fill(rows: Array) -> Array:
-    """Return the numbers (n, k) of n bodies as columns (k, m), m the next multiple of the bodies in a register."""
-    missing = -len(rows) % kernels("lanes").REGISTER
-    return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
-
-
-def turns_of(spin: Array | None, t: Array, m: int) -> Array:
-    """Return cosines and sines (s, 2, m) of the angles by which spins (n,), rad/s, turn in times t (s,), s; (1, 2, m) for none."""
-    if spin is None:
-        return np.stack([np.ones((1, m)), np.zeros((1, m))], axis=1)
-    angles = np.outer(t, np.concatenate([spin, np.zeros(m - len(spin))]))
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def prepare_run_many(bodies: Bodies, grid: Grid, order: int) -> RunMany | None:
+def prepare_bodies(bodies: Bodies, grid: Grid, order: int) -> RunMany | None:
     """Return the run of bodies by series of an order; None where they have to run alone."""
-    start = start_many(bodies, grid)
+    start = start_bodies(bodies, grid)
     if start is None:
         return None
-    n, s, (_, m) = len(bodies), grid.n_samples, start.states.shape
-    enter, turns = kernels("taylor_many").enter, turns_of(start.spin, grid.t, m)
-    R_WB0, w_WB_B0 = from_quaternion(to_quaternion(bodies.R_WB0)), bodies.w_WB_B0
+    n, s, m = len(bodies), grid.n_samples, start.states.shape[1]
+    enter, turns = kernels("taylor_many").enter, find_turns(start.spin, grid.t, m)
+    R_WB0, cost = from_quaternion(to_quaternion(bodies.R_WB0)), m * (20e-9 + 0.7e-9 * order**2)
 
     def run() -> Block:
         states, R_WB, w_WB_B = start.states.copy(), np.empty((m, s, 3, 3)), np.empty((m, s, 3))
         samples = R_WB.reshape(-1), w_WB_B.reshape(-1)
-        for bodies_now, steps_now in divide(m, grid.n_steps, order):
-            enter(order, start.like, start.columns, states, turns, *bodies_now, *steps_now, grid.n_steps, grid.every, *samples)
-        R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, w_WB_B0
+        given = order, start.like, start.columns, states, turns
+        take_pieces(grid.n_steps, cost, lambda done, last: enter(*given, done, last, grid.n_steps, grid.every, *samples))
+        R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
         return Block(R_WB[:n], w_WB_B[:n], states[-1, :n] == 0)
 
     return run
 
 
-def divide(m: int, n_steps: int, order: int) -> Any:
-    """Yield bodies and steps, first and last, that take about `PIECE` together."""
-    width = kernels("lanes").REGISTER
-    piece = int(PIECE / (15e-9 + 0.6e-9 * order**2))
-    steps = min(n_steps, max(1, piece // width))
-    count = max(1, piece // (steps * width)) * width
-    for first in range(0, m, count):
-        for done in range(0, n_steps, steps):
-            yield (first, min(m, first + count)), (done, min(n_steps, done + steps))
+def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
+    """Return the start of bodies; None where they have to run alone."""
+    frames = find_frames(bodies)
+    w = into_axes(bodies.w_WB_B0, frames.R_BP)
+    fields = find_fields(bodies.scene.potential, bodies, frames.R_BP)
+    if fields is None:
+        return None
+    if not fields.axis_W.any():
+        fields = find_momenta(bodies, frames, w, fields.scale)
+    energy = np.sum(frames.moments * w * w, axis=1) / 2 + fields.scale
+    units = find_units(frames.moments, energy, grid.dt)
+    R_DP = directions(fields.axis_W).swapaxes(1, 2) @ bodies.R_WB0 @ frames.R_BP
+    model = build_model(frames, fields, units, grid.dt, w, np.where(energy > 0, energy, 1.0), R_DP)
+    state = (model.g, model.a, model.L / model.J, np.zeros((len(w), 1)))
+    spin, width = find_spins(frames, w) if frames.spinning.any() else None, kernels("lanes").REGISTER
+    return Start(build_likes(fields.like), *(fill_columns(np.column_stack(parts), width) for parts in (model, state)), spin)
+
+
+def find_frames(bodies: Bodies) -> Frames:
+    """Return the axes of all bodies. Those that may be symmetric are looked at one by one, unless all are the same."""
+    moments, R_BP = (np.array(each) for each in bodies.principal)
+    J, spinning = moments.copy(), np.zeros(len(bodies), bool)
+    gaps = np.abs(moments - np.roll(moments, 1, axis=1)).min(axis=1)
+    near = np.flatnonzero(gaps <= NEARLY_EQUAL * moments.max(axis=1))
+    alike = bodies.inertia is None and not bodies.parameters
+    for part in [near] if alike and len(near) else near[:, None]:
+        i = int(part[0])
+        axis_B = bodies.take(i).symmetry_axis_B
+        if axis_B is not None:
+            x, y, J3 = np.roll(moments[i], 2 - int(np.argmax(np.abs(axis_B @ R_BP[i]))))
+            J1 = (x + y) / 2
+            spinning[part], J[part], moments[part], R_BP[part] = True, J1, (J1, J1, J3), axes_about(axis_B)
+    return Frames(moments, J, R_BP, spinning)
+
+
+def find_spins(frames: Frames, w: Array) -> Array:
+    """Return the rates (n,), rad/s, at which bodies turn about the third axis of their frames; w (n, 3), rad/s, in these."""
+    J1, J3 = frames.moments[:, 0], frames.moments[:, 2]
+    return np.asarray(np.where(frames.spinning, (J1 - J3) / (J1 * J3) * (w[:, 2] * J3), 0.0))
+
+
+def find_units(moments: Array, energy: Array, dt: float) -> Units:
+    """Return the units of bodies of moments (n, 3), kg m^2, with energies (n,), J, for a step dt, s (`units.find_units`)."""
+    moment, step = np.frexp(moments.max(axis=1))[1], int(np.frexp(dt)[1])
+    rate = (np.frexp(energy)[1] - moment) // 2
+    time = np.where(energy > 0, np.minimum(-rate, step - SHORTEST), step)
+    return Units(*(np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)))
+
+
+def find_momenta(bodies: Bodies, frames: Frames, w: Array, scale: Array) -> Fields:
+    """Return what stands for the field of free bodies with rates w (n, 3), rad/s: the momentum, whose size is the number.
+
+    `scale` (n,) is that of a potential that does nothing, J.
+    """
+    L = w * frames.moments
+    axis_W = (bodies.R_WB0 @ (frames.R_BP @ L[..., None]))[..., 0]
+    return Fields(kernels("taylor").Free(0.0), np.linalg.norm(L, axis=1)[:, None], slice(0), axis_W, scale)
+
+
+def directions(axes: Array) -> Array:
+    """Return rotations (n, 3, 3) whose third columns point along vectors (n, 3): those of `axes_about`; along e_z for none."""
+    sizes = np.linalg.norm(axes, axis=1)[:, None]
+    third = np.where(sizes > 0, axes, (0.0, 0.0, 1.0)) / np.where(sizes > 0, sizes, 1.0)
+    first = np.cross(np.eye(3)[(np.argmax(np.abs(third), axis=1) + 2) % 3], third)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(third, first), third], axis=2)
+
+
+def build_model(frames: Frames, fields: Fields, units: Units, dt: float, w: Array, energy: Array, R_DP: Array) -> Any:
+    """Return `Models` of numbers (n, .), one row for each body, in their units: rates w (n, 3), rad/s, energies (n,), J."""
+    moments, J = (each / units.moment[:, None] for each in (frames.moments, frames.J))
+    L, energy = w * units.time[:, None] * moments, energy / units.energy
+    spin = np.where(frames.spinning, J[:, 2] / moments[:, 2], 1.0)
+    one = np.ones(len(w))
+    return kernels("taylor_many").Models(
+        J=J,
+        J_inverse=1 / J,
+        field=find_numbers(fields, units, frames.spinning, L),
+        loose=np.column_stack([one, one, ~frames.spinning]),
+        scales=np.column_stack([energy, np.sqrt(2 * energy * moments.max(axis=1))]),
+        g=R_DP[:, 2],
+        a=R_DP[:, 0],
+        L=L,
+        h=(dt / units.time)[:, None],
+        axes=directions(fields.axis_W).reshape(-1, 9),
+        R_BP=frames.R_BP.reshape(-1, 9),
+        units=np.column_stack([one, one, spin]) / units.time[:, None],
+    )
+
+
+def find_numbers(fields: Fields, units: Units, spinning: Any, L: Array) -> Array:
+    """Return the numbers (n, k) of fields in units of the bodies; along the axis where a body is symmetric about it."""
+    numbers = fields.numbers.copy()
+    numbers[:, fields.energies] /= units.energy[:, None]
+    if isinstance(fields.like, kernels("taylor").Free):
+        return np.linalg.norm(L, axis=1)[:, None]
+    if isinstance(fields.like, kernels("fields").Uniform):
+        numbers[spinning, :2] = 0.0  # along the axis but for round-off
+    return numbers
+
+
+def build_likes(field: Any) -> tuple[Any, Any]:
+    """Return `Models` and `State` of floats, with a field."""
+    kernel, one, three = kernels("taylor_many"), 0.0, (0.0, 0.0, 0.0)
+    nine = (three, three, three)
+    sizes = {"J": three, "J_inverse": three, "field": field, "loose": three, "scales": (one, one), "g": three, "a": three}
+    return kernel.Models(**sizes, L=three, h=one, axes=nine, R_BP=nine, units=three), kernel.State(three, three, three, one)
+
+
+def find_turns(spin: Array | None, t: Array, m: int) -> Array:
+    """Return cosines and sines (s, 2, m) of the angles of spins (n,), rad/s, at times t (s,), s; of no angles (1, 2, m)."""
+    angles = np.zeros((1, m)) if spin is None else np.outer(t, np.pad(spin, (0, m - len(spin))))
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -20,7 +20,8 @@ class MJWarp(EngineMethod):
 
     Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`). A step is recorded by Warp once
     and then replayed; launched from Python, its kernels take a hundred times as long. They are compiled when a run is prepared,
-    once in the life of an environment, which takes a minute. It is made for thousands of worlds at once on a GPU.
+    once in the life of an environment, which takes a minute. It is made for thousands of worlds at once on a GPU: many bodies
+    are as many worlds.
 
     Parameters
     ----------
@@ -47,6 +48,7 @@ class MJWarp(EngineMethod):
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("mujoco-warp", "mujoco_warp", oldest="3.10")
     takes_gravity: ClassVar[bool] = True
+    many = ({"integrator": "RK4"},)
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)

@@ -19,6 +19,8 @@ INTEGRATORS = ("Euler", "RK4", "implicitfast")
 class MJX(EngineMethod):
     """MJX on a free joint or a ball joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
 
+    Many bodies at once are `jax.vmap` over models and states.
+
     Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`).
 
     Parameters
@@ -47,6 +49,7 @@ class MJX(EngineMethod):
 
     family: ClassVar[str] = "mjx"
     takes_gravity: ClassVar[bool] = True
+    many = ({"integrator": "RK4"}, {"integrator": "RK4", "precision": "f32"})
     distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
 
     def __post_init__(self) -> None:

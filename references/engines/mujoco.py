@@ -24,7 +24,7 @@ from conservative.trajectory import Trajectory
 from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
-from ..environments.plain_numbers import Samples, describe, describe_many, read_many, take_axes
+from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
 from .inside.mujoco import prepare_many_with, prepare_with
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
@@ -113,11 +113,12 @@ class MuJoCo(Method):
         axes = take_axes(bodies, grid, self.unsupported)
         if axes is None or not hasattr(mj.mjtIntegrator, f"mjINT_{self.integrator.upper()}"):
             return None
-        march = prepare_many_with(mj, SimpleNamespace(**asdict(self), **describe_many(axes, grid)))
+        samples = ManySamples(axes, grid)
+        march = prepare_many_with(mj, [SimpleNamespace(**asdict(self), **describe(each, grid)) for each in axes])
 
         def run() -> Block:
             with _quiet(mj):
-                return read_many(axes, grid, march())
+                return samples.trajectory(march())
 
         return run
 
@@ -169,6 +170,7 @@ class MuJoCoVersion(EngineMethod):
     family: ClassVar[str] = "mujoco"
     distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
     takes_gravity: ClassVar[bool] = True
+    many = ({"integrator": "RK4"},)
     colour: ClassVar[str] = "vermilion"
 
     def __post_init__(self) -> None:

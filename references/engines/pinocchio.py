@@ -17,7 +17,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import Axes, gravity_or_free, load, mass_model, mass_model_reason, principal_axes, version
-from ..environments.plain_numbers import read_many, take_axes
+from ..environments.plain_numbers import ManySamples, take_axes
 
 SCHEMES = ("Euler", "RK4")
 
@@ -89,12 +89,13 @@ class Pinocchio(Method):
         pin, axes = load("pinocchio", "pin", "Pinocchio"), take_axes(bodies, grid, self.unsupported)
         if axes is None:
             return None
+        samples = ManySamples(axes, grid)
         make = _rk4 if self.scheme == "RK4" else _euler
         starts = [(make(pin, _model(pin, each), grid.dt), np.roll(each.q0, -1), each.w0) for each in axes]
 
         def run() -> Block:
             q, w = (np.stack(part) for part in zip(*(_march(*start, grid) for start in starts), strict=True))
-            return read_many(axes, grid, {"q": np.roll(q, 1, axis=-1), "w": w})
+            return samples.trajectory({"q": np.roll(q, 1, axis=-1), "w": w})
 
         return run
 

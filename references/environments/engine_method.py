@@ -9,21 +9,21 @@ from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter_ns
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from conservative import registry
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.method import Grid, Method, Role, Run
+from conservative.methods.many import Bodies, RunMany
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
 
 from ..engine import gravity_or_free, mass_model_reason, principal_axes
 from .catalogue import Distribution
 from .client import Worker
 from .environment import Environment, find_environment
-from .plain_numbers import Samples, describe
+from .plain_numbers import ManySamples, Samples, describe, describe_many, take_axes
 from .workers import worker_of
 
 
@@ -45,6 +45,8 @@ class EngineMethod(Method):
         Whether its adapter has bodies about a fixed point in uniform gravity, beside free ones.
     free_only
         Why it has free bodies only, where it is the engine that has no others.
+    many
+        Settings that run many bodies at once, by the function `prepare_many` of what runs in the environment; by default none.
     """
 
     role: ClassVar[Role] = Role.ENGINE
@@ -53,6 +55,7 @@ class EngineMethod(Method):
     precision: ClassVar[str] = "f64"
     takes_gravity: ClassVar[bool] = False
     free_only: ClassVar[str] = ""
+    many: ClassVar[tuple[Mapping[str, Any], ...]] = ()
 
     def __post_init__(self) -> None:
         """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
@@ -103,10 +106,9 @@ class EngineMethod(Method):
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
-        environment, axes = self.environment, principal_axes(scene)
-        given = {"adapter": str(_inside(type(self))), "settings": self._settings(), **describe(axes, grid)}
+        axes = principal_axes(scene)
         samples = Samples(axes, grid, self.label)
-        run = WorkerRun(worker_of(environment, self.variables), given, samples)
+        run = WorkerRun(worker_of(self.environment, self.variables), self._given(describe(axes, grid)), samples)
         try:
             run.prepare()
         except NotImplementedError as error:
@@ -114,6 +116,23 @@ class EngineMethod(Method):
         except IntegrationFailed as failure:
             return partial(samples.failure, failure)
         return run
+
+    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+        """Have the worker prepare the run of many bodies; None where the adapter has none, or not for these bodies."""
+        axes = take_axes(bodies, grid, self.unsupported) if self in self.many_settings() else None
+        if axes is None:
+            return None
+        given = self._given(describe_many(axes, grid))
+        run = WorkerRun(worker_of(self.environment, self.variables), given, ManySamples(axes, grid))
+        run.prepare()
+        return run
+
+    @classmethod
+    def many_settings(cls) -> tuple[Method, ...]:
+        return tuple(cls(**settings) for settings in cls.many)
+
+    def _given(self, numbers: Mapping[str, Any]) -> dict[str, Any]:
+        return {"adapter": str(_inside(type(self))), "settings": self._settings(), **numbers}
 
     def _settings(self) -> dict[str, Any]:
         value: Any = self
@@ -151,15 +170,28 @@ def rate_limit_reason(scene: Scene, limit: float) -> str | None:
     return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 
-class WorkerRun:
-    """A run in a worker. Calling it gives the trajectory; `wall_time` times calls without the way to the worker."""
+Found = TypeVar("Found", covariant=True)
 
-    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Samples) -> None:
+
+class Reads(Protocol[Found]):
+    """Makes of what an engine hands over what a run gives."""
+
+    def trajectory(self, found: Mapping[str, Any]) -> Found:
+        """Return the samples."""
+
+    def failure(self, failure: IntegrationFailed) -> Found:
+        """Return what there is of a run whose engine did not answer."""
+
+
+class WorkerRun(Generic[Found]):
+    """A run in a worker. Calling it gives the samples; `wall_time` times calls without the way to the worker."""
+
+    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Reads[Found]) -> None:
         self._worker, self._given, self._samples = worker, given, samples
         self._number, self._start = 0, 0
         self._found: Mapping[str, Any] = {}
 
-    def __call__(self) -> Trajectory:
+    def __call__(self) -> Found:
         try:
             self._found = self._ask("run")
             return self._samples.trajectory(self._found)

@@ -18,7 +18,6 @@ from conservative.trajectory import Counters, Trajectory
 from ..engine import Axes, mass_model, principal_axes
 from .failures import EngineCrashed
 
-
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """What all of the bodies that run at once have in common."""
 
@@ -63,30 +62,38 @@ def take_axes(bodies: Bodies, grid: Grid, unsupported: Callable[[Scene], str | N
 
 
 def describe_many(axes: Sequence[Axes], grid: Grid) -> dict[str, Any]:
-    """Return the same of n scenes of one kind: what belongs to each stands in `rows` by name, and has n rows; `n` is there, too."""
+    """Return the same of n scenes of one kind: what belongs to each is named in `rows`, and has n of them."""
     every = [describe(each, grid) for each in axes]
     shared = {name: value for name, value in every[0].items() if name in SHARED}
     rows = {name: np.array([each[name] for each in every]) for name in every[0] if name not in SHARED}
-    return {**shared, **rows, "rows": list(rows), "n": len(every)}
+    return {**shared, **rows, "rows": list(rows)}
 
 
-def read_many(axes: Sequence[Axes], grid: Grid, found: Mapping[str, Any]) -> Block:
-    """Return the samples of n bodies, in body axes, of what an engine hands over: as `Samples` takes it, with n rows.
+class ManySamples:
+    """Makes a block of what an engine hands over of n bodies: what `Samples` takes of one, with n rows."""
 
-    Raises
-    ------
-    EngineCrashed
-        They are not what the grid asks for.
-    """
-    R_WF = from_quaternion(found["q"].reshape(-1, 4)).reshape(*found["q"].shape[:-1], 3, 3)
-    rates = np.asarray(found["w"] if "w" in found else found["w_W"], float)
-    wanted = (len(axes), grid.n_samples)
-    if R_WF.shape[:2] != wanted or rates.shape != (*wanted, 3):
-        raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {rates.shape}, not {wanted} samples")
-    R_FB = np.array([each.R_BF.T for each in axes])[:, None]
-    w = rates if "w" in found else (rates[..., None, :] @ R_WF)[..., 0, :]
-    R_WB, w_WB_B = R_WF @ R_FB, (w[..., None, :] @ R_FB)[..., 0, :]
-    return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)) & np.isfinite(w_WB_B).all(axis=(1, 2)))
+    def __init__(self, axes: Sequence[Axes], grid: Grid) -> None:
+        self._R_FB, self._wanted = np.array([each.R_BF.T for each in axes])[:, None], (len(axes), grid.n_samples)
+
+    def trajectory(self, found: Mapping[str, Any]) -> Block:
+        """Return the samples in body axes.
+
+        Raises
+        ------
+        EngineCrashed
+            They are not what the grid asks for.
+        """
+        R_WF = from_quaternion(np.asarray(found["q"], float).reshape(-1, 4)).reshape(*found["q"].shape[:-1], 3, 3)
+        rates = np.asarray(found["w"] if "w" in found else found["w_W"], float)
+        if R_WF.shape[:2] != self._wanted or rates.shape != (*self._wanted, 3):
+            raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {rates.shape}, not {self._wanted} samples")
+        w = rates if "w" in found else (rates[..., None, :] @ R_WF)[..., 0, :]
+        R_WB, w_WB_B = R_WF @ self._R_FB, (w[..., None, :] @ self._R_FB)[..., 0, :]
+        return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)) & np.isfinite(w_WB_B).all(axis=(1, 2)))
+
+    def failure(self, failure: IntegrationFailed) -> Block:
+        """Raise how the engine failed: it did so for all bodies."""
+        raise failure
 
 
 class Samples:

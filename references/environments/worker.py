@@ -7,7 +7,8 @@ It needs Python 3.9 and NumPy. A message is a prefix, values as JSON, and arrays
     the arrays, one after the other
 
 What is asked is one of `OPERATIONS`; the answer has what was found, or `error` and `message`. An adapter is a file with a
-function `prepare(given)`, which returns a function without arguments that integrates and returns values and arrays.
+function `prepare(given)`, which returns a function without arguments that integrates and returns values and arrays; some have
+`prepare_many(bodies)` for many at once, which is given a list of them.
 """
 
 from __future__ import annotations
@@ -101,8 +102,13 @@ class Adapters:
         return {"python": sys.version.split()[0]}
 
     def prepare(self, adapter: str, settings: Message, **numbers: Any) -> Message:
-        """Prepare a run of a scene, which is numbers, with settings of the engine."""
-        run = self._load(adapter).prepare(SimpleNamespace(**numbers, **settings))
+        """Prepare a run of a scene, which is numbers, with settings of the engine, or of many if some stand in rows."""
+        loaded = self._load(adapter)
+        rows = numbers.pop("rows", None)
+        if rows is None:
+            run = loaded.prepare(SimpleNamespace(**numbers, **settings))
+        else:
+            run = loaded.prepare_many([SimpleNamespace(**body, **settings) for body in _split(numbers, rows)])
         self._count += 1
         self._runs[self._count] = run
         return {"run": self._count}
@@ -131,6 +137,18 @@ class Adapters:
     def forget(self, run: int) -> None:
         """Forget a run that nobody can ask for any more."""
         self._runs.pop(run, None)
+
+
+def _split(numbers: Message, rows: list[str]) -> list[Message]:
+    """Return the numbers of each body; those of the names in `rows` have a row for each, the others are all bodies'."""
+    count = len(numbers[rows[0]])
+    shared = {name: value for name, value in numbers.items() if name not in rows}
+    return [{**shared, **{name: _unwrap(numbers[name][i]) for name in rows}} for i in range(count)]
+
+
+def _unwrap(value: Any) -> Any:
+    """Return an array as it is, and a number of NumPy's as Python's."""
+    return value if value.shape else value.item()
 
 
 def _wall_time(run: Any, calls: int) -> float:

@@ -86,9 +86,9 @@ def _open_picture(out: Path | None) -> AbstractContextManager[IO[str] | None]:
 def _connect(address: str | None) -> AbstractContextManager[Any]:
     if address is None:
         return nullcontext()
-    from conservative.integration.cluster import connect
+    from conservative.integration.cluster import open_client
 
-    return connect(address)
+    return open_client(address)
 
 
 def _run(planned: Sweep, picture: IO[str] | None) -> dict[str, Any]:

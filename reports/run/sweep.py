@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,13 +16,13 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import Array
 from conservative.check import MOST_STEPS, describe, positive_number
-from conservative.errors import BadInput, NotWritten, nearest
+from conservative.errors import AccuracyNotReached, BadInput, NotWritten, nearest
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
 from conservative.integration.spread import spread
 from conservative.method import grid_for
-from conservative.outcome import ProgressOfMany
+from conservative.outcome import ChoiceForMany, ProgressOfMany
 from conservative.scene import Scene
 
 from ..tables.cells import finite_or_none, outcome_record
@@ -123,11 +124,13 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
         tell(_kept_text(sweep, progress))
         step(progress.done / progress.total, _progress_text(sweep, progress))
 
-    step(0.0, "starting")
+    step(0.0, "preparing: a first run compiles")
     try:
         starts, settings = spread(sweep.scene, sweep.n, seed=sweep.seed, **sweep.spread), _given(sweep.settings)
         begin = perf_counter()
-        found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AccuracyNotReached)  # the summary says so
+            found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
     except KeyboardInterrupt as stop:
         if heard and (text := _kept_text(sweep, heard[0])):
             stop.add_note(text)
@@ -145,6 +148,9 @@ def _in_options(error: BadInput) -> BadInput:
     """Return an error about an argument of a function as one about an option."""
     allowed = error.allowed.replace("resume=True", "--resume")
     argument = _WORDS.get(error.argument, error.argument)
+    if argument == "samples":
+        allowed = allowed.replace("a larger one", "fewer samples or starts, or a folder for them, --out")
+        return BadInput(argument, str(error.got).partition("for ")[2], allowed)
     if isinstance(error, NotWritten):
         return NotWritten(argument, error.path, error.cause, allowed)
     return BadInput(argument, error.got, allowed)
@@ -159,8 +165,8 @@ def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
 
 
 def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    steps = f", {rate_text(progress.rate * sweep.steps)} body-steps/s" if sweep.steps else ""
-    return f"{progress.done:,} of {progress.total:,} bodies, {rate_text(progress.rate)}/s{steps}"
+    steps = f", {rate_text(progress.rate * sweep.steps)} steps/s" if sweep.steps else ""
+    return f"{rate_text(progress.rate)} bodies/s{steps}"
 
 
 def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
@@ -177,6 +183,7 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
         "dt": found.grid.dt,
         "steps": found.grid.n_steps,
         "t_end": float(found.t[-1]),
+        "error": _error_of(found.choice),
         "samples": len(found.t),
         "outcomes": {"ok": len(found) - len(failed), **kinds},
         "failures": [
@@ -190,6 +197,13 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
         "bodies_per_second": last.rate if last else 0.0,
         "body_steps_per_second": last.rate * found.grid.n_steps if last else 0.0,
     }
+
+
+def _error_of(choice: ChoiceForMany | None) -> dict[str, Any] | None:
+    """Return the error that was asked for, rad, and its estimate, and on how many bodies that rests."""
+    if choice is None:
+        return None
+    return {"asked": choice.error, "estimate": choice.estimate, "reached": choice.reached, "bodies": choice.bodies}
 
 
 def _flat(varied: Mapping[str, Any]) -> dict[str, str]:
@@ -207,7 +221,7 @@ def _largest(values: Array) -> dict[str, Any] | None:
 
 def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     """Return quantiles of angles from the mean attitude, rad, at a few times, s."""
-    samples = np.unique(np.linspace(0, len(found.t) - 1, MOST_TIMES).astype(int)).tolist()
+    samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
     return [
         {"t": float(found.t[i])}

@@ -4,6 +4,12 @@ from functools import partial
 
 import numpy as np
 
+PER_BODY = (
+    *("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat"),
+    *("body_invweight0", "dof_invweight0"),
+)
+"""What of a model belongs to the body in it, beside gravity."""
+
 
 def prepare(given):
     """Return a run on a free joint, or on a ball joint at the fixed point.
@@ -33,6 +39,40 @@ def prepare(given):
         return {"q": q, "w": w}
 
     run.data = data  # what owns the views
+    return run
+
+
+def prepare_many(bodies):
+    """Return a run of many bodies, each in a world of its own, with rows of its own in the model."""
+    import mujoco
+    import mujoco_warp
+    import warp
+
+    given, count = bodies[0], len(bodies)
+    warp.config.quiet = True
+    with warp.ScopedDevice("cpu"):
+        hosts = [_model(mujoco, body) for body in bodies]
+        model, data = mujoco_warp.put_model(hosts[0]), mujoco_warp.make_data(hosts[0], nworld=count)
+        for name in PER_BODY:
+            rows = np.array([getattr(host, name) for host in hosts])
+            setattr(model, name, warp.array(rows.astype(np.float32), dtype=getattr(model, name).dtype))
+        gravity = np.array([host.opt.gravity for host in hosts], np.float32)
+        model.opt.gravity = warp.array(gravity, dtype=warp.vec3)
+        mujoco_warp.step(model, data)
+        step = _record(warp, partial(mujoco_warp.step, model, data))
+    qpos, qvel = data.qpos.numpy(), data.qvel.numpy()  # views of what the engine computes with
+    q0, w0 = np.array([body.q0 for body in bodies]), np.array([body.w0 for body in bodies])
+
+    def run():
+        qpos[:, :-4], qpos[:, -4:], qvel[:, :-3], qvel[:, -3:] = 0, q0, 0, w0
+        q, w = np.empty((count, len(given.steps), 4)), np.empty((count, len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                step()
+            q[:, sample], w[:, sample] = qpos[:, -4:], qvel[:, -3:]
+        return {"q": q, "w": w}
+
+    run.data = data, model  # what owns the views, and the rows
     return run
 
 

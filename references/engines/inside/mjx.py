@@ -1,9 +1,15 @@
 """MJX in its environment. Source: MuJoCo's documentation, MJX; JAX's, double precision (x64)."""
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
+
+PER_BODY = (
+    *("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat"),
+    *("body_invweight0", "dof_invweight0"),
+)
+"""What of a model belongs to the body in it, beside gravity."""
 
 
 def prepare(given):
@@ -33,20 +39,68 @@ def prepare(given):
     return run
 
 
+def prepare_many(bodies):
+    """Return a run of many bodies, each a row of models and states, by `jax.vmap`."""
+    import jax
+    import mujoco
+    from mujoco import mjx
+
+    jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
+    given, q0, w0 = bodies[0], np.array([body.q0 for body in bodies]), np.array([body.w0 for body in bodies])
+    hosts = [_model(mujoco, body) for body in bodies]
+    one = mjx.put_model(hosts[0])
+    number = one.body_mass.dtype
+    rows = {name: np.array([getattr(host, name) for host in hosts]) for name in PER_BODY}
+    rows = {name: jax.numpy.asarray(values, number) for name, values in rows.items()}
+    gravity = jax.numpy.asarray(np.array([host.opt.gravity for host in hosts]), number)
+    data = mjx.make_data(one)
+    place = np.zeros((len(bodies), 3 * given.free))
+    qpos = jax.numpy.asarray(np.hstack([place, q0]), number)
+    qvel = jax.numpy.asarray(np.hstack([place, w0]), number)
+    counts = np.diff(given.steps).astype(np.int32)
+
+    together, given_to_it = _march_many(), (one, data, rows, gravity, qpos, qvel, counts)
+    jax.block_until_ready(together(*given_to_it))
+
+    def run():
+        start = q0[:, None], w0[:, None]
+        rest = (np.asarray(samples, float) for samples in together(*given_to_it))
+        q, w = (np.concatenate(both, axis=1) for both in zip(start, rest))  # noqa: B905
+        return {"q": q, "w": w}
+
+    return run
+
+
+@lru_cache(maxsize=1)
+def _march_many():
+    """Return what computes all samples of many bodies, compiled once for every number of bodies and of samples."""
+    import jax
+    from mujoco import mjx
+
+    def march(model, data, rows, gravity, qpos, qvel, counts):
+        model = model.replace(opt=model.opt.replace(gravity=gravity), **rows)
+        return _march_samples(mjx, jax, model, data.replace(qpos=qpos, qvel=qvel), counts)
+
+    return jax.jit(jax.vmap(march, in_axes=(None, None, 0, 0, 0, 0, None)))
+
+
+def _march_samples(mjx, jax, model, start, counts):
+    """Return samples of attitude and rates, after as many steps each as `counts` has."""
+
+    def advance(data, n_steps):
+        data = jax.lax.fori_loop(0, n_steps, lambda _, data: mjx.step(model, data), data)
+        return data, (data.qpos[-4:], data.qvel[-3:])
+
+    return jax.lax.scan(advance, start, counts)[1]
+
+
 @lru_cache(maxsize=1)
 def _march():
     """Return what computes all samples, compiled once for every number of them: step, counts and inertia are data."""
     import jax
     from mujoco import mjx
 
-    def march(model, start, counts):
-        def advance(data, n_steps):
-            data = jax.lax.fori_loop(0, n_steps, lambda _, data: mjx.step(model, data), data)
-            return data, (data.qpos[-4:], data.qvel[-3:])
-
-        return jax.lax.scan(advance, start, counts)[1]
-
-    return jax.jit(march)
+    return jax.jit(partial(_march_samples, mjx, jax))
 
 
 def _model(mujoco, given):

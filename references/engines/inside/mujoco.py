@@ -51,24 +51,23 @@ def prepare_with(mj: Any, given: Any) -> Any:
     return run
 
 
-def prepare_many(given):
-    """Return a run of many bodies, numbers of which stand in rows, by `mujoco.rollout`; see `prepare`."""
+def prepare_many(bodies):
+    """Return a run of many bodies by `mujoco.rollout`; see `prepare`."""
     import mujoco as mj
 
     mj.set_mju_user_warning(lambda message: None)
-    return prepare_many_with(mj, given)
+    return prepare_many_with(mj, bodies)
 
 
-def prepare_many_with(mj: Any, given: Any) -> Any:
+def prepare_many_with(mj: Any, bodies: Any) -> Any:
     """Return a run of many bodies, a model and a state for each, with a module `mujoco` that is there."""
     from mujoco.rollout import Rollout
 
-    bodies = [SimpleNamespace(**vars(given) | {name: vars(given)[name][i] for name in given.rows}) for i in range(given.n)]
-    models = [_model(mj, body) for body in bodies]
+    given, models = bodies[0], [_model(mj, body) for body in bodies]
     threads = getattr(given, "threads", 1)
     datas = [mj.MjData(models[0]) for _ in range(threads)]
-    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies)])
-    room = np.empty((given.n, max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
+    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies)])  # noqa: B905
+    room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
 
     def run():
         states = [start]

@@ -1,0 +1,114 @@
+"""Fields of many bodies at once, as numbers of the named tuples that kernels take (`conservative.kernels.fields`).
+
+What a potential's `kernel_field` does for one body is done here for n of them. Source: definitions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array
+from ..deferred_imports import kernels
+from ..potentials.gravity_gradient import GravityGradient
+from ..potentials.point_to_point import LinearSpring, PointAttraction
+from ..potentials.uniform_gravity import UniformGravity
+from .many import Bodies
+
+_NONE = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """The field of each body.
+
+    Attributes
+    ----------
+    like
+        The kernel's field, whatever its numbers.
+    numbers
+        These numbers (n, k), a row for each body; lengths in units of the longest.
+    energies
+        Which of the k are proportional to energy, J.
+    axis_W
+        Axes (n, 3), vectors of any length, world axes; 0 where nothing acts.
+    scale
+        Sizes (n,) of the potential, J.
+    """
+
+    like: Any
+    numbers: Array
+    energies: slice
+    axis_W: Array
+    scale: Array
+
+
+@singledispatch
+def find_fields(potential: Any, bodies: Bodies, R_BP: Array) -> Fields | None:
+    """Return the fields of bodies in axes R_BP (n, 3, 3); None of a kind that is not known here."""
+    return None
+
+
+@find_fields.register
+def _find_none(potential: None, bodies: Bodies, R_BP: Array) -> Fields:
+    n = len(bodies)
+    return Fields(None, np.zeros((n, 0)), slice(0), np.zeros((n, 3)), np.zeros(n))
+
+
+@find_fields.register
+def _find_gravity(potential: UniformGravity, bodies: Bodies, R_BP: Array) -> Fields:
+    moments = into_axes(read_parameter(bodies, "weight")[:, None] * read_parameter(bodies, "com_B"), R_BP)
+    up = np.broadcast_to(potential.axis_W, moments.shape)
+    return Fields(kernels("fields").Uniform(*_NONE), moments, slice(3), up, np.linalg.norm(moments, axis=1))
+
+
+@find_fields.register
+def _find_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Fields:
+    rest, stiffness = read_parameter(bodies, "rest_length"), read_parameter(bodies, "stiffness")
+    b, A, unit = _shrink_points(bodies, R_BP, rest)
+    stiffness, rest = stiffness * unit * unit, rest / unit
+    farthest = np.maximum(np.linalg.norm(b, axis=1) + np.linalg.norm(A, axis=1), rest)
+    like = kernels("point_fields").Spring(_NONE, _NONE, 0.0, 0.0)
+    return Fields(like, np.column_stack([b, A, stiffness, rest]), slice(6, 7), A, stiffness / 2 * farthest**2)
+
+
+@find_fields.register
+def _find_attractions(potential: PointAttraction, bodies: Bodies, R_BP: Array) -> Fields:
+    b, A, unit = _shrink_points(bodies, R_BP)
+    strength = read_parameter(bodies, "strength") / unit
+    scale = np.abs(strength) / np.hypot(np.linalg.norm(b, axis=1), np.linalg.norm(A, axis=1))
+    like = kernels("point_fields").Attraction(_NONE, _NONE, 0.0)
+    return Fields(like, np.column_stack([b, A, strength]), slice(6, 7), A, scale)
+
+
+@find_fields.register
+def _find_gradients(potential: GravityGradient, bodies: Bodies, R_BP: Array) -> Fields:
+    factor = 3 * read_parameter(bodies, "rate")[:, None, None] ** 2
+    rows = factor * (np.swapaxes(R_BP, 1, 2) @ read_parameter(bodies, "inertia") @ R_BP)
+    e = read_parameter(bodies, "direction_W")
+    like = kernels("gradient_field").Gradient(_NONE, _NONE, _NONE, _NONE)
+    return Fields(like, np.column_stack([rows.reshape(-1, 9), e]), slice(9), e, np.linalg.eigvalsh(rows)[:, -1] / 2)
+
+
+def read_parameter(bodies: Bodies, name: str) -> Array:
+    """Return a number, or numbers, of the potential of each body, (n, ...), of its own unit."""
+    if name in bodies.parameters:
+        return np.asarray(bodies.parameters[name], dtype=float)
+    value = np.asarray(getattr(bodies.scene.potential, name), dtype=float)
+    return np.broadcast_to(value, (len(bodies), *value.shape))
+
+
+def into_axes(v: Array, R_BP: Array) -> Array:
+    """Return vectors (n, 3) of any unit, body axes, in axes R_BP (n, 3, 3)."""
+    return np.asarray((v[:, None, :] @ R_BP)[:, 0, :])
+
+
+def _shrink_points(bodies: Bodies, R_BP: Array, *lengths: Array) -> tuple[Array, Array, Array]:
+    """Return the points of body and world (n, 3) in units of the longest length, m, and these units (n,), powers of two."""
+    b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
+    longest = np.column_stack([np.abs(b), np.abs(A), *lengths]).max(axis=1)
+    unit = np.ldexp(1.0, np.frexp(longest)[1])
+    return b / unit[:, None], A / unit[:, None], unit

@@ -1,0 +1,248 @@
+"""Ensembles on disk: what is read is what was run, whatever was in the way; and what is something else stays as it is."""
+
+import os
+import signal
+import subprocess
+import sys
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.integration import blocks, store
+
+zarr = pytest.importorskip("zarr")
+
+N = 22
+"""Bodies: three blocks of which the last is not full."""
+
+
+@pytest.fixture(autouse=True)
+def _small_blocks(monkeypatch):
+    monkeypatch.setattr(blocks, "MOST_BODIES", 8)
+
+
+def starts(n=N):
+    """Rates (n, 3), rad/s, of which the fourth is beyond what any step takes."""
+    w = np.random.default_rng(14).normal(size=(n, 3)) * 3
+    w[3] = 1e9
+    return w
+
+
+def run(path=None, **changes):
+    """Run tops in uniform gravity, each of its own weight."""
+    given = {
+        "w_WB_B0": starts(),
+        "dt": 0.05,
+        "t_end": 0.5,
+        "parameters": {"weight": np.linspace(1.0, 2.0, N)},
+        "threads": 1,
+        "method": "convected",
+    }
+    return cv.integrate_many(cv.scenes.lagrange_top(), **(given | changes), path=path)
+
+
+def digest(folder):
+    """What lies in a folder, by its paths."""
+    return {str(p.relative_to(folder)): sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def stop_after(count):
+    """A function of progress that interrupts a run after so many blocks."""
+
+    def tell(progress):
+        tell.calls += 1
+        if tell.calls == count:
+            raise KeyboardInterrupt
+
+    tell.calls = 0
+    return tell
+
+
+@pytest.fixture(scope="module")
+def in_memory():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks, "MOST_BODIES", 8)
+        return run()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run without a break."""
+    place = tmp_path_factory.mktemp("store") / "whole.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks, "MOST_BODIES", 8)
+        run(place)
+    return place
+
+
+def assert_same(found, wanted):
+    assert np.array_equal(found.R_WB[:], wanted.R_WB[:], equal_nan=True)
+    assert np.array_equal(found.w_WB_B[:], wanted.w_WB_B[:], equal_nan=True)
+    assert found.drifts.keys() == wanted.drifts.keys()
+    assert all(np.array_equal(found.drifts[name], wanted.drifts[name], equal_nan=True) for name in wanted.drifts)
+    assert {i: str(each) for i, each in found.failures.items()} == {i: str(each) for i, each in wanted.failures.items()}
+    assert {i: vars(each) for i, each in found.failures.items()} == {i: vars(each) for i, each in wanted.failures.items()}
+    assert (found.label, found.grid, len(found)) == (wanted.label, wanted.grid, len(wanted))
+
+
+def test_what_is_read_is_what_was_run(whole, in_memory):
+    found = cv.open_ensemble(whole)
+    assert_same(found, in_memory)
+    assert list(found.failures) == [3]
+    assert isinstance(found.failures[3], cv.NotConverged)
+    assert np.array_equal(found[4].energy, in_memory[4].energy)  # of its own weight
+    assert repr(found.bodies.take(4)) == repr(in_memory.bodies.take(4))
+    assert repr(found) == repr(in_memory)
+
+
+def test_samples_stay_on_the_disk(whole):
+    found = cv.open_ensemble(whole)
+    assert isinstance(found.R_WB, zarr.Array)
+    (whole / "R_WB/c/2/0/0/0").rename(whole / "away")  # what a slice of other blocks does not miss
+    try:
+        assert np.isfinite(found.R_WB[8:16, -1]).all()
+        assert np.isnan(found.R_WB[16:]).all()
+    finally:
+        (whole / "away").rename(whole / "R_WB/c/2/0/0/0")
+
+
+def test_what_was_in_memory_is_written_as_what_was_not(whole, in_memory, tmp_path):
+    in_memory.to_zarr(tmp_path / "copy.zarr")
+    assert digest(tmp_path / "copy.zarr") == digest(whole)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path, threads):
+    place = tmp_path / "a.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        run(place, progress=stop_after(1), threads=threads)
+    assert digest(place) != digest(whole)
+    with pytest.raises(cv.BadInput, match=r"22 bodies of which 14 have not been run; .*resume=True"):
+        cv.open_ensemble(place)
+    seen = []
+    run(place, resume=True, progress=seen.append, threads=threads)
+    assert len(seen) == 2
+    assert digest(place) == digest(whole)
+    run(place, resume=True, progress=seen.append)  # there is nothing to do
+    assert len(seen) == 2
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from conservative.integration import blocks, store
+from test_store import run
+blocks.MOST_BODIES = 8
+write, calls = store._write_columns, []
+
+def write_and_die(group, first, columns):
+    calls.append(first)
+    if len(calls) == 3:
+        columns = dict(list(columns.items())[:2])
+    write(group, first, columns)
+    if len(calls) == 3:
+        Path(sys.argv[2], "w_WB_B/c/1/0/.0123456789abcdef.partial").write_bytes(b"part of a chunk")
+        os.kill(os.getpid(), signal.SIGKILL)
+
+store._write_columns = write_and_die
+run(sys.argv[2])
+"""
+
+
+def test_a_killed_run_goes_on_to_the_same_bytes(whole, tmp_path):
+    place = tmp_path / "a.zarr"
+    command = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(place)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert (place / "R_WB/c/1/0/0/0").exists()  # of a block that is not done
+    assert not (place / "outcome/c/1").exists()
+    seen = []
+    run(place, resume=True, progress=seen.append)
+    assert len(seen) == 2
+    assert digest(place) == digest(whole)
+
+
+def test_a_full_disk_keeps_what_is_done(whole, tmp_path, monkeypatch):
+    place, put, files = tmp_path / "a.zarr", zarr.storage._local._put, []
+
+    def fill_up(path, value, exclusive=False):
+        if path.is_relative_to(place):
+            files.append(path)
+            if len(files) > 8:
+                raise OSError(28, os.strerror(28))
+        return put(path, value, exclusive)
+
+    monkeypatch.setattr(zarr.storage._local, "_put", fill_up)
+    with pytest.raises(cv.NotWritten, match=r"No space left on device.*blocks that are done are kept, and resume=True"):
+        run(place)
+    monkeypatch.undo()
+    monkeypatch.setattr(blocks, "MOST_BODIES", 8)
+    assert (place / "outcome/c/0").exists()
+    assert not (place / "outcome/c/1").exists()
+    run(place, resume=True)
+    assert digest(place) == digest(whole)
+
+
+CHANGES = {
+    "dt": ({"dt": 0.02}, "dt 0.05 there, 0.02 here; n_steps 10 there, 25 here"),
+    "method": ({"method": "reduced"}, "method 'conservative==0.2.0/convected' there, 'conservative==0.2.0/reduced"),
+    "start": ({"w_WB_B0": starts() * (1 + 1e-15)}, "another w_WB_B0;"),
+    "parameters": ({"parameters": {"weight": np.linspace(1.0, 2.1, N)}}, "another parameters;"),
+    "inertia": ({"inertia": np.ones((N, 3))}, "another inertia;"),
+    "number": ({"w_WB_B0": starts(4), "parameters": None}, "bodies 22 there, 4 here"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_another_run_does_not_go_on(whole, change):
+    before, (changes, said) = digest(whole), CHANGES[change]
+    with pytest.raises(cv.BadInput) as refused:
+        run(whole, resume=True, **changes)
+    assert said in str(refused.value)
+    assert digest(whole) == before
+
+
+def test_a_folder_that_is_there_is_left_alone(whole, tmp_path):
+    before = digest(whole)
+    with pytest.raises(cv.BadInput, match="where an ensemble is; allowed: a new folder, or resume=True"):
+        run(whole)
+    assert digest(whole) == before
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder/file").write_text("mine")
+    for name, said in (("file", "a file"), ("folder", "which is no ensemble"), ("file/below", "a file")):
+        with pytest.raises(cv.BadInput, match=said):
+            run(tmp_path / name, resume=True)
+    assert [path.read_text() for path in sorted(tmp_path.rglob("file"))] == ["mine", "mine"]
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path):
+    def fail(progress):
+        raise AssertionError("a block was run")
+
+    for place in (tmp_path / "missing/a.zarr", tmp_path / "a\0b", "/proc/a.zarr"):
+        with pytest.raises(cv.NotWritten, match="path: got"):
+            run(place, progress=fail)
+    for wrong, argument in (({"path": 3}, "path"), ({"resume": True}, "resume"), ({"path": "a", "resume": 1}, "resume")):
+        with pytest.raises(cv.BadInput, match=f"^{argument}: got"):
+            cv.integrate_many(cv.scenes.brick_flip(), **wrong)
+
+
+def test_two_do_not_write_to_one_folder(whole, in_memory):
+    what = in_memory.label, in_memory.bodies, in_memory.grid, True
+    with store.open_store(whole, *what), pytest.raises(cv.BadInput, match="which another process writes to"):  # noqa: SIM117
+        with store.open_store(whole, *what):
+            pass
+
+
+def test_what_is_no_ensemble_is_not_opened(tmp_path):
+    for place in (tmp_path, tmp_path / "missing", Path(__file__)):
+        with pytest.raises(cv.BadInput, match="no ensemble"):
+            cv.open_ensemble(place)
+    zarr.create_group(tmp_path / "a.zarr", attributes={"format": "conservative ensemble", "format_version": 99})
+    with pytest.raises(cv.BadInput, match="version 99 of its format; allowed: version 1"):
+        cv.open_ensemble(tmp_path / "a.zarr")
