@@ -30,7 +30,7 @@ def conservative(*arguments):
 def made_up(monkeypatch):
     """Measure nothing: two bodies of a field, on one of which ours is slower."""
     table = measurement.frame([each for lines in (*TWICE, *SLOWER) for each in lines])
-    monkeypatch.setattr(single_study, "measure_study", lambda study, progress: Measurements(table, pd.DataFrame()))
+    monkeypatch.setattr(single_study, "measure_study", lambda study, progress, scheduler: Measurements(table, pd.DataFrame()))
     return table
 
 
