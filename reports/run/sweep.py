@@ -224,9 +224,9 @@ def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     """Return quantiles of angles from the mean attitude, rad, at a few times, s."""
     samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
+    names = [f"p{100 * share:g}" for share in QUANTILES]
     return [
-        {"t": float(found.t[i])}
-        | {f"p{100 * share:g}": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
+        dict(zip(["t", *names], [float(found.t[i]), *map(finite_or_none, row)], strict=True))
         for i, row in zip(samples, quantiles.tolist(), strict=True)
     ]
 

@@ -165,7 +165,10 @@ def test_samples_that_do_not_fit_in_memory(monkeypatch):
     monkeypatch.setattr("conservative.integration.many.most_samples", lambda: 2)
     done = conservative("brick_flip", *SPREAD, "--starts", "3")
     assert done.exit_code == 2
-    assert "Error: samples: got 153 samples of 3 bodies; allowed: fewer samples or starts, or a folder for them, --out:" in done.stderr
+    assert (
+        "Error: samples: got 153 samples of 3 bodies; allowed: fewer samples or starts, or a folder for them, --out:"
+        in done.stderr
+    )
 
 
 @pytest.mark.parametrize("count", ["0", "5.5", "many", "nan", "inf"])
