@@ -18,7 +18,7 @@ def test_numbers_count_what_is_done_with_them():
     a, (b, _) = Counted(2.0), count_value((3.0, "text"))
     assert -(a * b + 1.0 - 4.0 / b) / 2 == -(6.0 + 1.0 - 4.0 / 3.0) / 2
     assert dict(counts) == {"multiplications": 1, "additions": 2, "divisions": 2}
-    2.0 * a  # noqa: B018
+    assert 2.0 * a == 4.0
     assert counts["multiplications"] == 2
     assert type(a * b) is Counted
 
