@@ -230,7 +230,7 @@ GPU = """## What a GPU would give, on paper
 The same count at the published peak of two cards in double precision, in picoseconds a body-step, and, by their bandwidth, a
 sample. A division or a square root is taken for {dear} FMAs. Nothing of this was run: it leaves out what limits such cards in
 practice, bodies that need more corrections than their neighbours above all. A consumer card does one operation in double
-precision for 64 in single; where every sample is kept, memory is the limit of both."""
+precision for 64 in single. Where every sample is kept, the limit is whichever takes longer, the step or the sample."""
 
 
 def main() -> None:
