@@ -88,7 +88,7 @@ def recommended_width() -> int:
 
 
 def march_batches(batches: Batches, t: Array) -> Array:
-    """Return states (s, m, n) at times t (s,), s, batch after batch; nan from where a body does not get on."""
+    """Return states (..., m, n) at times t (s,), s, batch after batch; nan from where a body does not get on."""
     states = np.full((len(t), *batches.start.shape), np.nan)
     states[0] = batches.start
     with batches.integrators.borrow() as integrator:
@@ -102,7 +102,7 @@ def march_batches(batches: Batches, t: Array) -> Array:
 
 
 def march_ensemble(batches: Batches, t: Array) -> Array:
-    """Return states (s, m, n) at times t (s,), s, from `ensemble_propagate_until_batch` on one thread.
+    """Return states (..., m, n) at times t (s,), s, from `ensemble_propagate_until_batch` on one thread.
 
     It copies its integrator for each batch.
     """
