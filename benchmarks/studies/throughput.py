@@ -72,14 +72,14 @@ class Kind:
 class Point:
     """A setting that reaches its end, in one way: errors, rad, by which one they are, and what a body costs, s.
 
-    That is a share of a call, and of its preparation with what is compiled at hand; 0 until that has been measured.
+    That is a share of a call, and of its preparation with what is compiled at hand.
     """
 
     way: Way
     case: Case
     errors: dict[str, float]
     spent: float
-    prepare: float = 0.0
+    prepare: float
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -147,7 +147,7 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
             continue
         errors = read_errors(found, kind.truth)
         n = len(kind.few)
-        line.append(Point(way, case, errors, found.spent / n))
+        line.append(Point(way, case, errors, found.spent / n, found.prepare / n))
         for name, error in errors.items():
             yield case.row(
                 Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method)

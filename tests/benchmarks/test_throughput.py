@@ -107,7 +107,7 @@ def test_a_setting_that_would_take_too_long_says_so():
 
 def test_a_lucky_setting_decides_nothing():
     errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
-    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0) for each in errors]
+    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
     assert throughput.decide(line) == line[1:]
 
 
