@@ -197,7 +197,9 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
     argument, known = f"potential.{name}", list_parameters(scene)
     if name not in known:
-        allowed = nearest(name, known) if known else "none: the scene has no potential, or one without numbers that can be spread"
+        allowed = (
+            nearest(name, known) if known else "none: the scene has no potential, or one without numbers that can be spread"
+        )
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
     deviation = read_number(argument, value)
