@@ -155,6 +155,11 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
     return line
 
 
+def say(size: int) -> str:
+    """Return a number of bodies in words."""
+    return "1 body" if size == 1 else f"{size} bodies"
+
+
 def name_of(way: Way, what: str) -> str:
     """Return the quantity of a row: what it is of, and the way, such as `1000 bodies, one at a time`."""
     return ", ".join(filter(None, (what, way.text)))
@@ -185,12 +190,12 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
     study, ready = kind.study, {}
     for i, point in enumerate(points):
         if reason := too_long(point, size, study.longest_run):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, f"{size} bodies")), reason)
+            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), reason)
             continue
         way = replace(point.way, method=point.case.method)
         found = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
         if isinstance(found, Outcome):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, f"{size} bodies")), found)
+            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), found)
         else:
             ready[str(i)] = found
     rounds = QUICK_ROUNDS if study.quick else ROUNDS
@@ -222,4 +227,4 @@ def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
     }
     for measure, value in values.items():
         outcome = UNCOUNTED if timing.outcome.ok and math.isnan(value) else timing.outcome
-        yield case.row(Value(measure, value, name_of(point.way, f"{size} bodies")), outcome, str(timing) if outcome.ok else "")
+        yield case.row(Value(measure, value, name_of(point.way, say(size))), outcome, str(timing) if outcome.ok else "")
