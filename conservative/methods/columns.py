@@ -44,14 +44,14 @@ def fill_columns(rows: Array, width: int) -> Array:
     return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
 
 
-def make_room(n: int, width: int) -> Array:
-    """Return room for n rows (n, width), without a unit, that begins where a line of the processor's cache does.
+def make_room(n: int, m: int) -> Array:
+    """Return room (n, m) for numbers, dimensionless, that begins where a line of the processor's cache does.
 
     Loading what lies across two lines costs as much as two loads.
     """
-    room = np.empty(n * width + LINE)
+    room = np.empty(n * m + LINE)
     first = -(room.ctypes.data // room.itemsize) % LINE
-    return room[first : first + n * width].reshape(n, width)
+    return room[first : first + n * m].reshape(n, m)
 
 
 def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
