@@ -15,11 +15,10 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from conservative import files, registry
 from conservative.kernels.lanes import REGISTER
@@ -35,6 +34,10 @@ SAMPLE = 96
 """Bytes of a sample: nine numbers of the attitude and three rates."""
 DEAR = 10
 """FMAs that a division or a square root is taken for on a GPU, where both are sequences of them."""
+
+
+Case = tuple[str, str, float]
+"""Method, kind of bodies, and step, s."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def count_series(order: int) -> Work:
     return Work(15 * pairs + 18 * order, 15 * pairs + 15 * order, 0, 0)
 
 
-def count_all() -> dict[tuple[str, str, float], Work]:
+def count_all() -> dict[Case, Work]:
     """Return the operations of each case: method, kind of bodies and step, s."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-W", "ignore", "-m", operations.__name__]
@@ -109,7 +112,7 @@ def count_all() -> dict[tuple[str, str, float], Work]:
     return found
 
 
-def reach(cases: Any, every: int = STEPS) -> dict[Any, float]:
+def reach(cases: Iterable[Case], every: int = STEPS) -> dict[Case, float]:
     """Return the time, s, of a body-step of each case among `BODIES`, samples every so many steps."""
     runs = {
         (name, kind, dt): registry.method(name).prepare_many(draw(kind, BODIES), Grid(dt, STEPS, every))
@@ -122,17 +125,32 @@ def reach(cases: Any, every: int = STEPS) -> dict[Any, float]:
     return {case: seconds / (BODIES * STEPS) for case, seconds in least.items()}
 
 
-def write_page() -> str:
-    """Measure, and return the page."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a page shows: operations of each case, time of one double's, bytes per second, and times of steps and samples, s."""
+
+    work: Mapping[Case, Work]
+    peaks: Mapping[str, float]
+    bandwidth: float
+    steps: Mapping[Case, float]
+    samples: Mapping[Case, float]
+
+
+def measure() -> Measured:
+    """Count and measure everything."""
     work, peaks, bandwidth = count_all(), find_peaks(), find_bandwidth()
-    steps, sampled = reach(work), reach(work, every=1)
-    again = find_peaks()
-    peaks = {name: min(peaks[name], again[name]) for name in peaks}
-    parts = [HEAD.format(**machine(), width=REGISTER), _peak_table(peaks, bandwidth), REACHED, _step_table(work, peaks, steps)]
-    samples = {case: sampled[case] - steps[case] for case in work}
-    parts += [SAMPLES.format(bytes=SAMPLE, bound=SAMPLE / bandwidth * 1e9), _sample_table(samples), GPU.format(dear=DEAR)]
+    steps, sampled, again = reach(work), reach(work, every=1), find_peaks()
+    least = {name: min(peaks[name], again[name]) for name in peaks}
+    return Measured(work, least, bandwidth, steps, {case: sampled[case] - steps[case] for case in work})
+
+
+def write_page(found: Measured) -> str:
+    """Return the page."""
+    head = HEAD.format(**machine(), width=REGISTER), _peak_table(found.peaks, found.bandwidth)
+    reached = REACHED, _step_table(found.work, found.peaks, found.steps)
+    samples = SAMPLES.format(bytes=SAMPLE, bound=SAMPLE / found.bandwidth * 1e9), _sample_table(found.samples)
     sources = "\n".join(f"* {device.name}: {device.source}." for device in DEVICES)
-    return "\n\n".join([*parts, _gpu_table(work), sources]) + "\n"
+    return "\n\n".join([*head, *reached, *samples, GPU.format(dear=DEAR), _gpu_table(found.work), sources]) + "\n"
 
 
 def _table(header: list[str], rows: list[list[str]]) -> str:
@@ -146,7 +164,7 @@ def _peak_table(peaks: Mapping[str, float], bandwidth: float) -> str:
     return _table(["operation", "ns a register", "10^9 doubles/s"], rows) + "\n\n" + writing
 
 
-def _step_table(work: Mapping[Any, Work], peaks: Mapping[str, float], steps: Mapping[Any, float]) -> str:
+def _step_table(work: Mapping[Case, Work], peaks: Mapping[str, float], steps: Mapping[Case, float]) -> str:
     rows = []
     for (name, kind, dt), each in work.items():
         bound, reached = each.bound(peaks), steps[name, kind, dt]
@@ -156,12 +174,12 @@ def _step_table(work: Mapping[Any, Work], peaks: Mapping[str, float], steps: Map
     return _table(["method", "bodies", "step, s", "×", "+", "÷", "√", "bound, ns", "reached, ns", "share"], rows)
 
 
-def _sample_table(samples: Mapping[Any, float]) -> str:
+def _sample_table(samples: Mapping[Case, float]) -> str:
     rows = [[f"`{name}`", kind.replace("_", " "), f"{seconds * 1e9:.1f}"] for (name, kind, _), seconds in samples.items()]
     return _table(["method", "bodies", "ns a sample"], rows)
 
 
-def _gpu_table(work: Mapping[Any, Work]) -> str:
+def _gpu_table(work: Mapping[Case, Work]) -> str:
     rows = []
     for (name, kind, _), each in work.items():
         fmas = each.fewest + DEAR * (each.divisions + each.roots)
@@ -212,14 +230,14 @@ GPU = """## What a GPU would give, on paper
 The same count at the published peak of two cards in double precision, in picoseconds a body-step, and, by their bandwidth, a
 sample. A division or a square root is taken for {dear} FMAs. Nothing of this was run: it leaves out what limits such cards in
 practice, bodies that need more corrections than their neighbours above all. A consumer card does one operation in double
-precision for 64 in single; where every sample is kept, memory is the limit of both."""
+precision for 64 in single. Where every sample is kept, the limit is whichever takes longer, the step or the sample."""
 
 
 def main() -> None:
     """Write the page, or print it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, help="file to write  [default: stdout]")
-    out, page = parser.parse_args().out, write_page()
+    out, page = parser.parse_args().out, write_page(measure())
     if out is None:
         print(page)
     else:

@@ -75,7 +75,7 @@ def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Map
     array = real_array(value)
     other = next(iter(given), None)
     n = "n" if other is None else str(len(given[other]))
-    allowed = "numbers of shape " + " or ".join(f"({', '.join((n, *map(str, shape)))})" for shape in shapes)
+    allowed = "numbers of shape " + " or ".join(f"({n},{','.join(f' {size}' for size in shape)})" for shape in shapes)
     allowed += "" if other is None else f": {n} bodies, as {other} has"
     if array is None:
         raise BadInput(name, describe(value), allowed)

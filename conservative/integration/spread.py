@@ -85,8 +85,8 @@ def spread(
     ------
     BadInput
         A spread cannot be read, or is one of nothing, such as 2 % of a body's rate at rest; the potential has no such number;
-        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no such
-        integer, or so many do not fit in memory.
+        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no
+        such integer, or so many do not fit in memory.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
@@ -197,7 +197,7 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
     argument, known = f"potential.{name}", list_parameters(scene)
     if name not in known:
-        allowed = nearest(name, known) if known else "none: the scene has no potential, or one without numbers that can be spread"
+        allowed = nearest(name, known) if known else "none: the scene has no potential with numbers to spread"
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
     deviation = read_number(argument, value)

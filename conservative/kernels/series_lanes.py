@@ -16,7 +16,7 @@ from llvmlite import ir
 from numba.core import cgutils
 
 from .lanes_llvm import REGISTER
-from .series import HIGHEST, LOWEST, find_terms, load_once, next_by_sums, outwards
+from .series import HIGHEST, LOWEST, TurningSeries, find_terms, list_products, load_once, outwards, turn_rows
 from .series_llvm import VolatileLoad
 from .traced import Axes
 
@@ -41,9 +41,16 @@ class Emitter:
             memory.align = _BYTES
             self._memory = builder.bitcast(memory, ir.IntType(8).as_pointer())
 
-    def find_next(self, *given):
-        """The next coefficients: another order's sums are formed while one waits for the newest."""
-        return next_by_sums(self, *given)
+    def find_next(self, c, n, h, K, field):
+        """The coefficients n + 1 of g, a and w, with few operations in all."""
+        f = self.times(h, self.constant(1.0 / (n + 1)))
+        gw, aw, ww = self.convolve(n, 0, n, *list_products(c))
+        torque = field.accelerate(c, n)
+        rates = self.times(K, ww) if torque is None else self.add(torque, K, ww)
+        g, a = self.times(f, gw), self.times(f, aw)
+        if isinstance(field, TurningSeries):
+            g, a = turn_rows(self, c, f, field, g, a)
+        return g, a, self.times(f, rates)
 
     def _each(self, build, *values):
         """What `build` makes of every component; a scalar has one for all of them."""

@@ -69,7 +69,8 @@ class Bodies:
         potential: Any = self.scene.potential
         if not self.parameters:
             return potential
-        own = replace(static_part(potential), **{name: values[i] for name, values in self.parameters.items()})
+        numbers = {name: values[i].item() if values[i].ndim == 0 else values[i] for name, values in self.parameters.items()}
+        own = replace(static_part(potential), **numbers)
         return Turning(own, potential.orbit) if isinstance(potential, Turning) else own
 
     @cached_property

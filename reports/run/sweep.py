@@ -22,7 +22,7 @@ from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
 from conservative.integration.spread import spread
 from conservative.method import grid_for
-from conservative.outcome import ChoiceForMany, ProgressOfMany
+from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
 from ..tables.cells import finite_or_none, outcome_record
@@ -149,7 +149,7 @@ def _in_options(error: BadInput) -> BadInput:
     allowed = error.allowed.replace("resume=True", "--resume")
     argument = _WORDS.get(error.argument, error.argument)
     if argument == "samples":
-        allowed = allowed.replace("a larger one", "fewer samples or starts, or a folder for them, --out")
+        allowed = allowed.replace("a larger one, or a path", "fewer samples or starts, or a folder for them, --out")
         return BadInput(argument, str(error.got).partition("for ")[2], allowed)
     if isinstance(error, NotWritten):
         return NotWritten(argument, error.path, error.cause, allowed)
@@ -172,6 +172,7 @@ def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
 def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
     """Return what was run, how it ended, what drifted and how far attitudes are apart."""
     found, last = result.ensemble, result.last
+    rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
     failed = sorted(found.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
     return {
@@ -194,12 +195,12 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
         "angle_from_mean": _angles(found),
         "wall_time": result.wall,
         "found_before": last.found if last else len(found),
-        "bodies_per_second": last.rate if last else 0.0,
-        "body_steps_per_second": last.rate * found.grid.n_steps if last else 0.0,
+        "bodies_per_second": rate,
+        "body_steps_per_second": rate * found.grid.n_steps,
     }
 
 
-def _error_of(choice: ChoiceForMany | None) -> dict[str, Any] | None:
+def _error_of(choice: Any) -> dict[str, Any] | None:
     """Return the error that was asked for, rad, and its estimate, and on how many bodies that rests."""
     if choice is None:
         return None
@@ -223,9 +224,9 @@ def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     """Return quantiles of angles from the mean attitude, rad, at a few times, s."""
     samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
+    names = [f"p{100 * share:g}" for share in QUANTILES]
     return [
-        {"t": float(found.t[i])}
-        | {f"p{100 * share:g}": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
+        dict(zip(["t", *names], [float(found.t[i]), *map(finite_or_none, row)], strict=True))
         for i, row in zip(samples, quantiles.tolist(), strict=True)
     ]
 

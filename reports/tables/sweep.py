@@ -41,7 +41,8 @@ def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
 
 def _error_text(error: dict[str, Any]) -> str:
     reached = "" if error["reached"] else ", which is not what was asked for"
-    return f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies; asked: {error['asked']:g} rad{reached}"
+    estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
+    return f"{estimate}; asked: {error['asked']:g} rad{reached}"
 
 
 def _time_text(summary: Summary) -> str:
