@@ -14,7 +14,22 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-class BadInput(ValueError):
+class _Error(Exception):
+    """What can be sent to another process, whatever arguments its `__init__` takes."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _restore, (type(self), self.args, self.__dict__)
+
+
+def _restore(kind: type[_Error], args: tuple[object, ...], values: dict[str, object]) -> _Error:
+    """Return an error that was sent from another process: without a call of its constructor, which takes other arguments."""
+    found = kind.__new__(kind, *args)
+    found.args = args
+    found.__dict__.update(values)
+    return found
+
+
+class BadInput(_Error, ValueError):
     """An argument that cannot be used; the message says which one, what was got and what is allowed."""
 
     def __init__(self, argument: str, got: object, allowed: str) -> None:
@@ -49,7 +64,7 @@ class NotWritten(BadInput):
         super().__init__(argument, f"{str(path)!r} ({getattr(cause, 'strerror', None) or cause})", allowed)
 
 
-class MissingEngine(ImportError):
+class MissingEngine(_Error, ImportError):
     """An engine is not installed; the message has the line that installs it."""
 
     def __init__(self, engine: str, package: str) -> None:
@@ -57,7 +72,7 @@ class MissingEngine(ImportError):
         super().__init__(f"engine: got {engine!r}, which is not installed; allowed after: pip install {package}")
 
 
-class MissingExtra(ImportError):
+class MissingExtra(_Error, ImportError):
     """Packages of an extra are not installed; the message has the line that installs them.
 
     Attributes: `what` needs them, the names of the `packages`, and the `extra` that brings them.
@@ -69,25 +84,14 @@ class MissingExtra(ImportError):
         super().__init__(f"{what}: got an environment without {packages}; {allowed}")
 
 
-class IntegrationFailed(ArithmeticError):
+class IntegrationFailed(_Error, ArithmeticError):
     """A run did not reach its end, or not as it says. Attribute: `outcome`, which trajectories and tables carry."""
 
     outcome: Outcome
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return _restore, (type(self), self.args, self.__dict__)
-
     def at_times(self, unit: float) -> Self:
         """Return the failure with its time, which is in units of `unit` s, in s; of failures without a time the same."""
         return self
-
-
-def _restore(kind: type[IntegrationFailed], args: tuple[object, ...], values: dict[str, object]) -> IntegrationFailed:
-    """Return a failure that was sent to another process: without a call of its constructor, which takes other arguments."""
-    found = kind.__new__(kind, *args)
-    found.args = args
-    found.__dict__.update(values)
-    return found
 
 
 class NotConverged(IntegrationFailed):
@@ -170,7 +174,7 @@ class NotRun(IntegrationFailed):
         super().__init__(reason)
 
 
-class PotentialFailed(RuntimeError):
+class PotentialFailed(_Error, RuntimeError):
     """A function that a potential was made of raised an exception, which is this one's `__cause__`."""
 
     def __init__(self, cause: BaseException) -> None:

@@ -10,7 +10,9 @@ in common, a task whose worker dies is run by another one, and what is run twice
 same version, which is asked for before any work. From processors of the same kind the same numbers come back as without a
 cluster, bit for bit; compiled code differs from kind to kind.
 
-Source: `concurrent.futures` and `distributed.Client.get_executor`; all scheduling is Dask's.
+Source: `concurrent.futures` and `distributed.Client.submit`; all scheduling is Dask's. `Client.get_executor` fetches results
+side by side, and with distributed 2026.8.0 some of those that a dying worker had never came. Here they are fetched one after
+another.
 """
 
 from __future__ import annotations
@@ -129,15 +131,25 @@ class ClusterExecutor(Executor):
 
     def __init__(self, client: Any) -> None:
         self.places = sum(client.nthreads().values())
-        self._executor: Executor = client.get_executor(pure=False)
+        self._client = client
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
         """Return the future of a call, whose function and arguments are made bytes of: they may be those of a script."""
-        return self._executor.submit(_call, VERSION, dump((fn, args, kwargs)))
+        task = self._client.submit(_call, VERSION, dump((fn, args, kwargs)), pure=False)
+        found: Future[T] = Future()
+        found.add_done_callback(lambda done: task.cancel() if done.cancelled() else None)
+        task.add_done_callback(lambda task: _pass_on(task, found))
+        return found
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Wait for all calls, or give them up. The client stays as it is."""
-        self._executor.shutdown(wait=wait and not cancel_futures)
+
+def _pass_on(task: Any, found: Future[Any]) -> None:
+    """Make the result of a task that of a future. Dask calls this for one task after the other, in a thread of its own."""
+    if not found.set_running_or_notify_cancel():
+        return
+    try:
+        found.set_result(task.result())
+    except BaseException as error:  # whatever it is, it is for whoever waits
+        found.set_exception(error)
 
 
 def _call(version: str, content: bytes) -> Any:

@@ -32,6 +32,7 @@ COLUMNS = 7
         "conservative study throughput --sizes 1,1000,1e6 --time-limit 5",
         "conservative study convergence --scenes lagrange_top --methods reduced,gauss --json",
         "conservative study engines_at_one_step --engines all --out one_step",
+        "conservative study hard_cases --scheduler tcp://10.0.0.7:8786",
     ),
 )
 @click.argument("name", shell_complete=completion.studies)
@@ -40,12 +41,15 @@ COLUMNS = 7
 @click.option(
     "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="Engines in environments, too."
 )
-@click.option("--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each field, or of each kind.  [default: 10, 64]")
+@click.option(
+    "--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each field, or of each kind.  [default: 10, 64]"
+)
 @click.option("--seed", type=click.IntRange(0), metavar="S", help="Of the random bodies.  [default: 0]")
 @click.option("--sizes", multiple=True, metavar="N,M", help="Of throughput: numbers of bodies.  [default: 1,10,...,1e6]")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option("--time-limit", type=float, metavar="S", help="Longest run to plan for, s.  [default: 0.6, with --quick 0.15]")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that finds the rows of a study without times.")
 @click.option("--json", "as_json", is_flag=True, help="Rows and samples as JSON on stdout.")
 @click.option("--csv", type=FilePath(), help="Write the rows as CSV.")
 @click.option("--markdown", type=FilePath(), help="Write the tables as Markdown.")
@@ -97,10 +101,11 @@ def _measure(name: str, options: dict[str, Any]) -> StudyRows:
 
     scenes, methods = (tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods"))
     engines, sizes = (tuple(split_list(key, options.pop(key))) for key in ("engines", "sizes"))
+    scheduler = options.pop("scheduler")
     planned, source = plan_study(name, Extent(scenes, methods, engines, sizes, **options)), provenance()
     made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
     with interruptible(signal.SIGTERM), progress() as step:
-        found = measure_study(planned, lambda done, total, what: step(done / total, what))
+        found = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
     return StudyRows(name, found.table, found.samples, made)
 
 

@@ -6,10 +6,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.studies import engine_selection, hard_cases, many_runs, random, selection, stability, studies
-from conservative.benchmarks.studies.study import Progress, Study
+from conservative.benchmarks.studies import (
+    engine_selection,
+    hard_cases,
+    many_runs,
+    on_cluster,
+    random,
+    selection,
+    stability,
+    studies,
+)
+from conservative.benchmarks.studies.study import Finding, Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
+from conservative.integration.cluster import open_client
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -60,7 +70,9 @@ def plan_study(name: str, extent: Extent) -> Study:
 def _random(extent: Extent) -> Study:
     _require_drawn(extent)
     if extent.sizes:
-        raise BadInput("sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies")
+        raise BadInput(
+            "sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
+        )
     bodies = DEFAULT_BODIES if extent.bodies is None else extent.bodies
     found = selection.methods(extent.methods or None, extent.skip_missing, random.settings)
     methods = tuple(dict.fromkeys((*found, *_engines(extent))))
@@ -84,7 +96,7 @@ def _require_drawn(extent: Extent) -> None:
 
 
 def read_count(argument: str, text: str) -> int:
-    """Return the number that a text such as `1000` or `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
+    """Return the number that a text such as `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
     with suppress(ValueError, OverflowError):
         if (number := float(text)) >= 1 and number == int(number):
             return int(number)
@@ -111,10 +123,24 @@ def _methods(name: str, extent: Extent) -> tuple[Method, ...]:
     return hard_cases.settings(found) if name == "hard_cases" else found
 
 
-def measure_study(study: Study, progress: Progress) -> Measurements:
-    """Return all that the study finds."""
-    findings = list(studies.findings(study, progress))
+def measure_study(study: Study, progress: Progress, scheduler: str | None = None) -> Measurements:
+    """Return all that the study finds: here, or on the Dask cluster whose scheduler has this address.
+
+    Raises
+    ------
+    BadInput
+        The study is one of times, no scheduler answers, or its workers cannot be used.
+    MissingExtra
+        Dask, of the extra `cluster`, is not installed.
+    """
+    findings = list(studies.findings(study, progress)) if scheduler is None else _find_there(study, progress, scheduler)
     return Measurements(
         measurement.frame(each for each in findings if isinstance(each, measurement.Measurement)),
         samples.frame(each for each in findings if isinstance(each, samples.Samples)),
     )
+
+
+def _find_there(study: Study, progress: Progress, scheduler: str) -> list[Finding]:
+    on_cluster.require_untimed(study.name)
+    with open_client(scheduler) as client:
+        return list(on_cluster.find_on_cluster(client, study, progress))

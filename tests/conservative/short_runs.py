@@ -86,7 +86,9 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
-            yield f"{scene.name}, {method.name}, many, 1", partial(run_many, scene, method, Grid(scene.dt, 33, 16))
+            for factor, n in ((1, 33), (40, 3)):
+                dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
+                yield f"{scene.name}, {method.name}, many, {factor}", partial(run_many, scene, method, Grid(dt, n, 16))
         yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_eval=(0.3 * scene.dt, 7.7 * scene.dt))
 
 

@@ -33,7 +33,14 @@ def starts(n=N):
 
 def run(path=None, **changes):
     """Run tops in uniform gravity, each of its own weight."""
-    given = {"w_WB_B0": starts(), "dt": 0.05, "t_end": 0.5, "parameters": {"weight": np.linspace(1.0, 2.0, N)}, "threads": 1, "method": "convected"}
+    given = {
+        "w_WB_B0": starts(),
+        "dt": 0.05,
+        "t_end": 0.5,
+        "parameters": {"weight": np.linspace(1.0, 2.0, N)},
+        "threads": 1,
+        "method": "convected",
+    }
     return cv.integrate_many(cv.scenes.lagrange_top(), **(given | changes), path=path)
 
 

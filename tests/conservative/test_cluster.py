@@ -1,0 +1,103 @@
+"""A real Dask cluster, two workers of which one is killed: the same numbers as without one; what is not there is said."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.integration import blocks, cluster
+from conservative.integration.cluster import open_client, require_versions
+
+distributed = pytest.importorskip("distributed")
+
+N, KILLED = 24, 9
+"""Bodies, one a block, and of how many of them the results are there when a worker is killed."""
+LIMIT = 60.0
+"""Time, s, in which processes start, on however busy a machine."""
+
+
+def start(stack, folder, program, *arguments):
+    """Start a program of Dask, which ends with the stack."""
+    command = [sys.executable, "-m", f"distributed.cli.dask_{program}", "--no-dashboard", *arguments]
+    log = stack.enter_context((folder / program).open("ab"))
+    process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder)
+    stack.callback(process.wait)
+    stack.callback(process.kill)
+    return process
+
+
+def start_scheduler(stack, folder):
+    """Start a scheduler and return its address."""
+    file, end = folder / "scheduler.json", time.monotonic() + LIMIT
+    start(stack, folder, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    return json.loads(file.read_text())["address"]
+
+
+def run(**options):
+    """Run tops of one block each, of which the fourth fails."""
+    w = np.random.default_rng(14).normal(size=(N, 3)) * 3
+    w[3] = 1e9
+    weight = {"weight": np.linspace(1.0, 2.0, N)}
+    given = {"parameters": weight, "dt": 1e-4, "t_end": 2.0, "sample_every": 5000, "method": "convected", "threads": 1}
+    return cv.integrate_many(cv.scenes.lagrange_top(), w_WB_B0=w, **given, **options)
+
+
+def test_a_worker_that_is_killed_loses_nothing_and_nothing_comes_twice(tmp_path, monkeypatch):
+    monkeypatch.setattr(blocks, "MOST_BODIES", 1)
+    alone, done = run(), []
+    with ExitStack() as stack:
+        address = start_scheduler(stack, tmp_path)
+        client = stack.enter_context(open_client(address, LIMIT))
+        with pytest.raises(cv.BadInput, match=r"client: got a scheduler at tcp.* without workers"):
+            run(client=client)
+        options = "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1"
+        workers = [start(stack, tmp_path, "worker", address, *options) for _ in range(2)]
+        client.wait_for_workers(2, timeout=LIMIT)
+
+        def kill_one(progress):
+            done.append(progress.done)
+            if progress.done == KILLED:
+                workers[0].send_signal(signal.SIGKILL)
+
+        found = run(client=client, progress=kill_one, path=tmp_path / "a.zarr")
+        assert workers[0].wait() == -signal.SIGKILL
+        assert done == list(range(1, N + 1))
+        assert np.array_equal(found.R_WB[:], alone.R_WB, equal_nan=True)
+        assert np.array_equal(found.w_WB_B[:], alone.w_WB_B, equal_nan=True)
+        assert {i: str(each) for i, each in found.failures.items()} == {i: str(each) for i, each in alone.failures.items()}
+        assert list(found.failures) == [3]
+
+        monkeypatch.setattr(cluster, "VERSION", "0.0.1")
+        with pytest.raises(cv.BadInput, match=rf"{cv.VERSION} on tcp://.*; allowed: 0\.0\.1, as here, on all of them"):
+            require_versions(client)
+        with pytest.raises(cv.BadInput, match=rf"a worker of version {cv.VERSION}; allowed: 0\.0\.1"):
+            cluster.ClusterExecutor(client).submit(sum, ()).result()
+
+
+def test_a_scheduler_that_is_not_there_is_said_in_one_line(capfd):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        nowhere = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    for address in (nowhere, "nowhere", ""):
+        with (
+            pytest.raises(cv.BadInput, match=r"scheduler: got '.*', where no scheduler answers") as refused,
+            open_client(address, 0.5),
+        ):
+            pass
+        assert "\n" not in str(refused.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_is_no_client_is_refused():
+    for wrong in ("tcp://127.0.0.1:8786", 3):
+        with pytest.raises(cv.BadInput, match=r"client: got .*; allowed: a dask\.distributed\.Client"):
+            cv.integrate_many(cv.scenes.brick_flip(), client=wrong)
