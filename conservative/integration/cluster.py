@@ -44,10 +44,12 @@ _LOST = "a cluster that stays there; what was written to a path is kept, and res
 def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
     """Give a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, with Dask's own messages off in the block.
 
+    The scheduler has `limit`, s, to answer.
+
     Raises
     ------
     BadInput
-        No scheduler answers there within `limit` s, or it is no address.
+        No scheduler answers there, or it is no address.
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """
