@@ -4,7 +4,7 @@ Body number i is the same however many are drawn. Drawn with NumPy's PCG64 from 
 
 * second moments about the principal axes 0.1 to 1, log-uniform, so that a mass distribution has them; of the moments of inertia
   that they make the mean is 1 kg m^2 and the condition at most 5.5;
-* principal axes, and the attitude at the start, turned by rotations that are uniform on the group: all inertias are full matrices;
+* principal axes, and the attitude at the start, turned by rotations that are uniform on the group: inertias are full matrices;
 * rates at the start normal, 2 rad/s along each axis, which is 3.2 rad/s at the median;
 * heavy tops: the centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform.
 

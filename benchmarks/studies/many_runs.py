@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from conservative.methods.many import Block, Bodies, RunMany
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 
-from ..measures.timing import prepare_and_run, wall_time
+from ..measures.timing import wall_time
 
 BLOCK = 1024
 """Bodies that are prepared, and run, at a time."""
@@ -144,10 +145,13 @@ def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     try:
         with time_limit(limit):
-            run, block, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
-            if cost.prepare > COMPILED:
-                _, _, cost = prepare_and_run(lambda: prepare_blocks(way, bodies, grid))
-            return ManyDone(run, block, cost.prepare, wall_time(run))
+            start = perf_counter()
+            run = prepare_blocks(way, bodies, grid)
+            if (spent := perf_counter() - start) > COMPILED:
+                start = perf_counter()
+                run = prepare_blocks(way, bodies, grid)
+                spent = perf_counter() - start
+            return ManyDone(run, run(), spent, wall_time(run))
     except MissingEngine:
         raise
     except BadInput as error:  # a step that the method does not have
@@ -161,7 +165,7 @@ def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone
 
 
 def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings that a family's name stands for, where its throughput is compared; none of what runs single bodies."""
+    """Return the settings that a family's name stands for, where throughput is compared; none of what runs single bodies."""
     return method.many_settings() if takes_many(method) else ()
 
 

@@ -29,6 +29,7 @@ from . import (
     sphere_curves,
     stability,
     throughput,
+    throughput_extent,
     work_precision,
 )
 from .ensembles import KINDS, draw
@@ -109,7 +110,7 @@ def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: boo
     return Study(RANDOM, random.bodies(bodies, seed), methods, quick, skip_missing, Truths(random.precise))
 
 
-def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> throughput.ThroughputStudy:
+def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> throughput_extent.ThroughputStudy:
     """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword, fewer bodies if it is quick.
 
     Raises
@@ -118,8 +119,8 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
         A number is not an integer of 1 or more, a seed not one of 0 or more, or there is no method.
     """
     scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
-    usual = {"sizes": throughput.QUICK_SIZES, "bodies": throughput.QUICK_BODIES} if quick else {}
-    return throughput.ThroughputStudy(THROUGHPUT, scenes, methods, quick, **{**usual, **extent})
+    usual = {"sizes": throughput_extent.QUICK_SIZES, "bodies": throughput_extent.QUICK_BODIES} if quick else {}
+    return throughput_extent.ThroughputStudy(THROUGHPUT, scenes, methods, quick, **{**usual, **extent})
 
 
 def _silent(done: int, total: int, what: str) -> None:

@@ -22,8 +22,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conservative.attitude import Array, angle_between
-from conservative.check import positive_integer
-from conservative.errors import BadInput
 from conservative.method import Grid, Method
 from conservative.methods.many import Bodies
 from conservative.outcome import Outcome, OutcomeKind
@@ -39,64 +37,21 @@ from .many_runs import ManyDone, Way, attempt_many, list_ways
 from .selection import at_tolerance, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
 from .study import Progress, Study
-
-ERRORS = (1e-3, 1e-6, 1e-9)
-"""Attitude errors, rad, at which methods are compared."""
-SAMPLES = 12
-"""Instants at which errors are read."""
-STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, 128, 181, 256, 362, 512, 724, 1024, 1448, 2048))
-"""Steps of the motion, long to short."""
-EXACT_STEPS = 120
-"""Steps of exact solutions, whose length is free."""
-TOLERANCES = tuple(10.0**-k for k in range(1, 14))
-FEW = slice(1, None, 3)
-"""What a quick study takes of both."""
-SIZES, QUICK_SIZES = tuple(10**k for k in range(7)), (1, 100)
-"""Numbers of bodies."""
-BODIES, QUICK_BODIES = 64, 8
-"""Bodies whose errors are read."""
-PREPARATION = 8.0
-"""How many times longer than a call its preparation may take."""
-ROUNDS, QUICK_ROUNDS = 5, 3
-MEDIAN, MOST = "median", "95 %"
-"""Which error of the bodies a value is of."""
-EXACT = "exact solution"
-"""Detail of errors that do not depend on the step."""
-
-
-@dataclass(frozen=True)
-class ThroughputStudy(Study):
-    """The study, of so many bodies.
-
-    Attributes
-    ----------
-    sizes
-        Numbers of bodies that are timed.
-    bodies, seed
-        Number of bodies whose errors are read, and where they are drawn from.
-
-    Raises
-    ------
-    BadInput
-        As `Study` does, and where a size or `bodies` is not an integer of 1 or more.
-    """
-
-    sizes: tuple[int, ...] = SIZES
-    bodies: int = BODIES
-    seed: int = 0
-
-    @property
-    def longest_errors(self) -> float:
-        """Longest run, s, on the way to smaller errors."""
-        return 4 * self.longest_run
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for size in self.sizes:
-            positive_integer("sizes", size)
-        if not self.sizes:
-            raise BadInput("sizes", "none", "one or more")
-        positive_integer("bodies", self.bodies)
+from .throughput_extent import (
+    ERRORS,
+    EXACT,
+    EXACT_STEPS,
+    FEW,
+    MEDIAN,
+    MOST,
+    PREPARATION,
+    QUICK_ROUNDS,
+    ROUNDS,
+    SAMPLES,
+    STEPS,
+    TOLERANCES,
+    ThroughputStudy,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +134,7 @@ def _grid(n: int) -> Grid:
 
 
 def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Point]]:
-    """Yield the errors of a line, coarse to fine, to the last of `ERRORS` or to the longest run planned for; return its points."""
+    """Yield the errors of a line, coarse to fine, to the last of `ERRORS` or the longest run planned for; return its points."""
     line: list[Point] = []
     for case in list_cases(kind, way.method):
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
@@ -194,7 +149,9 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
         n = len(kind.few)
         line.append(Point(way, case, errors, found.spent / n))
         for name, error in errors.items():
-            yield case.row(Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method))
+            yield case.row(
+                Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method)
+            )
     return line
 
 
@@ -205,7 +162,8 @@ def name_of(way: Way, what: str) -> str:
 
 def read_errors(found: ManyDone, truth: Array) -> dict[str, float]:
     """Return the median and the 95th percentile, rad, of the bodies' errors; a body that did not get there is off by pi."""
-    off = angle_between(truth, found.block.R_WB).max(axis=1)
+    with np.errstate(all="ignore"):  # too long a step may leave the range of floats
+        off = angle_between(truth, found.block.R_WB).max(axis=1)
     off = np.where(found.block.finished & np.isfinite(off), off, math.pi)
     return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 

@@ -26,6 +26,8 @@ MOST_BODIES, MOST_BYTES = 1024, 2**24
 """Bodies of a block at most, and about how many bytes its samples take at most."""
 SAMPLE_BYTES = 96
 """Bytes of the attitude and the rates of a sample."""
+LONGEST_WAIT = 0.1
+"""Time, s, between two looks at what has ended: in between, some systems do not let Ctrl-C in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +173,7 @@ def run_blocks(
                 pending[executor.submit(run_block, method, bodies[first : first + size], grid)] = first
             if not pending:
                 return
-            ended, _ = wait(pending, return_when=FIRST_COMPLETED)
+            ended, _ = wait(pending, LONGEST_WAIT, FIRST_COMPLETED)
             for future in ended:
                 yield pending.pop(future), future.result()
     finally:

@@ -26,9 +26,9 @@ _BLOCK = 1 << 24
 
 
 def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
-    """Yield the attitudes (b, s, 3, 3) of one block of bodies after the other, of all samples or of those chosen.
+    """Yield the attitudes (b, m, 3, 3) of one block of bodies after the other, of all samples or of those chosen.
 
-    Those of all, (n, s, 3, 3), are a NumPy array, or what gives one when it is sliced, as an array on a disk does: then along
+    Those of all, (n, m, 3, 3), are a NumPy array, or what gives one when it is sliced, as an array on a disk does: then along
     the blocks in which it is stored.
     """
     n, count = R_WB.shape[:2]
@@ -41,7 +41,7 @@ def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
 
 
 def mean_attitudes(R_WB: Any, samples: Sequence[int] | None = None) -> Array:
-    """Return the mean attitudes (s, 3, 3) of bodies (n, s, 3, 3) at each sample; bodies that are not finite are left out."""
+    """Return the mean attitudes (m, 3, 3) of bodies (n, m, 3, 3) at each sample; bodies that are not finite are left out."""
     total = sum(np.nansum(block, axis=0) for block in blocks(R_WB, samples))
     U, _, Vt = np.linalg.svd(np.asarray(total))
     U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
@@ -49,7 +49,7 @@ def mean_attitudes(R_WB: Any, samples: Sequence[int] | None = None) -> Array:
 
 
 def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = None) -> Array:
-    """Return `QUANTILES` (s, 3) of the angles, rad, of bodies (n, s, 3, 3) from attitudes (s, 3, 3), one for each sample.
+    """Return `QUANTILES` (m, 3) of the angles, rad, of bodies (n, m, 3, 3) from attitudes (m, 3, 3), one for each sample.
 
     Right to a quarter of a percent, or to 1e-9 rad. Bodies that are not finite are left out; of none, not a number.
     """
@@ -64,7 +64,7 @@ def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = No
 
 
 def _count_angles(R_WB: Array, centre: Array) -> Any:
-    """Return how many angles lie in each bin, (s, bins): the first has those below `_LEAST`."""
+    """Return how many angles lie in each bin, (m, bins): the first has those below `_LEAST`."""
     off = R_WB - centre
     square = np.einsum("nsij,nsij->ns", off, off)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -77,7 +77,7 @@ def _count_angles(R_WB: Array, centre: Array) -> Any:
 
 
 def directions(R_WB: Any, axis_B: Array, samples: Sequence[int]) -> Array:
-    """Return where a unit vector (3,) of the body points, (samples, n, 3), world axes, at samples of bodies (n, s, 3, 3).
+    """Return where a unit vector (3,) of the body points, world axes: one (n, 3) for each sample chosen of (n, m, 3, 3).
 
     Bodies that are not finite at one of them are left out.
     """

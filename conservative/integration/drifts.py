@@ -150,10 +150,11 @@ def find_axes(bodies: Bodies) -> Array:
     """Return the directions (n, 3, 3), or (1, 3, 3) for all, row by row, that momenta are conserved along; 0 is none."""
     if bodies.scene.potential is None:
         return np.eye(3)[None]
-    found = np.zeros((1, 3, 3))
     axis = bodies.scene.potential.axis_W
-    if axis is not None:
-        found[0, 0] = axis
+    own = bodies.varied.axes_W() if bodies.parameters else np.zeros((1, 3)) if axis is None else axis[None]
+    found = np.zeros((len(own), 3, 3))
+    if axis is not None:  # else there is no such invariant
+        found[:, 0] = own
     return found
 
 
@@ -161,10 +162,7 @@ def field_scales(bodies: Bodies) -> Any:
     """Return the size of the field, J: of each body (n,), or one for all."""
     if bodies.scene.potential is None:
         return 0.0
-    if not bodies.parameters:
-        return bodies.scene.potential.scale()
-    potentials: list[Any] = [bodies.take_potential(i) for i in range(len(bodies))]
-    return np.array([each.scale() for each in potentials])
+    return bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale()
 
 
 def field_energies(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
@@ -176,11 +174,7 @@ def field_energies(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Arra
     if potential is None or (depends_on_time(potential) and not isinstance(potential, Turning)):
         return np.empty((0, 0))
     R_OB = bodies.scene.in_field_axes(R_WB, t)
-    if bodies.parameters:
-        each = (static_part(bodies.take_potential(i)).energy(R_OB[i]) for i in range(len(bodies)))
-        V = np.stack(list(each))
-    else:
-        V = static_part(potential).energy(R_OB)
+    V = bodies.varied.energies(R_OB) if bodies.parameters else static_part(potential).energy(R_OB)
     if not isinstance(potential, Turning):
         return np.ascontiguousarray(V)
     normal_O = potential.orbit.normal_W @ R_OB  # of the body's axes: the normal is the same in W and O

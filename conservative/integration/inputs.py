@@ -14,6 +14,7 @@ from ..body import RigidBody
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
 from ..errors import BadInput, nearest
 from ..methods.many import Bodies
+from ..potentials.turning import static_part
 from ..scene import Scene
 
 RATES = "three finite rates (3,), rad/s"
@@ -53,6 +54,9 @@ def read_bodies(
     if "w_WB_B0" in given:
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
+    if J is not None and hasattr(static_part(scene.potential), "inertia") and "inertia" not in values:
+        allowed = "{'inertia': ...} too: the field has an inertia of its own, which should be that of the body"
+        raise BadInput("parameters", describe(parameters), allowed)
     if (J is not None or values) and scene.extra_invariants:
         scene = scene.rename(scene.name, extra_invariants=())  # which are of the scene's own body and field
     return Bodies(scene, R, w, J, values)
@@ -71,7 +75,7 @@ def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Map
     array = real_array(value)
     other = next(iter(given), None)
     n = "n" if other is None else str(len(given[other]))
-    allowed = "numbers of shape " + " or ".join(f"({', '.join((n, *map(str, shape)))})" for shape in shapes)
+    allowed = "numbers of shape " + " or ".join(f"({n},{','.join(f' {size}' for size in shape)})" for shape in shapes)
     allowed += "" if other is None else f": {n} bodies, as {other} has"
     if array is None:
         raise BadInput(name, describe(value), allowed)
@@ -123,16 +127,16 @@ def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> 
         return {}
     if not isinstance(parameters, Mapping):
         raise BadInput("parameters", describe(parameters), "a mapping of names of the potential's numbers to arrays (n, ...)")
-    known = list_parameters(scene.potential)
+    known = list_parameters(static_part(scene.potential))
     found = {}
     for name, value in parameters.items():
         if name not in known:
             allowed = nearest(str(name), known) if known else f"none: the scene {scene.name!r} has no potential with numbers"
             raise BadInput("parameters", describe(name), allowed)
-        found[name] = _read(f"parameters[{name!r}]", value, (known[name],), given)
-        given.setdefault(f"parameters[{name!r}]", found[name])
-    _check_potentials(scene, found)
-    return found
+        key = f"parameters[{name!r}]"
+        found[name] = _read(key, value, (known[name],), given)
+        given.setdefault(key, found[name])
+    return _check_potentials(scene, found) if found else {}
 
 
 def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
@@ -147,12 +151,24 @@ def _is_numeric(value: object) -> bool:
     return isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype == np.float64)
 
 
-def _check_potentials(scene: Scene, parameters: Mapping[str, Array]) -> None:
-    """Raise `BadInput` for the first body whose potential cannot be made."""
-    n = len(next(iter(parameters.values()), ()))
+def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
+    """Return parameters (n, ...) as potentials have them. Raise `BadInput` for the first that none can be made of."""
+    n = len(next(iter(parameters.values())))
     bodies = Bodies(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
-    for i in range(n):
-        try:
-            bodies.take_potential(i)
-        except BadInput as refusal:
-            raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None
+    suspects = getattr(static_part(scene.potential), "suspects", None)
+    bad = np.ones(n, dtype=bool) if suspects is None else np.zeros(n, dtype=bool) | suspects(parameters)
+    for values in parameters.values():
+        bad |= ~_are_in_range(values)
+    found = {name: values.copy() for name, values in parameters.items()} if bad.any() else parameters
+    for i in np.flatnonzero(bad).tolist():
+        potential = _take_potential(bodies, i)
+        for name, values in found.items():
+            values[i] = getattr(potential, name)  # which may be of another length, such as a direction
+    return {name: read_only(values) for name, values in found.items()}
+
+
+def _take_potential(bodies: Bodies, i: int) -> Any:
+    try:
+        return static_part(bodies.take_potential(i))
+    except BadInput as refusal:
+        raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol, TypedDict, Unpack
@@ -43,7 +44,8 @@ class Details(TypedDict, total=False):
     client: Any
 
 
-_DETAILS, _PLACES = Details.__annotations__.keys(), {"path", "resume", "client"}
+_DETAILS = Details.__annotations__.keys()
+_PLACES = frozenset({"threads", "path", "resume", "client"})
 
 
 def integrate_many(
@@ -116,14 +118,13 @@ def integrate_many(
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     if not details.keys() <= _DETAILS:
         raise TypeError(f"integrate_many() got an unexpected keyword argument {min(details.keys() - _DETAILS)!r}")
-    progress = _read_progress(details.get("progress"))
+    progress, place = _read_progress(details.get("progress")), _read_place(details)
     alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
         method, grid, choice = make_plan(bodies, dt, t_end, details)
-        if len(bodies) == 1 and details.keys().isdisjoint(_PLACES):
+        if len(bodies) == 1 and place.here:
             return run_one(method, bodies, grid, choice, progress)
-        place = _read_place(details)
         if place.path is None:
             _require_memory(bodies, grid)
         return replace(run_all(method, bodies, grid, place, progress), choice=choice)
@@ -138,8 +139,16 @@ def _read_progress(value: Any) -> Tell | None:
 
 
 def _read_place(details: Details) -> Place:
+    """Return where the run is made: nearly always here, and on as many threads as there are processors."""
+    if details.keys().isdisjoint(_PLACES):
+        return _usual_place()
     to = details.get("client"), details.get("path"), details.get("resume", False)
     return Place(_read_threads(details.get("threads")), *to)
+
+
+@lru_cache(maxsize=1)
+def _usual_place() -> Place:
+    return Place(_read_threads(None))
 
 
 def _read_threads(value: object) -> int:
@@ -202,9 +211,7 @@ def _require_memory(bodies: Bodies, grid: Grid) -> None:
     most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
     if samples > most:
         got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
-        raise BadInput(
-            "sample_every", got, f"a larger one, or a path: {most:.3g} samples fit in memory, {KEPT_BYTES} bytes each"
-        )
+        raise BadInput("sample_every", got, f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory")
 
 
 def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:

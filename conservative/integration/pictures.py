@@ -1,6 +1,6 @@
 """How an ensemble looks: where a body axis points, how far attitudes are apart over time, what drifted. Altair when asked for.
 
-Charts have a few thousand rows at most, of any number of bodies: counts and quantiles, computed block by block.
+Charts have a few thousand rows at most, of any number of bodies: counts and quantiles, block by block. Source: our own.
 """
 
 from __future__ import annotations

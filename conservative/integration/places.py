@@ -41,6 +41,11 @@ class Place:
         if self.resume and self.path is None:
             raise BadInput("resume", "True", "False without a path, as there is nothing to go on from")
 
+    @property
+    def here(self) -> bool:
+        """Whether samples stay in the memory of this process, which runs all blocks."""
+        return self.client is None and self.path is None
+
     @contextmanager
     def start(self, blocks: int) -> Iterator[tuple[Executor, int]]:
         """Give what runs so many blocks, and how many to hand to it at a time."""

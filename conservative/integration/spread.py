@@ -16,13 +16,15 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ..attitude import Array, from_quaternion
-from ..check import describe, positive_integer
+from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer
 from ..errors import BadInput, nearest
 from ..potentials.turning import static_part
 from ..scene import Scene
 from . import inputs
 from .deviation import Deviation, read_angle, read_number, read_rate, read_share
 
+START_BYTES = 400
+"""Memory that a body takes with its inertia, bytes, where its start is drawn and then read."""
 _PIECE = 1 << 16
 """Bodies whose attitudes are computed at once: what that takes besides stays below 50 MB."""
 _ROUND_OFF = 1e-12
@@ -83,11 +85,12 @@ def spread(
     ------
     BadInput
         A spread cannot be read, or is one of nothing, such as 2 % of a body's rate at rest; the potential has no such number;
-        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no such integer.
+        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no
+        such integer, or so many do not fit in memory.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    count, seed = positive_integer("n", n), _read_seed(seed)
+    count, seed = _read_count(n), _read_seed(seed)
     found = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
@@ -101,6 +104,13 @@ def spread(
 def list_parameters(scene: Scene) -> list[str]:
     """Return the names of what `spread` can vary of a scene's potential: its numbers and vectors."""
     return [name for name, shape in inputs.list_parameters(scene.potential).items() if shape in ((), (3,))]
+
+
+def _read_count(n: object) -> int:
+    count, most = positive_integer("n", n), most_samples() * SAMPLE_BYTES // START_BYTES
+    if count > most:
+        raise BadInput("n", describe(n), f"up to {most:.3g}, which fit in memory, {START_BYTES} bytes each")
+    return count
 
 
 def _read_seed(seed: object) -> int:
@@ -187,7 +197,7 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
     """Return a number (n,) or a vector (n, 3) of the potential for each body, in its own unit."""
     argument, known = f"potential.{name}", list_parameters(scene)
     if name not in known:
-        allowed = nearest(name, known) if known else "none: the scene's potential has no numbers, or it has no potential"
+        allowed = nearest(name, known) if known else "none: the scene has no potential with numbers to spread"
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
     deviation = read_number(argument, value)

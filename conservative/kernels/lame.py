@@ -250,9 +250,7 @@ def divide_step(model, h):
     w2 = spin[0]
     half = 0.5 * w2
     cos, sin = math.cos(half * h), math.sin(half * h)
-    return parts, Part(
-        E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin
-    )
+    return parts, Part(E[0], z[0], kappa / J, nu[0], x0[0], w2, rate, p_h, dp_h, ya, da, yb, db, ym, dm, ca, cb, cm, cos, sin)
 
 
 @small

@@ -10,10 +10,10 @@ from . import entry, small
 from .lame import Model, Part, advance, divide_step, unit_vertical
 from .lanes import WIDTH, choose, load, load_rows, save_columns, save_rows
 
-CONSTANTS = 22
-"""A body's constants: those of `Part`, the number of parts of a step, and the moment across the axis."""
-PARTS, ROWS = 20, 32
-"""Row of the numbers of parts; numbers of a body: its constants, attitude (4), vertical (3), rates across the axis (2), and momentum along it."""
+PARTS, CONSTANTS, ROWS = 20, 22, 32
+"""Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across
+the axis, then attitude (4), vertical (3), rates across the axis (2), and momentum along it. The number of parts, all of the
+constants, and all."""
 
 
 @entry
@@ -28,10 +28,8 @@ def prepare(J, kappa, q, L, h, table):
         parts, part = divide_step(Model(J[i], kappa[i], q0, L0), h)
         gamma = unit_vertical(q0)
         state = q0 + gamma + (L0[0] / J[i], L0[1] / J[i], L0[2])
-        row = 0
-        for x in part[:] + (float(parts), J[i]) + state:
+        for row, x in enumerate((*part[:], float(parts), J[i], *state)):
             table[row, i] = x
-            row += 1
     for i in range(n, table.shape[1]):
         for row in range(ROWS):
             table[row, i] = table[row, n - 1]
@@ -59,11 +57,11 @@ def march(table, done, last, n_steps, every, q_out, L_out):
     n, flat = table.shape[1], table.reshape(-1)
     q_flat, L_flat, samples = q_out.reshape(-1), L_out.reshape(-1), q_out.shape[1]
     for i in range(0, n, WIDTH):
-        c = Part(*load_rows(flat, i, n, 20, WIDTH))
-        parts, J = load(flat, i + 20 * n, WIDTH), load(flat, i + 21 * n, WIDTH)
-        least, most = table[20, i], table[20, i]
+        c = Part(*load_rows(flat, i, n, PARTS, WIDTH))
+        parts, J = load(flat, i + PARTS * n, WIDTH), load(flat, i + (PARTS + 1) * n, WIDTH)
+        least, most = table[PARTS, i], table[PARTS, i]
         for lane in range(1, WIDTH):
-            least, most = min(least, table[20, i + lane]), max(most, table[20, i + lane])
+            least, most = min(least, table[PARTS, i + lane]), max(most, table[PARTS, i + lane])
         state = load_rows(flat, i + CONSTANTS * n, n, 10, WIDTH)
         q, gamma, w0, w1, L2 = state[:4], state[4:7], state[7], state[8], state[9]
         row, until_sample = done // every, every - done % every

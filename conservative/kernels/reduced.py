@@ -308,10 +308,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
     for step in range(first_step, last + 1):
         for stage in range(first, len(lengths)):
             h = lengths[stage]
-            if known >= 6:
-                a = guess_ahead(past)
-            else:
-                a = explicit_guess(h, J_inverse, field, q, L)
+            a = guess_ahead(past) if known >= 6 else explicit_guess(h, J_inverse, field, q, L)
             a, gain, iterations, size, trusted = newton_solve(h, J, field, q, L, L_carry, a, NEAR, tolerance)
             corrections += iterations
             if not trusted:

@@ -123,13 +123,13 @@ def _next_rates(emit, c, n, sums, f, f1, f2, K, field):
     return emit.add(new, emit.times(f2, K), c[n, 4]) if n else new
 
 
-def _products(c):
+def list_products(c):
     """What `convolve` takes for g x w, a x w and w2 w3 and its kin."""
     (g_r, g_s), (a_r, a_s), (w_r, w_s) = (c.turned(k) for k in range(3))
     return ((g_r, w_s), (g_s, w_r)), ((a_r, w_s), (a_s, w_r)), ((w_r, w_s),)
 
 
-def _turn_rows(emit, c, f, field, g, a):
+def turn_rows(emit, c, f, field, g, a):
     """The rows where their axes turn with a field."""
     by = emit.times(f, field.turn)
     return emit.add(g, by, c.newest[1]), emit.subtract(a, by, c.newest[0])
@@ -138,25 +138,13 @@ def _turn_rows(emit, c, f, field, g, a):
 def next_in_short_chains(emit, c, n, h, K, field):
     """The coefficients n + 1 of g, a and w, with few operations after the newest."""
     f = emit.times(h, emit.constant(1.0 / (n + 1)))
-    gw, aw, ww = emit.convolve(n, 1, n - 1, *_products(c))
+    gw, aw, ww = emit.convolve(n, 1, n - 1, *list_products(c))
     f1, f2 = emit.times(f, c[0, 4]), emit.times(f, c[0, 5])
     g = _next_row(emit, c, n, 0, gw, f, f1, f2)
     a = _next_row(emit, c, n, 2, aw, f, f1, f2)
     if isinstance(field, TurningSeries):
-        g, a = _turn_rows(emit, c, f, field, g, a)
+        g, a = turn_rows(emit, c, f, field, g, a)
     return g, a, _next_rates(emit, c, n, ww, f, f1, f2, K, field)
-
-
-def next_by_sums(emit, c, n, h, K, field):
-    """The coefficients n + 1 of g, a and w, with few operations in all."""
-    f = emit.times(h, emit.constant(1.0 / (n + 1)))
-    gw, aw, ww = emit.convolve(n, 0, n, *_products(c))
-    torque = field.accelerate(c, n)
-    rates = emit.times(K, ww) if torque is None else emit.add(torque, K, ww)
-    g, a = emit.times(f, gw), emit.times(f, aw)
-    if isinstance(field, TurningSeries):
-        g, a = _turn_rows(emit, c, f, field, g, a)
-    return g, a, emit.times(f, rates)
 
 
 class Straight:

@@ -2,8 +2,9 @@
 
 A value is the registers of x, y and z, or one register where it is a scalar, so that shuffles are other names and no
 instructions. A processor that has nothing to wait for wants few operations: sums have one total for products that are added and
-for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body: after 100
-steps attitudes differ by some 1e-14, and as much faster as the motion itself lets two of them part.
+for those that are taken away, and are multiplied by h/(n+1) as a whole. So they round otherwise than for one body. Of 32 random
+heavy tops the attitudes differ by 3e-16 from those of one body after 10 steps, by 1e-15 to 3e-15 after 100 (the worst by
+6e-14), by 4e-14 to 4e-13 after 1,000; from then on chaotic motions part, as those of any two starts that round-off tells apart.
 
 Straight code for all orders would not fit into the processor's cache of instructions: from `LOOPS_FROM` on each order has a
 loop of its own, whose end the processor learns.
@@ -15,7 +16,7 @@ from llvmlite import ir
 from numba.core import cgutils
 
 from .lanes_llvm import REGISTER
-from .series import HIGHEST, LOWEST, find_terms, load_once, next_by_sums, outwards
+from .series import HIGHEST, LOWEST, TurningSeries, find_terms, list_products, load_once, outwards, turn_rows
 from .series_llvm import VolatileLoad
 from .traced import Axes
 
@@ -40,9 +41,16 @@ class Emitter:
             memory.align = _BYTES
             self._memory = builder.bitcast(memory, ir.IntType(8).as_pointer())
 
-    def find_next(self, *given):
-        """The next coefficients: another order's sums are formed while one waits for the newest."""
-        return next_by_sums(self, *given)
+    def find_next(self, c, n, h, K, field):
+        """The coefficients n + 1 of g, a and w, with few operations in all."""
+        f = self.times(h, self.constant(1.0 / (n + 1)))
+        gw, aw, ww = self.convolve(n, 0, n, *list_products(c))
+        torque = field.accelerate(c, n)
+        rates = self.times(K, ww) if torque is None else self.add(torque, K, ww)
+        g, a = self.times(f, gw), self.times(f, aw)
+        if isinstance(field, TurningSeries):
+            g, a = turn_rows(self, c, f, field, g, a)
+        return g, a, self.times(f, rates)
 
     def _each(self, build, *values):
         """What `build` makes of every component; a scalar has one for all of them."""

@@ -1,8 +1,8 @@
 """Many bodies as kernels with lanes take them: in columns of whole registers, and in units in which all are of order one.
 
-Moments of inertia are in units of the largest of each body, rounded to a power of two, and times in units of the step, likewise.
-So squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold, and powers of two round nothing: results are
-those in SI units, bit for bit. Source: definitions; our own layout.
+Moments of inertia are in units of the largest of each body, times in units of the step, both rounded to powers of two. So
+squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold, and nothing is rounded: results are those in SI
+units, bit for bit. Source: definitions; our own layout.
 """
 
 from __future__ import annotations
@@ -74,14 +74,13 @@ def take_pieces(n_steps: int, cost: float, take: Callable[[int, int], object]) -
         pause()
 
 
-def turn_samples(grid: Grid, q: Array, L: Array, J_inverse: Array, spin: Array | None, R_BP: Array, places: Any, n: int) -> Block:
+def turn_samples(grid: Grid, q: Array, L: Array, turn: tuple[Array, Array | None, Array], places: Any, n: int) -> Block:
     """Return the samples of n bodies in body axes; those of k of them are known, which are at `places` (k,) among all.
 
-    Attitudes q (m, s, 4) and momenta L (m, s, 3), m not below k, are in axes R_BP (k, 3, 3); L times J_inverse (k, 3) are
-    rates, rad/s. `spin` (k, 2) is what `PrincipalStart` has, of each body, or None.
+    Attitudes q (m, s, 4) and momenta L (m, s, 3), m not below k, are in the kernel's axes. `turn` is what turns them, as
+    `PrincipalStart` has it of one body: J_inverse (k, 3), with which L are rates, rad/s; spin (k, 2) or None; R_BP (k, 3, 3).
     """
-    s = grid.n_samples
+    s, (J_inverse, spin, R_BP) = grid.n_samples, turn
     R_WB, w_WB_B = np.full((n, s, 3, 3), np.nan), np.full((n, s, 3), np.nan)
-    R_BP = np.require(R_BP, np.float64, ("C", "W"))
-    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, R_BP, places, R_WB, w_WB_B)
+    kernels("samples").of_many(grid.t, q, L, J_inverse, spin, np.require(R_BP, float, ("C", "W")), places, R_WB, w_WB_B)
     return Block(R_WB, w_WB_B, np.isin(np.arange(n), places))

@@ -34,7 +34,7 @@ class Fields:
     energies
         Which of the k are proportional to energy, J.
     axis_W
-        Axes (n, 3), vectors of any length, world axes.
+        Axes (n, 3), vectors of any length, world axes; 0 where nothing acts.
     scale
         Sizes (n,) of the potential, J.
     """
@@ -50,6 +50,12 @@ class Fields:
 def find_fields(potential: Any, bodies: Bodies, R_BP: Array) -> Fields | None:
     """Return the fields of bodies in axes R_BP (n, 3, 3); None of a kind that is not known here."""
     return None
+
+
+@find_fields.register
+def _find_none(potential: None, bodies: Bodies, R_BP: Array) -> Fields:
+    n = len(bodies)
+    return Fields(None, np.zeros((n, 0)), slice(0), np.zeros((n, 3)), np.zeros(n))
 
 
 @find_fields.register

@@ -178,12 +178,13 @@ def prepare_lanes(method: Lame, bodies: Bodies, grid: Grid) -> RunMany | None:
     """Return the run of many tops with `conservative.kernels.lame_many`; None where none of them has such a step."""
     kernel, n, time = kernels("lame_many"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
-    with np.errstate(all="ignore"):  # whose numbers overflow is not among the tops that are left
-        tops = tops.convert(find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1)), time)
-        tops = tops[tops.rate * h <= MOST_RADIANS]
-    table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
-    if not table.size:
+    if tops is not None:
+        with np.errstate(all="ignore"):  # whose numbers overflow is not among the tops that are left
+            tops = tops.convert(find_units_of_moments(np.stack([tops.J1, tops.J3], axis=1)), time)
+            tops = tops[tops.rate * h <= MOST_RADIANS]
+    if tops is None or not len(tops.places):
         return None
+    table = np.empty((kernel.ROWS, -(-len(tops.places) // kernel.WIDTH) * kernel.WIDTH))
     kernel.prepare(tops.J1, tops.kappa, tops.q, tops.L, h, table)
     # Those with as many parts of a step side by side, so that few lanes wait for others.
     order = np.argsort(table[kernel.PARTS, : len(tops.places)], kind="stable")
@@ -196,19 +197,19 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
     kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L
-    rates, spin = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time
+    turn = np.repeat(1 / tops.J1 / time, 3).reshape(-1, 3), tops.spin / time, tops.R_BP
     cost = PART * m * float(table[kernel.PARTS].max())
 
     def run() -> Block:
         states = table.copy()
         take_pieces(grid.n_steps, cost, lambda done, last: kernel.march(states, done, last, grid.n_steps, grid.every, q, L))
-        return turn_samples(grid, q, L, rates, spin, tops.R_BP, tops.places, n)
+        return turn_samples(grid, q, L, turn, tops.places, n)
 
     return run
 
 
-def find_tops(method: Lame, bodies: Bodies) -> Tops:
-    """Return those of the bodies that the method supports, as tops."""
+def find_tops(method: Lame, bodies: Bodies) -> Tops | None:
+    """Return those of the bodies that the method supports, as tops; None where there are none."""
     if has_one_axis(bodies):
         return find_alike(method, bodies)
     found = []
@@ -218,8 +219,7 @@ def find_tops(method: Lame, bodies: Bodies) -> Tops:
             axes, J1, J3 = slow_axes(scene)
             start = start_along(scene, axes, np.array((J1, J1, J3)))
             found.append((i, J1, J3, start.field.z if start.field else 0.0, start.q, start.L, axes))
-    columns = zip(*found, strict=True) if found else ((),) * 7
-    return Tops(*(np.array(column, dtype=np.int64 if i == 0 else float) for i, column in enumerate(columns)))
+    return Tops(*(np.array(column) for column in zip(*found, strict=True))) if found else None
 
 
 def has_one_axis(bodies: Bodies) -> bool:
@@ -228,13 +228,13 @@ def has_one_axis(bodies: Bodies) -> bool:
     return bodies.inertia is None and "com_B" not in bodies.parameters and bool((weights > 0).all() or (weights < 0).all())
 
 
-def find_alike(method: Lame, bodies: Bodies) -> Tops:
+def find_alike(method: Lame, bodies: Bodies) -> Tops | None:
     """Return what `find_tops` does, of bodies with the same axis."""
     scene, n = bodies.take(0), len(bodies)
     if method.unsupported(scene) is not None:
-        return Tops(np.empty(0, dtype=np.int64), *(np.empty(0),) * 6)
+        return None
     axes, J1, J3 = slow_axes(scene)
     R_BP = np.tile(axes, (n, 1, 1))
     kappa = np.zeros(n) if scene.free else moments_of_gravity(bodies, R_BP)[:, 2]
-    q, L = to_quaternion(bodies.R_WB0 @ axes), (bodies.w_WB_B0 @ axes) * (J1, J1, J3)
+    q, L = to_quaternion(bodies.R_WB0 @ R_BP), (bodies.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * (J1, J1, J3)
     return Tops(np.arange(n), np.full(n, J1), np.full(n, J3), kappa, q, L, R_BP)

@@ -14,6 +14,8 @@ from ..attitude import Array, to_quaternion
 from ..body import RigidBody
 from ..check import build_unchecked
 from ..potentials.potential import AnyPotential
+from ..potentials.turning import Turning, static_part
+from ..potentials.varied import OneByOne, Varied
 from ..scene import Scene
 
 
@@ -30,7 +32,8 @@ class Bodies:
     inertia
         Tensors (n, 3, 3), kg m^2, body axes; None where all have the scene's.
     parameters
-        Numbers (n, ...) of the scene's potential by the names of its fields, where they differ from body to body.
+        Numbers (n, ...) of the scene's potential by the names of its fields, where they differ from body to body; of one that
+        turns, those of the field in its axes.
     """
 
     scene: Scene
@@ -66,7 +69,17 @@ class Bodies:
         potential: Any = self.scene.potential
         if not self.parameters:
             return potential
-        return replace(potential, **{name: values[i] for name, values in self.parameters.items()})
+        numbers = {name: values[i].item() if values[i].ndim == 0 else values[i] for name, values in self.parameters.items()}
+        own = replace(static_part(potential), **numbers)
+        return Turning(own, potential.orbit) if isinstance(potential, Turning) else own
+
+    @cached_property
+    def varied(self) -> Varied:
+        """The fields of all bodies, where they have numbers of their own: those that turn as they are in their axes."""
+        vary = getattr(static_part(self.scene.potential), "vary", None)
+        if vary is not None:
+            return vary(self.parameters)
+        return OneByOne([static_part(self.take_potential(i)) for i in range(len(self))])
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:

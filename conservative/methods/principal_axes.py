@@ -84,7 +84,7 @@ def slow_axes(scene: Scene) -> tuple[Array, float, float]:
     return axes_about(axis_B), float(J[0] + J[1]) / 2, float(J[2])
 
 
-def spin_rate(J1: float, J3: float, L3: Any) -> Any:
+def spin_rate(J1: Any, J3: Any, L3: Any) -> Any:
     """Return the rate about the axis, rad/s, that the frame lacks, of moments, kg m^2, and momentum along it, kg m^2/s."""
     return (J1 - J3) / (J1 * J3) * L3
 

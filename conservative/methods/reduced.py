@@ -170,6 +170,6 @@ def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
             kernel.march(lengths, tol, columns, field, states, room, done, last, grid.n_steps, grid.every, q, L, finished)
 
         take_pieces(grid.n_steps, BODY_STEP * len(lengths) * n, take)
-        return turn_samples(grid, q, L, 1 / J / time, None, R_BP, np.flatnonzero(finished[:n]), n)
+        return replace(turn_samples(grid, q, L, (1 / J / time, None, R_BP), np.arange(n), n), finished=finished[:n])
 
     return run

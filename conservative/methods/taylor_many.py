@@ -101,9 +101,11 @@ def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
     """Return the start of bodies; None where they have to run alone."""
     frames = find_frames(bodies)
     w = into_axes(bodies.w_WB_B0, frames.R_BP)
-    fields = find_momenta(bodies, frames, w) if is_free(bodies) else find_fields(bodies.scene.potential, bodies, frames.R_BP)
+    fields = find_fields(bodies.scene.potential, bodies, frames.R_BP)
     if fields is None:
         return None
+    if not fields.axis_W.any():
+        fields = find_momenta(bodies, frames, w, fields.scale)
     energy = np.sum(frames.moments * w * w, axis=1) / 2 + fields.scale
     units = find_units(frames.moments, energy, grid.dt)
     R_DP = directions(fields.axis_W).swapaxes(1, 2) @ bodies.R_WB0 @ frames.R_BP
@@ -111,11 +113,6 @@ def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
     state = (model.g, model.a, model.L / model.J, np.zeros((len(w), 1)))
     spin, width = find_spins(frames, w) if frames.spinning.any() else None, kernels("lanes").REGISTER
     return Start(build_likes(fields.like), *(fill_columns(np.column_stack(parts), width) for parts in (model, state)), spin)
-
-
-def is_free(bodies: Bodies) -> bool:
-    """Whether nothing acts on the bodies, or what has no axis."""
-    return bodies.scene.potential is None or bodies.scene.potential.axis_W is None
 
 
 def find_frames(bodies: Bodies) -> Frames:
@@ -149,12 +146,13 @@ def find_units(moments: Array, energy: Array, dt: float) -> Units:
     return Units(*(np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)))
 
 
-def find_momenta(bodies: Bodies, frames: Frames, w: Array) -> Fields:
-    """Return what stands for the field of free bodies with rates w (n, 3), rad/s: the momentum, whose size is the number."""
+def find_momenta(bodies: Bodies, frames: Frames, w: Array, scale: Array) -> Fields:
+    """Return what stands for the field of free bodies with rates w (n, 3), rad/s: the momentum, whose size is the number.
+
+    `scale` (n,) is that of a potential that does nothing, J.
+    """
     L = w * frames.moments
     axis_W = (bodies.R_WB0 @ (frames.R_BP @ L[..., None]))[..., 0]
-    potential = bodies.scene.potential
-    scale = np.full(len(L), potential.scale() if potential else 0.0)
     return Fields(kernels("taylor").Free(0.0), np.linalg.norm(L, axis=1)[:, None], slice(0), axis_W, scale)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..attitude import Array, triple
 from ..body import RigidBody
 from ..check import build_unchecked, positive_number, power_of_two
 from .direction import unit_vector
+from .varied import VariedGradient, fill
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +91,11 @@ class GravityGradient(_Fields):
     def axis_W(self) -> Array:
         """Return the direction of the centre, (3,)."""
         return self.direction_W
+
+    def vary(self, parameters: Mapping[str, Array]) -> VariedGradient:
+        """Return the fields of n bodies with these numbers (n, ...), rad/s, kg m^2 and of no unit, in place of its own."""
+        rates, inertia, directions_W = fill(self, parameters, "rate", "inertia", "direction_W")
+        return VariedGradient(3 * rates**2, inertia, directions_W)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return 3 rate^2 J in principal axes, row by row, and the direction as the kernels want them."""

@@ -11,6 +11,7 @@ paper's (21).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array, Triple, triple
 from ..check import build_unchecked, finite_array, finite_number, positive_number, power_of_two
 from ..errors import BadInput
+from .varied import VariedPoints, fill, lengths
 
 _POINT = "three finite numbers (3,), m"
 _LENGTH = "a finite length of 0 or more, m"
@@ -139,6 +141,21 @@ class LinearSpring(_SpringFields, PointPotential):
         farthest = float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W))
         return self.stiffness / 2 * max(farthest, self.rest_length) ** 2
 
+    def vary(self, parameters: Mapping[str, Array]) -> VariedPoints:
+        """Return the fields of n bodies with these numbers (n, ...), N/m and m, in place of its own."""
+        stiffness, point_B, anchor_W, rest = fill(self, parameters, "stiffness", "point_B", "anchor_W", "rest_length")
+        farthest = np.maximum(lengths(point_B) + lengths(anchor_W), rest)
+
+        def energy_of(distances: Array) -> Array:
+            return stiffness[:, None] / 2 * (distances - rest[:, None]) ** 2
+
+        return VariedPoints(point_B, anchor_W, energy_of, stiffness / 2 * farthest**2)
+
+    @staticmethod
+    def suspects(parameters: Mapping[str, Array]) -> Any:
+        """Return which of n bodies' numbers (n, ...), N/m and m, might not be taken as they are."""
+        return (parameters.get("stiffness", np.ones(1)) <= 0) | (parameters.get("rest_length", np.ones(1)) < 0)
+
     def in_units(self, energy: float) -> LinearSpring:
         """Return the field with energies in units of `energy`, a power of two, J, and lengths in units of the longest."""
         unit, points = self._shrink(self.rest_length)
@@ -200,6 +217,18 @@ class PointAttraction(_AttractionFields, PointPotential):
     def scale(self) -> float:
         """Return the size of V where the points' directions from the pivot are at right angles, J."""
         return abs(self.strength) / float(np.hypot(np.linalg.norm(self.point_B), np.linalg.norm(self.anchor_W)))
+
+    def vary(self, parameters: Mapping[str, Array]) -> VariedPoints:
+        """Return the fields of n bodies with these numbers (n, ...), J m and m, in place of its own."""
+        strengths, point_B, anchor_W = fill(self, parameters, "strength", "point_B", "anchor_W")
+        sizes = np.abs(strengths) / np.hypot(lengths(point_B), lengths(anchor_W))
+        return VariedPoints(point_B, anchor_W, lambda distances: -strengths[:, None] / distances, sizes)
+
+    @staticmethod
+    def suspects(parameters: Mapping[str, Array]) -> Any:
+        """Return which of n bodies' numbers (n, ...), J m and m, might not be taken as they are."""
+        zero = [~parameters[name].any(axis=1) for name in ("point_B", "anchor_W") if name in parameters]
+        return np.logical_or.reduce([parameters.get("strength", np.ones(1)) == 0, *zero])
 
     def in_units(self, energy: float) -> PointAttraction:
         """Return the field with energies in units of `energy`, a power of two, J, and lengths in units of the longest."""

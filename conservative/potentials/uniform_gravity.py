@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import build_unchecked, finite_array, finite_number, length, power_of_two
+from .varied import VariedGravity, fill
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,16 @@ class UniformGravity(_Fields):
         """Return the field with energies in units of `energy`, a power of two, J."""
         lever = power_of_two(float(np.abs(self.com_B).max()))
         return build_unchecked(UniformGravity, weight=self.weight * lever / energy, com_B=self.com_B / lever)
+
+    def vary(self, parameters: Mapping[str, Array]) -> VariedGravity:
+        """Return the fields of n bodies with these numbers (n, ...), N and m, in place of its own."""
+        weights, coms_B = fill(self, parameters, "weight", "com_B")
+        return VariedGravity(weights[:, None] * coms_B)
+
+    @staticmethod
+    def suspects(parameters: Mapping[str, Array]) -> bool:
+        """Return which of n bodies' numbers (n, ...), N and m, might not be taken as they are: none."""
+        return False
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the moment in principal axes as the kernels want it."""

@@ -27,7 +27,7 @@ class Varied(Protocol):
         """Return the size of the field, (n,), in J, as `Potential.scale` has it."""
 
     def axes_W(self) -> Array:
-        """Return unit vectors (n, 3), or (1, 3) for all, world axes, that the field is symmetric about; 0 where there is none."""
+        """Return unit vectors (n, 3), or (1, 3) for all, world axes, that the field is symmetric about; 0 is none."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,8 @@ class MJWarp(EngineMethod):
 
     Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`). A step is recorded by Warp once
     and then replayed; launched from Python, its kernels take a hundred times as long. They are compiled when a run is prepared,
-    once in the life of an environment, which takes a minute. It is made for thousands of worlds at once on a GPU; many bodies at
-    once are as many worlds.
+    once in the life of an environment, which takes a minute. It is made for thousands of worlds at once on a GPU: many bodies
+    are as many worlds.
 
     Parameters
     ----------

@@ -19,7 +19,9 @@ INTEGRATORS = ("Euler", "RK4", "implicitfast")
 class MJX(EngineMethod):
     """MJX on a free joint or a ball joint, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
 
-    Many bodies at once are `jax.vmap` over models and states. Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`).
+    Many bodies at once are `jax.vmap` over models and states.
+
+    Switched off: contacts and constraints (`<flag contact="disable" constraint="disable"/>`).
 
     Parameters
     ----------

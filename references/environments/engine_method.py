@@ -16,9 +16,8 @@ import numpy as np
 from conservative import registry
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.method import Grid, Method, Role, Run
-from conservative.methods.many import Block, Bodies, RunMany
+from conservative.methods.many import Bodies, RunMany
 from conservative.scene import Scene
-from conservative.trajectory import Trajectory
 
 from ..engine import gravity_or_free, mass_model_reason, principal_axes
 from .catalogue import Distribution
@@ -171,7 +170,7 @@ def rate_limit_reason(scene: Scene, limit: float) -> str | None:
     return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 
-Found = TypeVar("Found", Trajectory, Block)
+Found = TypeVar("Found", covariant=True)
 
 
 class Reads(Protocol[Found]):

@@ -18,7 +18,6 @@ from conservative.trajectory import Counters, Trajectory
 from ..engine import Axes, mass_model, principal_axes
 from .failures import EngineCrashed
 
-
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """What all of the bodies that run at once have in common."""
 

@@ -102,7 +102,7 @@ class Adapters:
         return {"python": sys.version.split()[0]}
 
     def prepare(self, adapter: str, settings: Message, **numbers: Any) -> Message:
-        """Prepare a run of a scene, which is numbers, with settings of the engine; of many bodies where some numbers stand in rows."""
+        """Prepare a run of a scene, which is numbers, with settings of the engine, or of many if some stand in rows."""
         loaded = self._load(adapter)
         rows = numbers.pop("rows", None)
         if rows is None:

@@ -1,11 +1,13 @@
-"""Many scenes of one form as heyoka's batches: several bodies in the lanes of one integrator. Source: heyoka's documentation,
-Batch mode; Ensemble propagation.
+"""Many scenes of one form as heyoka's batches: several bodies in the lanes of one integrator.
+
+Source: heyoka's documentation, Batch mode; Ensemble propagation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -47,12 +49,20 @@ class Batches:
 
     def read(self, states: Array, count: int) -> Block:
         """Return the samples of the first `count` bodies from states (samples, m, n)."""
-        samples, _, n = states.shape
+        samples = len(states)
         rows = np.ascontiguousarray(states.transpose(2, 0, 1))[:count]
         R_DF = self.attitudes(rows[..., :-3].reshape(count * samples, -1)).reshape(count, samples, 3, 3)
         R_FB = self.R_BF[:count, None].swapaxes(-1, -2)
         R_WB, w_WB_B = self.R_WD[:count, None] @ R_DF @ R_FB, (rows[..., None, -3:] @ R_FB)[..., 0, :]
         return Block(R_WB, w_WB_B, np.isfinite(rows).all(axis=(1, 2)))
+
+
+@lru_cache(maxsize=64)
+def compile_batch(form: forms.Form, tol: float, fast_math: bool, width: int) -> forms.Integrators:
+    """Return integrators of `width` bodies at once of a form, in double precision, for a relative tolerance."""
+    equations = form.build()
+    start = [[0.0] * width for _ in equations]
+    return forms.Integrators(forms.heyoka().taylor_adaptive_batch(equations, start, tol=tol, fast_math=fast_math))
 
 
 def gather(problems: Sequence[Formulation], tol: float, width: int) -> Batches | None:
@@ -62,7 +72,7 @@ def gather(problems: Sequence[Formulation], tol: float, width: int) -> Batches |
         return None
     padded = [*problems, *[problems[-1]] * (-len(problems) % width)]
     return Batches(
-        integrators=forms.compile_batch(first.form, tol, first.fast_math, width),
+        integrators=compile_batch(first.form, tol, first.fast_math, width),
         width=width,
         parameters=np.array([problem.parameters for problem in padded]).T,
         start=np.array([problem.start for problem in padded]).T,

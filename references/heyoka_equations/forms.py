@@ -84,14 +84,6 @@ def compile_double(form: Form, tol: float, fast_math: bool = False) -> Integrato
     return Integrators(heyoka().taylor_adaptive(equations, [0.0] * len(equations), tol=tol, fast_math=fast_math))
 
 
-@lru_cache(maxsize=64)
-def compile_batch(form: Form, tol: float, fast_math: bool, width: int) -> Integrators:
-    """Return integrators of `width` bodies at once of a form, in double precision, for a relative tolerance."""
-    equations = form.build()
-    start = [[0.0] * width for _ in equations]
-    return Integrators(heyoka().taylor_adaptive_batch(equations, start, tol=tol, fast_math=fast_math))
-
-
 @dataclass(frozen=True)
 class Turning:
     """Euler's equations in principal axes with those of the attitude, state (attitude, w).

@@ -49,17 +49,17 @@ def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
 def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return what can be spread of the scene on the line, the last of several, up to the equals sign."""
     before, last = _last(incomplete)
-    names = [*SPREADS, *(f"potential.{name}" for name in _parameters(ctx.params.get("scene")))]
+    names = [*SPREADS, *(f"potential.{name}" for name in _parameters(ctx.params.get("scene") or "".join(ctx.args[:1])))]
     return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]
 
 
-def _parameters(scene: str | None) -> list[str]:
+def _parameters(scene: str) -> list[str]:
     """Return what can be spread of the potential of a scene; of one that cannot be made, nothing."""
     from conservative import registry
     from conservative.integration.spread import list_parameters
 
     try:
-        return list_parameters(registry.scene(scene or ""))
+        return list_parameters(registry.scene(scene))
     except Exception:  # nobody reads an error while completing
         return []
 

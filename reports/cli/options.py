@@ -23,7 +23,7 @@ class FilePath(click.Path):
         return Path(str(value))
 
 
-class Count(click.ParamType):
+class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the checker, not before click 8.2
     """A number of things, 1 or more, which may be written as 1e6."""
 
     name = "count"

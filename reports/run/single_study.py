@@ -96,7 +96,7 @@ def _require_drawn(extent: Extent) -> None:
 
 
 def read_count(argument: str, text: str) -> int:
-    """Return the number that a text such as `1000` or `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
+    """Return the number that a text such as `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
     with suppress(ValueError, OverflowError):
         if (number := float(text)) >= 1 and number == int(number):
             return int(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import Array
 from conservative.check import MOST_STEPS, describe, positive_number
-from conservative.errors import BadInput, NotWritten, nearest
+from conservative.errors import AccuracyNotReached, BadInput, NotWritten, nearest
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
@@ -123,11 +124,13 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
         tell(_kept_text(sweep, progress))
         step(progress.done / progress.total, _progress_text(sweep, progress))
 
-    step(0.0, "starting")
+    step(0.0, "preparing: a first run compiles")
     try:
         starts, settings = spread(sweep.scene, sweep.n, seed=sweep.seed, **sweep.spread), _given(sweep.settings)
         begin = perf_counter()
-        found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AccuracyNotReached)  # the summary says so
+            found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
     except KeyboardInterrupt as stop:
         if heard and (text := _kept_text(sweep, heard[0])):
             stop.add_note(text)
@@ -145,6 +148,9 @@ def _in_options(error: BadInput) -> BadInput:
     """Return an error about an argument of a function as one about an option."""
     allowed = error.allowed.replace("resume=True", "--resume")
     argument = _WORDS.get(error.argument, error.argument)
+    if argument == "samples":
+        allowed = allowed.replace("a larger one, or a path", "fewer samples or starts, or a folder for them, --out")
+        return BadInput(argument, str(error.got).partition("for ")[2], allowed)
     if isinstance(error, NotWritten):
         return NotWritten(argument, error.path, error.cause, allowed)
     return BadInput(argument, error.got, allowed)
@@ -159,13 +165,14 @@ def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
 
 
 def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    steps = f", {rate_text(progress.rate * sweep.steps)} body-steps/s" if sweep.steps else ""
-    return f"{progress.done:,} of {progress.total:,} bodies, {rate_text(progress.rate)}/s{steps}"
+    steps = f", {rate_text(progress.rate * sweep.steps)} steps/s" if sweep.steps else ""
+    return f"{rate_text(progress.rate)} bodies/s{steps}"
 
 
 def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
     """Return what was run, how it ended, what drifted and how far attitudes are apart."""
     found, last = result.ensemble, result.last
+    rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
     failed = sorted(found.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
     return {
@@ -177,6 +184,7 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
         "dt": found.grid.dt,
         "steps": found.grid.n_steps,
         "t_end": float(found.t[-1]),
+        "error": _error_of(found.choice),
         "samples": len(found.t),
         "outcomes": {"ok": len(found) - len(failed), **kinds},
         "failures": [
@@ -187,9 +195,16 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
         "angle_from_mean": _angles(found),
         "wall_time": result.wall,
         "found_before": last.found if last else len(found),
-        "bodies_per_second": last.rate if last else 0.0,
-        "body_steps_per_second": last.rate * found.grid.n_steps if last else 0.0,
+        "bodies_per_second": rate,
+        "body_steps_per_second": rate * found.grid.n_steps,
     }
+
+
+def _error_of(choice: Any) -> dict[str, Any] | None:
+    """Return the error that was asked for, rad, and its estimate, and on how many bodies that rests."""
+    if choice is None:
+        return None
+    return {"asked": choice.error, "estimate": choice.estimate, "reached": choice.reached, "bodies": choice.bodies}
 
 
 def _flat(varied: Mapping[str, Any]) -> dict[str, str]:
@@ -207,11 +222,11 @@ def _largest(values: Array) -> dict[str, Any] | None:
 
 def _angles(found: Ensemble) -> list[dict[str, float | None]]:
     """Return quantiles of angles from the mean attitude, rad, at a few times, s."""
-    samples = np.unique(np.linspace(0, len(found.t) - 1, MOST_TIMES).astype(int)).tolist()
+    samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
     quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
+    names = [f"p{100 * share:g}" for share in QUANTILES]
     return [
-        {"t": float(found.t[i])}
-        | {f"p{100 * share:g}": finite_or_none(value) for share, value in zip(QUANTILES, row, strict=True)}
+        dict(zip(["t", *names], [float(found.t[i]), *map(finite_or_none, row)], strict=True))
         for i, row in zip(samples, quantiles.tolist(), strict=True)
     ]
 

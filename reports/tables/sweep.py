@@ -29,12 +29,20 @@ def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
     yield "spread", ", ".join(f"{name}={value}" for name, value in summary["spread"].items()) + f"; seed {summary['seed']}"
     run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
     yield "run", run
+    if summary["error"]:
+        yield "error", _error_text(summary["error"])
     yield "time", _time_text(summary)
     for name, drift in summary["drift"].items():
         yield f"drift of {name}", _drift_text(drift)
     yield from _angle_lines(summary["angle_from_mean"])
     yield from ((name, summary[name]) for name in ("out", "picture") if summary[name])
     yield from ((f"body {failure['body']}", failure["text"]) for failure in summary["failures"])
+
+
+def _error_text(error: dict[str, Any]) -> str:
+    reached = "" if error["reached"] else ", which is not what was asked for"
+    estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
+    return f"{estimate}; asked: {error['asked']:g} rad{reached}"
 
 
 def _time_text(summary: Summary) -> str:
@@ -57,8 +65,8 @@ def _angle_lines(angles: list[dict[str, float | None]]) -> Iterator[tuple[str, s
 
 
 def rate_text(value: float) -> str:
-    """Return a rate with three digits, such as 12.3 million; of any unit."""
-    for size, name in ((1e9, "billion"), (1e6, "million")):
+    """Return a rate with three digits, such as 3,460 or 20.7M; of any unit."""
+    for size, prefix in ((1e9, "G"), (1e6, "M")):
         if value >= size:
-            return f"{value / size:.3g} {name}"
+            return f"{value / size:.3g}{prefix}"
     return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN
+from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN
 from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Cell, Grade, Table, number
@@ -17,12 +17,12 @@ from .random_ratios import ratio_text
 from .throughput_lines import Contest, Line, contests, lines
 
 TERMS = (
-    "The bodies all differ: asymmetric, in turned frames, heavy tops with no point on an axis, or free, drawn from a seed. Each "
-    "runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. The error "
-    "of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read the median "
-    "counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does not count. "
-    "Exact solutions are a class apart: they take steps of 0.1 s, and would take any. Where nothing else is said, bodies run at "
-    "once on one thread; `one at a time` is a loop over them in Python."
+    "The bodies all differ: asymmetric, in turned frames, heavy tops with no point on an axis, or free, drawn from a seed. "
+    "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
+    "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
+    "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
+    "not count. Exact solutions are a class apart: they take steps of 0.1 s, and would take any. Where nothing else is said, "
+    "bodies run at once on one thread; `one at a time` is a loop over them in Python."
 )
 """What the tables mean."""
 
@@ -42,19 +42,37 @@ def view(table: pd.DataFrame) -> ThroughputView:
     """Return the view of the named rows of the study."""
     found = lines(table)
     compared = list(contests(found))
-    return ThroughputView(tuple(statements(compared)), as_table(compared), cost_table(found), absent(table), chart_points(found))
+    return ThroughputView(
+        tuple(statements(compared)), as_table(compared), cost_table(found), absent(table), chart_points(found)
+    )
 
 
 def as_table(compared: Iterable[Contest]) -> Table:
     """Return the contests, a row for each kind, engine and error."""
-    header = ["bodies", "of ours", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs", "ours is", "engine is"]
+    header = [
+        "bodies",
+        "of ours",
+        "engine",
+        "error, rad",
+        "at",
+        "number",
+        "engine / ours",
+        "ours, µs",
+        "engine, µs",
+        "ours is",
+        "engine is",
+    ]
     return header, [_contest_row(contest) for contest in compared]
 
 
 def _contest_row(contest: Contest) -> list[str | Cell]:
     ours, theirs, ratio = contest.ours, contest.theirs, contest.ratio
     good = ratio >= 1
-    graded = Cell(DASH, Grade.NONE) if math.isnan(ratio) else Cell(f"{'✓' if good else '✗'} {ratio_text(ratio)}", Grade.GOOD if good else Grade.BAD)
+    graded = (
+        Cell(DASH, Grade.NONE)
+        if math.isnan(ratio)
+        else Cell(f"{'✓' if good else '✗'} {ratio_text(ratio)}", Grade.GOOD if good else Grade.BAD)
+    )
     times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
     names = [each.label if each else "does not get there" for each in (ours, theirs)]
     kind, of_ours = contest.kind.replace("_", " "), "exact solutions" if contest.exact else "integrators"
@@ -64,7 +82,9 @@ def _contest_row(contest: Contest) -> list[str | Cell]:
 def cost_table(found: Iterable[Line]) -> Table:
     """Return every line: body-steps per second at best, the least preparation, and the time among most bodies at each error."""
     header = ["bodies", "method", "class", "10^6 body-steps/s, best", "preparation, µs a body, least"]
-    return [*header, *(f"µs a body and second at {error:.0e} rad (number)" for error in ERRORS)], [_cost_row(line) for line in found]
+    return [*header, *(f"µs a body and second at {error:.0e} rad (number)" for error in ERRORS)], [
+        _cost_row(line) for line in found
+    ]
 
 
 def _cost_row(line: Line) -> list[str]:
@@ -84,7 +104,9 @@ def _cost_text(line: Line, error: float) -> str:
 
 def absent(table: pd.DataFrame) -> Table:
     """Return what of the study did not run, and why; what would have taken too long is left out where fewer bodies ran."""
-    failed = table[~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)]
+    failed = table[
+        ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
+    ]
     grouped = failed.groupby(["scene", "name", "outcome", "reason"], sort=False).size()
     rows = [[str(scene).replace("_", " "), str(name), f"{kind}: {reason}"] for scene, name, kind, reason in grouped.index]
     return ["bodies", "method", "why not"], rows
@@ -107,8 +129,10 @@ def _words(contest: Contest) -> str:
         missing = [name for name, side in (("ours", contest.ours), (contest.engine, contest.theirs)) if not side]
         return f"{at} {' and '.join(missing)} did not get there"
     ratio, among = contest.ratio, f"among {contest.size:,}"
-    return f"{at} {contest.engine} takes {ratio_text(ratio)} times as long ({among})" if ratio >= 1 else (
-        f"{at} {contest.engine} is {ratio_text(1 / ratio)} times as fast as ours ({among})"
+    return (
+        f"{at} {contest.engine} takes {ratio_text(ratio)} times as long ({among})"
+        if ratio >= 1
+        else (f"{at} {contest.engine} is {ratio_text(1 / ratio)} times as fast as ours ({among})")
     )
 
 

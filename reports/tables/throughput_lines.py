@@ -13,7 +13,7 @@ import pandas as pd
 from conservative.benchmarks.measures.cost_at_error import cost
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput import ERRORS, EXACT, MEDIAN, MOST
+from conservative.benchmarks.studies.throughput_extent import ERRORS, EXACT, MEDIAN, MOST
 from conservative.method import Role
 
 _SIZE = re.compile(r"(\d+) bodies")
@@ -59,7 +59,7 @@ class Line:
         return sorted({size for setting in self.settings for what, size in setting if what == Measure.TIME.text})
 
     def cost(self, error: float, size: int, which: str = MEDIAN) -> float:
-        """Return the time, s per body and simulated second, among `size` bodies at an error, rad; nan where it does not get there."""
+        """Return the time, s per body and simulated second, among `size` bodies at an error, rad; nan where there is none."""
         good = [setting for setting in self.settings if math.isfinite(setting.get((which, 0), math.nan))]
         errors = [setting[which, 0] for setting in good]
         return cost(errors, [setting.get((Measure.TIME.text, size), math.nan) for setting in good], error)

@@ -24,7 +24,7 @@ from conservative.methods.many import Block, Bodies
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-MACHINE_CODE = ("signals", "simd", "simd_llvm", "series_llvm", "lanes_llvm")
+MACHINE_CODE = ("signals", "simd", "simd_llvm", "series_llvm", "series_lanes", "lanes_llvm")
 OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in MACHINE_CODE))
 """Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
 BASES = ("at_time", "axial_constants", "axial_energy", "start_series", "finite_torque", "energy", "body_torque")
@@ -86,7 +86,9 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
             for factor, n in ((1, 8), (40, 3), (200, 2)):
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, {factor}", partial(method.solve, scene, Grid(dt, n, 2))
-            yield f"{scene.name}, {method.name}, many, 1", partial(run_many, scene, method, Grid(scene.dt, 33, 16))
+            for factor, n in ((1, 33), (40, 3)):
+                dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
+                yield f"{scene.name}, {method.name}, many, {factor}", partial(run_many, scene, method, Grid(dt, n, 16))
         yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_eval=(0.3 * scene.dt, 7.7 * scene.dt))
 
 

@@ -166,6 +166,7 @@ ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
         (REST, {"parameters": {"weight": "1%"}}, "parameters", "'weight'", "none"),
         (TOP, {"seed": -1}, "seed", "-1", "0 or more"),
         (TOP, {"n": 0}, "n", "0", "1 or more"),
+        (TOP, {"n": 10**12}, "n", "1000000000000", "fit in memory"),
         ("brick_flip", {}, "scene", "'brick_flip'", "a Scene"),
     ],
 )

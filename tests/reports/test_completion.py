@@ -67,6 +67,9 @@ def test_the_last_of_several_is_completed(folder):
         ("track exu", ("plain", "exudyn")),
         ("gate res", ("file", "res")),
         ("run brick_flip --csv s", ("file", "s")),
+        ("sweep brick", ("plain", "brick_flip")),
+        ("sweep lagrange_top --spread a", ("plain", "attitude=")),
+        ("sweep lagrange_top --spread rate=1%,potential.w", ("plain", "rate=1%,potential.weight=")),
     ],
 )
 def test_everything_else_is_completed_too(words, offered):

@@ -80,6 +80,10 @@ def test_any_other_study_shows_its_rows(tmp_path):
         (("random", "--scenes", "brick_flip"), "scenes"),
         (("speed", "--seed", "3"), "seed"),
         (("speed", "--bodies", "3"), "bodies"),
+        (("speed", "--sizes", "3"), "sizes"),
+        (("random", "--sizes", "3"), "sizes"),
+        (("throughput", "--sizes", "1,half"), "sizes"),
+        (("throughput", "--scenes", "brick_flip"), "scenes"),
         (("engines_at_one_step", "--methods", "reduced"), "methods"),
         (("random", "--methods", "nonsense"), "method"),
     ],
@@ -109,6 +113,13 @@ def test_the_number_of_bodies_is_that_in_each_field():
     assert "seed=5" in plan_study("random", Extent(methods=("projected",), bodies=1, seed=5)).scenes[0].name
     with pytest.raises(BadInput):
         plan_study("random", Extent(methods=("projected",), bodies=0))
+
+
+def test_numbers_of_bodies_are_read_as_people_write_them():
+    planned = plan_study("throughput", Extent(methods=("mujoco:RK4",), sizes=("1", "1e3"), bodies=3, seed=2, quick=True))
+    assert (planned.sizes, planned.bodies, planned.seed, planned.quick) == ((1, 1000), 3, 2, True)
+    assert [method.name for method in planned.methods] == ["mujoco"]
+    assert [scene.name for scene in planned.scenes] == ["heavy_tops", "free_bodies"]
 
 
 def test_a_row_that_failed_says_why():

@@ -43,7 +43,7 @@ def prepare(given):
 
 
 def prepare_many(bodies):
-    """Return a run of many bodies, each in a world of its own, of which all fields of the model that belong to a body are rows."""
+    """Return a run of many bodies, each in a world of its own, with rows of its own in the model."""
     import mujoco
     import mujoco_warp
     import warp

@@ -65,7 +65,7 @@ def prepare_many(bodies):
     def run():
         start = q0[:, None], w0[:, None]
         rest = (np.asarray(samples, float) for samples in together(*given_to_it))
-        q, w = (np.concatenate(both, axis=1) for both in zip(start, rest))
+        q, w = (np.concatenate(both, axis=1) for both in zip(start, rest))  # noqa: B905
         return {"q": q, "w": w}
 
     return run

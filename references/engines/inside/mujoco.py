@@ -66,7 +66,7 @@ def prepare_many_with(mj: Any, bodies: Any) -> Any:
     given, models = bodies[0], [_model(mj, body) for body in bodies]
     threads = getattr(given, "threads", 1)
     datas = [mj.MjData(models[0]) for _ in range(threads)]
-    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies)])
+    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies)])  # noqa: B905
     room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
 
     def run():

@@ -1,0 +1,121 @@
+"""The study of throughput: bodies that all differ, ways to run them, and which settings are timed."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from conservative import BadInput
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import many_runs, studies, throughput
+from conservative.benchmarks.studies.ensembles import draw
+from conservative.benchmarks.studies.many_runs import Way
+from conservative.method import Grid, Role
+from conservative.outcome import OutcomeKind
+from conservative.references.engines.mujoco import MuJoCo
+
+
+@dataclass(frozen=True)
+class Ours(MuJoCo):
+    """An integrator of ours, as far as the study can see, that needs no compilation."""
+
+    family: ClassVar[str] = "ours"
+    role: ClassVar[Role] = Role.OURS
+
+
+@dataclass(frozen=True)
+class Fails(MuJoCo):
+    """An engine that raises where many bodies are prepared."""
+
+    family: ClassVar[str] = "fails"
+
+    def prepare_many(self, bodies, grid):
+        raise RuntimeError("planted")
+
+
+def test_bodies_differ_and_stay_what_they_are_in_larger_numbers():
+    few, many = draw("heavy_tops", 3, seed=1), draw("heavy_tops", 200, seed=1)
+    for name in ("R_WB0", "w_WB_B0", "inertia"):
+        assert np.array_equal(getattr(few, name), getattr(many, name)[:3])
+    assert np.array_equal(few.parameters["com_B"], many.parameters["com_B"][:3])
+    moments = np.sort(many.principal[0], axis=1)
+    assert (moments[:, 2] / moments[:, 0]).max() < 5.5
+    assert (np.diff(moments, axis=1) / moments[:, :1]).min() > 1e-6  # asymmetric, all of them
+    assert np.abs(draw("heavy_tops", 3, seed=2).inertia - few.inertia).min() > 1e-6
+    with pytest.raises(BadInput):
+        draw("other", 3)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    study = studies.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=4)
+    tops = throughput.ThroughputStudy(study.name, study.scenes[:1], study.methods, True, sizes=(1, 3), bodies=4)
+    return list(studies.rows(tops))
+
+
+def of(rows, method, measure, quantity):
+    return [row for row in rows if (row.family, row.measure, row.quantity) == (method, measure, quantity)]
+
+
+def test_errors_fall_and_times_are_of_each_number_of_bodies(rows):
+    errors = [row.value for row in of(rows, "ours", Measure.ATTITUDE_MAX, "median")]
+    assert len(errors) >= 4
+    assert errors[-1] < 1e-4 < errors[0]
+    for size in ("1 bodies", "3 bodies", "3 bodies, one at a time", "3 bodies, 2 threads"):
+        times = of(rows, "ours", Measure.TIME, size)
+        assert times
+        assert all(row.value > 0 or row.outcome.kind is OutcomeKind.SKIPPED for row in times)
+    assert not of(rows, "mujoco", Measure.TIME, "3 bodies")  # Euler does not get to the least error within the time
+    assert not of(rows, "mujoco", Measure.ATTITUDE_MAX, "median, one at a time")
+
+
+def test_the_truths_agree(rows):
+    (row,) = [row for row in rows if row.measure is Measure.AGREEMENT]
+    assert row.value < 1e-9  # measured 5e-12
+    assert "body" in row.detail
+
+
+def test_an_engine_that_raises_has_a_row(rows):
+    found = of(rows, "fails", Measure.ATTITUDE_MAX, "median")
+    assert {row.outcome.kind for row in found} == {OutcomeKind.CRASHED}
+    with pytest.raises(RuntimeError):
+        many_runs.attempt_many(Way(OursFails()), draw("heavy_tops", 2), Grid(0.1, 2), 10.0)
+
+
+class OursFails(Fails):
+    """One of ours: what it raises is a mistake of ours."""
+
+    role: ClassVar[Role] = Role.OURS
+
+
+def test_ways_give_the_same_numbers():
+    bodies, grid = draw("free_bodies", 3), Grid(0.1, 4, 2)
+    found = [many_runs.prepare_blocks(way, bodies, grid)().R_WB for way in many_runs.list_ways(Ours("RK4"))]
+    assert len(found) == 3
+    assert np.abs(found[0] - found[1]).max() < 1e-14  # measured 4e-16
+    assert np.array_equal(found[0], found[2])
+
+
+def test_a_setting_that_would_take_too_long_says_so():
+    point = throughput.Point(Way(Ours()), None, {}, spent=0.01, prepare=0.02)
+    assert throughput.too_long(point, 10, 0.2) is None
+    assert throughput.too_long(point, 30, 0.2).reason.startswith("a call would take 0.3 s")
+    assert "preparing" in throughput.too_long(throughput.Point(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
+    assert throughput.too_long(point, 1, 1e-9) is None  # one body is always tried
+
+
+def test_a_lucky_setting_decides_nothing():
+    errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
+    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0) for each in errors]
+    assert throughput.decide(line) == line[1:]
+
+
+def fake(method):
+    return type("case", (), {"method": method})
+
+
+@pytest.mark.parametrize("extent", [{"sizes": (0,)}, {"sizes": ()}, {"bodies": 0}, {"time_limit": -1.0}])
+def test_numbers_that_make_no_study(extent):
+    with pytest.raises(BadInput):
+        studies.throughput_study((Ours(),), **extent)

@@ -1,0 +1,93 @@
+"""Engines that run many bodies at once: each body moves as it does alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conservative import BadInput, registry
+from conservative.benchmarks.studies.ensembles import draw
+from conservative.method import Grid
+from conservative.methods.many import Bodies
+from conservative.references.engine import principal_axes
+from conservative.references.engines.inside import mujoco as inside
+from conservative.references.environments.plain_numbers import ManySamples, describe_many
+from conservative.references.environments.worker import Adapters
+from conservative.references.heyoka_equations import batches
+
+GRID = Grid(0.01, 50, 20)
+TOPS, FREE = draw("heavy_tops", 5, seed=3), draw("free_bodies", 5, seed=3)
+HEYOKA = "heyoka:tol=1e-15,frame=base_vectors"
+
+
+def differences(block, method, bodies):
+    """The largest difference of each body from the run of it alone."""
+    alone = [method.solve(bodies.take(i), GRID) for i in range(len(bodies))]
+    R, w = (np.array([getattr(each, name) for each in alone]) for name in ("R_WB", "w_WB_B"))
+    return np.maximum(np.abs(block.R_WB - R).max(axis=(1, 2, 3)), np.abs(block.w_WB_B - w).max(axis=(1, 2)))
+
+
+@pytest.mark.parametrize(
+    ("name", "bodies", "allowed"),
+    [
+        (HEYOKA, TOPS, 1e-13),  # measured 5e-15
+        (f"{HEYOKA},driver=ensemble", TOPS, 1e-13),  # the same
+        ("mujoco:RK4", TOPS, 1e-14),  # measured 9e-16
+        ("mujoco:RK4,threads=2", FREE, 1e-14),
+        ("pinocchio:scheme=RK4", TOPS, 1e-14),
+    ],
+)
+def test_a_body_among_many_moves_as_it_does_alone(name, bodies, allowed):
+    method = registry.method(name)
+    run = method.prepare_many(bodies, GRID)
+    first, again = run(), run()
+    assert first.finished.all()
+    assert differences(first, method, bodies).max() < allowed
+    assert np.array_equal(first.R_WB, again.R_WB)
+    other = Bodies(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, bodies.inertia[::-1].copy(), bodies.parameters)
+    assert differences(first, method, other)[0] > 1e-3
+
+
+def test_a_batch_that_does_not_get_there_says_so(monkeypatch):
+    monkeypatch.setattr(batches, "STEP_LIMIT", 1)
+    block = registry.method(HEYOKA).prepare_many(TOPS, GRID)()
+    assert not block.finished.any()
+    assert np.isnan(block.R_WB[:, -1]).all()
+
+
+def test_a_rollout_that_stands_still_is_not_finished():
+    rates = TOPS.w_WB_B0.copy()
+    rates[2] = 1e4
+    many = Bodies(TOPS.scene, TOPS.R_WB0, rates, TOPS.inertia, TOPS.parameters)
+    block = registry.method("mujoco:RK4").prepare_many(many, GRID)()
+    assert block.finished.tolist() == [True, True, False, True, True]
+    assert np.isnan(block.R_WB[2, -1]).all()
+    assert np.isfinite(block.R_WB[[0, 1, 3, 4]]).all()
+
+
+def test_a_rollout_in_pieces_is_the_same(monkeypatch):
+    run = registry.method("mujoco:RK4").prepare_many
+    whole = run(TOPS, GRID)()
+    monkeypatch.setattr(inside, "ROOM", 7 * 8 * 5)
+    assert np.array_equal(run(TOPS, GRID)().R_WB, whole.R_WB)
+
+
+def test_a_worker_takes_bodies_apart_again():
+    axes = [principal_axes(TOPS.take(i)) for i in range(5)]
+    adapters = Adapters()
+    numbers = describe_many(axes, GRID)
+    number = adapters.prepare(str(Path(inside.__file__)), {"integrator": "RK4"}, **numbers)["run"]
+    block = ManySamples(axes, GRID).trajectory(adapters.run(number))
+    assert differences(block, registry.method("mujoco:RK4"), TOPS).max() < 1e-14  # measured 9e-16
+
+
+@pytest.mark.parametrize("settings", ["width=0", "width=65", "driver=other"])
+def test_bad_settings_of_batches(settings):
+    with pytest.raises(BadInput):
+        registry.method(f"heyoka:{settings}")
+
+
+def test_what_cannot_run_at_once_says_so():
+    assert registry.method("heyoka:frame=lean").prepare_many(FREE, GRID) is None
+    small = Bodies(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-30, TOPS.parameters)
+    assert registry.method("mujoco:RK4").prepare_many(small, GRID) is None

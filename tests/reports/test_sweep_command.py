@@ -1,0 +1,178 @@
+"""The command `sweep`: its figures are those of `integrate_many`, its folder can be gone on with, its errors are one line."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative.integration.distributions import angle_quantiles, mean_attitudes
+from conservative.outcome import ProgressOfMany
+from conservative.reports.cli.main import main
+from conservative.reports.run import sweep as work
+from conservative.reports.tables.sweep import rate_text, summary_text
+
+SPREAD = ("--spread", "attitude=5deg,rate=2%", "--seed", "3")
+COMMON = ("brick_flip", "--starts", "1500", *SPREAD, "--dt", "0.1", "--t-end", "1.15", "--samples", "5")
+
+
+def conservative(*arguments):
+    return CliRunner().invoke(main, ["sweep", *(str(argument) for argument in arguments)])
+
+
+def same():
+    """The ensemble that the command makes."""
+    scene = cv.scenes.brick_flip()
+    return cv.integrate_many(
+        scene, **cv.spread(scene, 1500, attitude="5deg", rate="2%", seed=3), dt=0.1, t_end=1.15, sample_every=3
+    )
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sweep")
+    return conservative(*COMMON, "--out", folder / "sweep.zarr", "--json"), folder
+
+
+def test_the_samples_are_those_of_integrate_many(answered):
+    done, folder = answered
+    assert done.exit_code == 0, done.output
+    found, expected = cv.open_ensemble(folder / "sweep.zarr"), same()
+    np.testing.assert_array_equal(found.R_WB[:], expected.R_WB)
+    np.testing.assert_array_equal(found.w_WB_B[:], expected.w_WB_B)
+
+
+def test_json_has_outcomes_drifts_spread_and_rates(answered):
+    done, folder = answered
+    content, expected = json.loads(done.stdout), same()
+    assert content["outcomes"] == {"ok": 1500}
+    assert content["spread"] == {"attitude": "5deg", "rate": "2%"}
+    assert (content["bodies"], content["seed"], content["samples"], content["steps"]) == (1500, 3, 5, 12)
+    for name, values in expected.drifts.items():
+        body = int(np.argmax(values))
+        assert content["drift"][name] == {"largest": values[body], "body": body, "median": np.median(values)}
+    quantiles = angle_quantiles(expected.R_WB, mean_attitudes(expected.R_WB))
+    rows = content["angle_from_mean"]
+    assert [row["t"] for row in rows] == expected.t.tolist()
+    assert [[row["p5"], row["p50"], row["p95"]] for row in rows] == quantiles.tolist()
+    assert content["body_steps_per_second"] == pytest.approx(12 * content["bodies_per_second"])
+    assert content["bodies_per_second"] > 1500 / content["wall_time"] > 0
+    assert (content["out"], content["picture"]) == (str(folder / "sweep.zarr"), str(folder / "sweep.svg"))
+
+
+def test_the_picture_lies_beside_the_folder(answered):
+    _, folder = answered
+    assert sorted(path.name for path in folder.iterdir()) == ["sweep.svg", "sweep.zarr"]
+    picture = (folder / "sweep.svg").read_text()
+    for part in ("<svg", "1,500 bodies", "Body axis 3 at t = 1.2 s", "angle from the mean", "drift of", "momentum"):
+        assert part in picture
+
+
+def test_an_interrupted_sweep_says_what_is_kept_and_resume_does_the_rest(answered, tmp_path, monkeypatch):
+    _, folder = answered
+
+    def stop(sweep, progress):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "sweep.zarr"
+    with monkeypatch.context() as context:
+        context.setattr(work, "_progress_text", stop)
+        done = conservative(*COMMON, "--out", out, "--threads", "1")
+    assert done.exit_code == 130
+    kept = rf"(1,024|476) of 1,500 bodies are finished in {re.escape(str(out))}; the same command with --resume does the rest"
+    told = re.fullmatch(f"Interrupted; {kept}\n", done.stderr)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.zarr"]
+    again = conservative(*COMMON, "--out", out, "--resume", "--json")
+    assert again.exit_code == 0, again.output
+    assert json.loads(again.stdout)["found_before"] == int(told[1].replace(",", ""))
+    np.testing.assert_array_equal(cv.open_ensemble(out).R_WB[:], cv.open_ensemble(folder / "sweep.zarr").R_WB[:])
+    assert (tmp_path / "sweep.svg").read_text() == (folder / "sweep.svg").read_text()
+
+
+def test_text_has_the_same_figures_without_a_folder_and_bodies_that_fail_are_listed():
+    done = conservative("brick_flip", "--starts", "2", "--spread", "rate=1%", "-m", "convected:1e-99", "--t-end", "0.05")
+    assert done.exit_code == 1
+    for part in ("bodies", "2: 0 ok, 2 ", "rate=1%; seed 0", "none: no body has it, or all failed"):
+        assert part in done.stdout
+    assert "body 1 " in done.stdout
+    assert done.stderr.count("\n") == 1
+    assert "2 of 2 bodies failed, the first of them number 0: " in done.stderr
+
+
+def test_an_error_instead_of_a_step():
+    done = conservative("brick_flip", "--starts", "3", "--spread", "rate=1%", "--error", "1e-3", "--t-end", "0.2", "--json")
+    assert done.exit_code == 0, done.output
+    content = json.loads(done.stdout)
+    assert content["error"]["asked"] == 1e-3
+    assert content["error"]["estimate"] < 1e-3
+    assert content["error"]["reached"]
+    assert content["samples"] == 51
+
+
+def test_an_estimate_that_is_not_reached_is_said_to_be_one():
+    summary = json.loads(conservative("brick_flip", "--starts", "2", "--spread", "rate=1%", "--dt", "0.2", "--json").stdout)
+    missed = summary | {"error": {"asked": 1e-20, "estimate": 2e-16, "reached": False, "bodies": 2}}
+    expected = "2e-16 rad at most, estimated on 2 bodies; asked: 1e-20 rad, which is not what was asked for"
+    assert expected in summary_text(missed)
+
+
+def test_progress_is_told_with_rates():
+    planned = work.plan("brick_flip", 10, {}, 0, samples=5, dt=0.1, t_end=1.0, error=None, resume=False, path=None)
+    told = work._progress_text(planned, ProgressOfMany(2.0, 4_000_500, 9_000_000, 500))
+    assert told == "2M bodies/s, 20M steps/s"
+    assert [rate_text(each) for each in (0.1234, 99.96, 123.4, 12_345, 2.3456e9)] == ["0.123", "100", "123", "12,300", "2.35G"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["brick_flipp", *SPREAD], ["scene: got 'brick_flipp'", "'brick_flip' (nearest)"]),
+        (["brick_flip", "--spread", "attitude"], ["spread: got 'attitude'", "attitude=5deg"]),
+        (["brick_flip", "--spread", "atitude=5deg"], ["spread: got 'atitude'", "'attitude' (nearest)", "potential."]),
+        (["brick_flip", "--spread", "rate=1,rate=2"], ["spread: got 'rate=2' after rate=1", "once"]),
+        (["brick_flip", "--spread", "rate=fast"], ["rate: got 'fast'", "10% (of its size)"]),
+        (["brick_flip", "--spread", "potential.weight=2%"], ["parameters: got 'weight'", "none"]),
+        (["lagrange_top", "--spread", "potential.wight=2%"], ["parameters: got 'wight'", "'weight' (nearest)"]),
+        (["brick_flip", *SPREAD, "--starts", "1e11"], ["starts: got 100000000000", "fit in memory"]),
+        (["brick_flip", *SPREAD, "--dt", "-1"], ["dt: got -1.0", "above 0"]),
+        (["brick_flip", *SPREAD, "--error", "1e-6", "--dt", "0.1"], ["dt: got 0.1", "none together with --error"]),
+        (["brick_flip", *SPREAD, "--error", "1e-6", "-m", "reduced"], ["method: got 'reduced'", "error"]),
+        (["brick_flip", *SPREAD, "--error", "-1"], ["error: got -1.0", "above 0"]),
+        (["brick_flip", *SPREAD, "--resume"], ["resume: got no folder", "--out"]),
+        (["brick_flip", *SPREAD, "--out", "missing/sweep.zarr"], ["out: got 'missing/sweep.svg'", "a folder that exists"]),
+        (["brick_flip", *SPREAD, "--out", "sweep.svg"], ["out: got 'sweep.svg'", "sweep.zarr"]),
+        (["brick_flip", *SPREAD, "--out", "."], ["out: got '.'", "sweep.zarr"]),
+        (["brick_flip", *SPREAD, "--out", "kept"], ["out: got", "kept'", "no ensemble"]),
+        (["brick_flip", *SPREAD, "--scheduler", "nonsense"], ["scheduler: got 'nonsense'", "address of a Dask scheduler"]),
+    ],
+)
+def test_mistakes_end_in_one_clear_line_before_any_work(arguments, parts, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "mine").write_text("mine")
+    done = conservative(*arguments)
+    assert done.exit_code == 2, done.output
+    assert done.stdout == ""
+    assert done.stderr.startswith("Error: ")
+    assert done.stderr.count("\n") == 1
+    assert [part for part in parts if part not in done.stderr] == []
+    assert [path.name for path in tmp_path.rglob("*")] == ["kept", "mine"]
+
+
+def test_samples_that_do_not_fit_in_memory(monkeypatch):
+    monkeypatch.setattr("conservative.integration.many.most_samples", lambda: 2)
+    done = conservative("brick_flip", *SPREAD, "--starts", "3")
+    assert done.exit_code == 2
+    assert (
+        "Error: samples: got 153 samples of 3 bodies; allowed: fewer samples or starts, or a folder for them, --out:"
+        in done.stderr
+    )
+
+
+@pytest.mark.parametrize("count", ["0", "5.5", "many", "nan", "inf"])
+def test_a_number_of_starts_is_an_integer_above_0(count):
+    done = conservative("brick_flip", *SPREAD, "--starts", count)
+    assert done.exit_code == 2
+    assert f"got '{count}'; allowed: an integer of 1 or more, such as 1000 or 1e6" in done.stderr

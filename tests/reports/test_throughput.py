@@ -1,0 +1,109 @@
+"""Many bodies in tables, words and the report, on made-up measurements whose answer is known."""
+
+import pandas as pd
+import pytest
+
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.throughput_extent import EXACT
+from conservative.reports import document, view
+from conservative.reports.labels import with_names
+from conservative.reports.run.measure import Measurements
+from conservative.reports.run.plan import plan_report
+from conservative.reports.run.provenance import provenance
+from conservative.reports.tables import throughput
+from conservative.reports.tables.throughput_lines import contests, lines
+
+from .made_up import measurements
+from .rows import row
+
+
+def line(method, role, points, way="", scene="heavy_tops", detail="", sizes=(10, 1000)):
+    """Rows of a line: pairs of an error, which is that of the median and a tenth of that of the 95th percentile, and a time."""
+    common, found = {"scene": scene, "role": role}, []
+    for dt, (error, time) in enumerate(points, start=1):
+        for which, value in (("median", error), ("95 %", 10 * error)):
+            found.append((dt, Measure.ATTITUDE_MAX, value, which, detail))
+        for size in sizes:
+            found.append((dt, Measure.TIME, time * (2 if size == 10 else 1), f"{size} bodies", ""))
+            found.append((dt, Measure.BODY_STEPS, 1 / time, f"{size} bodies", ""))
+    return [
+        measurement.Measurement(
+            **{**vars(row("throughput", method, measure, value, dt, detail=said, **common)), "quantity": name}
+        )
+        for dt, measure, value, what, said in found
+        for name in [", ".join(filter(None, (what, way)))]
+    ]
+
+
+OURS = line("taylor", "ours", [(1e-3, 1e-6), (1e-6, 2e-5), (1e-10, 4e-5)])
+ALONE = line("taylor", "ours", [(1e-10, 1e-9)], way="one at a time")
+HEYOKA = line("heyoka", "engine", [(1e-3, 4e-6), (1e-6, 1e-5), (1e-10, 2e-5)], sizes=(10,))
+SHORT = line("mujoco", "engine", [(1e-3, 1e-3)])
+FREE = line("moser_veselov", "ours", [(1e-14, 1e-7)], scene="free_bodies", detail=EXACT)
+THEIRS = line("heyoka", "engine", [(1e-10, 1e-6)], scene="free_bodies")
+ROWS = measurement.frame([*OURS, *ALONE, *HEYOKA, *SHORT, *FREE, *THEIRS])
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return {(c.kind, c.engine, c.exact, c.error, c.which): c for c in contests(lines(with_names(ROWS)))}
+
+
+def test_contests_are_among_the_most_bodies_of_both_sides(compared):
+    found = compared["heavy_tops", "heyoka", False, 1e-3, "median"]
+    assert (found.size, found.ratio) == (10, pytest.approx(4.0))
+    assert found.ours.label == "taylor"  # one at a time takes less, and is another way
+    assert compared["heavy_tops", "mujoco", False, 1e-3, "median"].size == 1000
+    assert compared["heavy_tops", "mujoco", False, 1e-3, "median"].ratio == pytest.approx(1000.0)
+
+
+def test_a_peer_that_wins_is_said_to(compared):
+    assert compared["heavy_tops", "heyoka", False, 1e-6, "median"].ratio == pytest.approx(0.5)
+    (said,) = [text for text in throughput.statements(compared.values()) if "against heyoka" in text and "tops" in text]
+    assert "at 1e-03 rad heyoka takes 4.00 times as long (among 10)" in said
+    assert "at 1e-06 rad heyoka is 2.00 times as fast as ours (among 10)" in said
+
+
+def test_what_does_not_get_there_is_no_ratio(compared):
+    (said,) = [text for text in throughput.statements(compared.values()) if "against mujoco" in text]
+    assert "at 1e-06 rad mujoco did not get there" in said
+    assert compared["heavy_tops", "mujoco", False, 1e-3, "95 %"].theirs is None
+
+
+def test_exact_solutions_are_a_class_of_their_own(compared):
+    assert {key[2] for key in compared if key[0] == "free_bodies"} == {True}
+    (said,) = [text for text in throughput.statements(compared.values()) if "free bodies" in text]
+    assert "our cheapest exact solution" in said
+
+
+def test_the_table_has_every_line_and_at_how_many_bodies():
+    _, rows = throughput.cost_table(lines(with_names(ROWS)))
+    assert ["heavy tops", "taylor, one at a time"] in [row[:2] for row in rows]
+    (heyoka,) = [row for row in rows if row[:2] == ["heavy tops", "heyoka"]]
+    assert heyoka[5:7] == ["8 (10)", "20 (10)"]
+    assert {row[2] for row in rows} == {"integrator", "exact solution"}
+
+
+def test_what_did_not_run_has_its_reason():
+    failed = row(
+        "throughput", "mjx", "attitude error max", float("nan"), outcome="unsupported", role="engine", scene="heavy_tops"
+    )
+    _, rows = throughput.absent(with_names(measurement.frame([*OURS, failed])))
+    assert rows == [["heavy tops", "mjx", "unsupported: "]]
+
+
+def test_the_report_has_a_section_with_a_picture(tmp_path):
+    plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], quick=True, bodies=1), measurements()
+    assert plan.names[-1] == "throughput"
+    built = view.build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
+    document.render(built, tmp_path, png=False, announce=lambda what: None)
+    for name in ("report.md", "index.html"):
+        assert "heyoka is 2.00 times as fast as ours" in (tmp_path / name).read_text(encoding="utf-8").replace("&#39;", "'")
+    assert (tmp_path / "many_bodies.svg").read_text(encoding="utf-8").count("<path") > 20
+    assert "many_bodies.svg" in (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert 'data-figure="many_bodies"' in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_report_of_scenes_alone_has_no_such_section():
+    assert "throughput" not in plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], quick=True).names
