@@ -91,6 +91,9 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
                 dt = min(scene.dt * factor, 0.9 * method.longest_step(scene))
                 yield f"{scene.name}, {method.name}, many, {factor}", partial(run_many, scene, method, Grid(dt, n, 16))
         yield f"{scene.name}, between, 1", partial(cv.integrate, scene, scene.dt, t_eval=(0.3 * scene.dt, 7.7 * scene.dt))
+    for field, dt in (("lagrange_top", 0.5), ("brick_flip", 1.0)):
+        scene = getattr(cv.scenes, field)()
+        yield f"{scene.name}, many, long", partial(run_many, scene, cv.Reduced(), Grid(dt, 5))
 
 
 def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
