@@ -10,9 +10,11 @@ in common, a task whose worker dies is run by another one, and what is run twice
 same version, which is asked for before any work. From processors of the same kind the same numbers come back as without a
 cluster, bit for bit; compiled code differs from kind to kind.
 
-Source: `concurrent.futures` and `distributed.Client.submit`; all scheduling is Dask's. `Client.get_executor` fetches results
-side by side, and with distributed 2026.8.0 some of those that a dying worker had never came. Here they are fetched one after
-another.
+A scheduler tries for 30 s to reach a worker that has died with results, unless its setting `distributed.comm.timeouts.connect`
+says otherwise, and only then has them computed again: that long a run can stand still.
+
+Source: `concurrent.futures` and `distributed.Client.submit`; all scheduling is Dask's. Futures of `Client.get_executor` never
+end where fetching a result fails, as it does when a scheduler dies (distributed 2026.8.0).
 """
 
 from __future__ import annotations
@@ -42,10 +44,12 @@ _LOST = "a cluster that stays there; what was written to a path is kept, and res
 def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
     """Give a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, with Dask's own messages off in the block.
 
+    The scheduler has `limit`, s, to answer.
+
     Raises
     ------
     BadInput
-        No scheduler answers there within `limit` s, or it is no address.
+        No scheduler answers there, or it is no address.
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """

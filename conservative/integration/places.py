@@ -26,7 +26,13 @@ MOST_WAITING = 16
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run is made, as `integrate_many` has it: on so many threads, or by a client of a cluster; and to which path."""
+    """Where a run is made, as `integrate_many` has it: on so many threads, or by a client of a cluster; and to which path.
+
+    Raises
+    ------
+    BadInput
+        The path is none, or `resume` is no truth value, or is asked for without a path.
+    """
 
     threads: int
     client: Any = None

@@ -1,4 +1,7 @@
-"""Ensembles that are on disk, read where they are: arrays are those of Zarr, and a slice of one reads its own chunks."""
+"""Ensembles that are on disk, read where they are: arrays are those of Zarr, and a slice of one reads its own chunks.
+
+Source: the layout of `conservative.integration.store`.
+"""
 
 from __future__ import annotations
 

@@ -167,7 +167,10 @@ def _fill(folder: Path, attributes: Mapping[str, Any], bodies: Bodies, grid: Gri
 
 
 def list_inputs(bodies: Bodies) -> dict[str, Array]:
-    """Return what differs from body to body (n, ...), by the name of its array; units as in `Bodies`."""
+    """Return what differs from body to body, by the name of its array.
+
+    Attitudes are (n, 3, 3), body to world, rates (n, 3), rad/s, inertia (n, 3, 3), kg m^2, parameters (n, ...) in SI units.
+    """
     start = {"R_WB0": bodies.R_WB0, "w_WB_B0": bodies.w_WB_B0, "inertia": bodies.inertia}
     found = {f"start/{name}": values for name, values in start.items() if values is not None and values.strides[0] != 0}
     return found | {f"parameters/{name}": values for name, values in bodies.parameters.items()}

@@ -1,6 +1,7 @@
 """A real Dask cluster, two workers of which one is killed: the same numbers as without one; what is not there is said."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -19,6 +20,8 @@ distributed = pytest.importorskip("distributed")
 
 N, KILLED = 24, 9
 """Bodies, one a block, and of how many of them the results are there when a worker is killed."""
+RETRIES = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"}
+"""How long a scheduler tries to reach a worker that has died: 30 s by default."""
 LIMIT = 60.0
 """Time, s, in which processes start, on however busy a machine."""
 
@@ -27,7 +30,7 @@ def start(stack, folder, program, *arguments):
     """Start a program of Dask, which ends with the stack."""
     command = [sys.executable, "-m", f"distributed.cli.dask_{program}", "--no-dashboard", *arguments]
     log = stack.enter_context((folder / program).open("ab"))
-    process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder)
+    process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=os.environ | RETRIES)
     stack.callback(process.wait)
     stack.callback(process.kill)
     return process

@@ -2,14 +2,18 @@
 
 import csv
 import json
+from concurrent.futures import Future
+from contextlib import nullcontext
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput
 from conservative.benchmarks.measures import measurement
-from conservative.benchmarks.studies import hard_cases, stability, studies
+from conservative.benchmarks.studies import hard_cases, on_cluster, stability, studies
+from conservative.integration.pickling import dump, load
 from conservative.reports.cli.main import main
 from conservative.reports.run import single_study
 from conservative.reports.run.measure import Measurements
@@ -127,3 +131,52 @@ def test_a_row_that_failed_says_why():
     _, (failed, good, *_) = rows_table(table)
     assert failed[3:] == ["energy drift max", "–", "1", "unsupported"]
     assert good[-1] == ""
+
+
+def test_a_study_of_times_has_no_scheduler():
+    done = conservative("study", "speed", "--scenes", "brick_flip", "--methods", "gauss", "--scheduler", "tcp://127.0.0.1:1")
+    assert done.exit_code == 2
+    assert done.output.splitlines()[-1].startswith(
+        "Error: scheduler: got one for the study 'speed'; allowed: none for a study of"
+    )
+
+
+def test_a_scheduler_that_is_not_there_is_said_before_any_work():
+    done = conservative("study", "long_runs", "--scenes", "brick_flip", "--methods", "gauss", "--scheduler", "nowhere")
+    assert done.exit_code == 2
+    assert "Error: scheduler: got 'nowhere', where no scheduler answers" in done.output.splitlines()[-1]
+
+
+class Here:
+    """A cluster that runs its tasks in this process, from bytes and to bytes as a real one does."""
+
+    def __init__(self):
+        self.tasks = 0
+
+    def submit(self, fn, *args):
+        self.tasks += 1
+        future = Future()
+        future.set_result(load(dump(load(dump((fn, args)))[0](*args))))
+        return future
+
+
+def numbers(finding):
+    """What a finding is, to the last bit."""
+    return [value.tobytes() if isinstance(value, np.ndarray) else repr(value) for value in vars(finding).values()]
+
+
+@pytest.mark.parametrize("name", ["paper", "long_runs"])
+def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
+    study = plan_study(name, Extent(("brick_flip", "symmetric_body"), ("gauss",)))
+    here, told = Here(), []
+    monkeypatch.setattr(on_cluster, "start_executor", lambda client: nullcontext(here))
+    found = list(on_cluster.find_on_cluster(None, study, lambda *each: told.append(each)))
+    assert list(map(numbers, found)) == list(map(numbers, studies.findings(study)))
+    assert here.tasks == 2
+    assert told == [(0, 2, "brick_flip"), (1, 2, "symmetric_body")]
+
+
+def test_every_study_is_timed_or_is_not():
+    timed = {"speed", "work_precision", "import_time", "engines_at_one_step", "engines_over_steps", "random", "throughput"}
+    assert set(on_cluster.UNTIMED) | timed == set(studies.MAKERS)
+    assert not set(on_cluster.UNTIMED) & timed
