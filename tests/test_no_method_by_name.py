@@ -27,6 +27,7 @@ ALLOWED = {
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/studies/random.py": ("precise", "the truth of a body in any field"),
+    "benchmarks/studies/throughput.py": ("heyoka", "the truth of many bodies, at a tolerance below round-off"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (
         "convected exact gauss moser_veselov reduced substepped",
@@ -39,7 +40,9 @@ ALLOWED = {
     "benchmarks/verification/interrupts.py": ("scipy", "a run that stays in Python for long"),
     "benchmarks/verification/kills.py": ("moser_veselov", "the method of the report that is killed"),
     "benchmarks/measures/measure.py": ("newton", "the word for an iteration, which is an engine's name, too"),
+    "benchmarks/verification/operations.py": ("moser_veselov reduced taylor", "whose operations are counted"),
     "benchmarks/verification/report_kills.py": ("exudyn", "default of an option"),
+    "benchmarks/verification/roofline.py": ("taylor", "whose series are counted by a formula"),
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
     "benchmarks/verification/third_truth.py": ("exact orekit precise", "the solutions that are compared, and who decides"),
     "benchmarks/verification/worker_kills.py": ("exudyn", "default of an option"),

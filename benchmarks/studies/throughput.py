@@ -72,14 +72,14 @@ class Kind:
 class Point:
     """A setting that reaches its end, in one way: errors, rad, by which one they are, and what a body costs, s.
 
-    That is a share of a call, and of its preparation with what is compiled at hand; 0 until that has been measured.
+    That is a share of a call, and of its preparation with what is compiled at hand.
     """
 
     way: Way
     case: Case
     errors: dict[str, float]
     spent: float
-    prepare: float = 0.0
+    prepare: float
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -147,12 +147,17 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
             continue
         errors = read_errors(found, kind.truth)
         n = len(kind.few)
-        line.append(Point(way, case, errors, found.spent / n))
+        line.append(Point(way, case, errors, found.spent / n, found.prepare / n))
         for name, error in errors.items():
             yield case.row(
                 Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method)
             )
     return line
+
+
+def say(size: int) -> str:
+    """Return a number of bodies in words."""
+    return "1 body" if size == 1 else f"{size} bodies"
 
 
 def name_of(way: Way, what: str) -> str:
@@ -185,12 +190,12 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
     study, ready = kind.study, {}
     for i, point in enumerate(points):
         if reason := too_long(point, size, study.longest_run):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, f"{size} bodies")), reason)
+            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), reason)
             continue
         way = replace(point.way, method=point.case.method)
         found = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
         if isinstance(found, Outcome):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, f"{size} bodies")), found)
+            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), found)
         else:
             ready[str(i)] = found
     rounds = QUICK_ROUNDS if study.quick else ROUNDS
@@ -222,4 +227,4 @@ def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
     }
     for measure, value in values.items():
         outcome = UNCOUNTED if timing.outcome.ok and math.isnan(value) else timing.outcome
-        yield case.row(Value(measure, value, name_of(point.way, f"{size} bodies")), outcome, str(timing) if outcome.ok else "")
+        yield case.row(Value(measure, value, name_of(point.way, say(size))), outcome, str(timing) if outcome.ok else "")

@@ -31,7 +31,7 @@ PREPARATION = 8.0
 ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
 """Which error of the bodies a value is of."""
-EXACT = "exact solution"
+EXACT = "closed form"
 """Detail of errors that do not depend on the step."""
 
 

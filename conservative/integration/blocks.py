@@ -1,7 +1,7 @@
 """Blocks of bodies: one block is run from start to checked samples, many of them side by side on an executor.
 
 The size of a block follows from the number of its samples alone, so that numbers do not depend on threads, on the order in
-which blocks end, or on where they run.
+which blocks end, or on where they run. Source: our own.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Collection, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from time import perf_counter
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ..attitude import Array
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..method import Grid, Method
 from ..methods.many import Block, Bodies, pause, watch
+from ..outcome import ProgressOfMany
 from ..trajectory import Bounds
 from .drifts import find_drifts, list_drifts
 
@@ -179,3 +181,31 @@ def run_blocks(
     finally:
         for future in pending:
             future.cancel()
+
+
+Tell = Callable[[ProgressOfMany], object]
+
+
+class Sink(Protocol):
+    """What keeps the results of blocks, in the order in which they come."""
+
+    @property
+    def done(self) -> Collection[int]:
+        """First indices of the blocks that it has already."""
+
+    def write(self, first: int, result: BlockResult) -> None:
+        """Keep the result of the block that begins with body number `first`."""
+
+
+def fill(
+    sink: Sink, results: Generator[tuple[int, BlockResult], None, None], counts: tuple[int, int], progress: Tell | None
+) -> None:
+    """Hand all results to a sink, and tell after each of them how many bodies are done; counts are those left, and all."""
+    begun, (left, total) = perf_counter(), counts
+    done = total - left
+    with closing(results):
+        for first, result in results:
+            sink.write(first, result)
+            done += len(result)
+            if progress is not None:
+                progress(ProgressOfMany(perf_counter() - begun, done, total, total - counts[0]))

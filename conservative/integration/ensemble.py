@@ -1,4 +1,4 @@
-"""What `integrate_many` gives: samples, drifts and outcomes of many bodies."""
+"""What `integrate_many` gives: samples, drifts and outcomes of many bodies. Source: our own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Starts and bodies of many, checked before any work: which argument, which body, what was got and what is allowed."""
+"""Starts and bodies of many, checked before any work: which argument, which body, what was got and what is allowed.
+
+Source: the constructors of `Scene` and its parts, which are asked for what they say of the first bad one.
+"""
 
 from __future__ import annotations
 

@@ -1,15 +1,13 @@
-"""`integrate_many`: thousands of starts, and of bodies, of one kind of scene."""
+"""`integrate_many`: thousands of starts, and of bodies, of one kind of scene. Source: our own."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Generator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from time import perf_counter
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -21,14 +19,12 @@ from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
-from .blocks import BlockResult, count_left, list_blocks, run_blocks
+from .blocks import Tell, count_left, fill, list_blocks, run_blocks
 from .ensemble import Ensemble, ensemble_of_one
 from .inputs import only_body, read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
 from .places import Place
 from .shared_choice import Goal, choose_for_all, pick_hardest
-
-Tell = Callable[[ProgressOfMany], object]
 
 
 class Details(TypedDict, total=False):
@@ -229,28 +225,3 @@ def run_all(method: Method, bodies: Bodies, grid: Grid, place: Place, progress: 
         results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
         fill(sink, results, (count_left(len(bodies), grid, sink.done), len(bodies)), progress)
     return place.read(sink, *what)
-
-
-class Sink(Protocol):
-    """What keeps the results of blocks, in the order in which they come."""
-
-    @property
-    def done(self) -> Collection[int]:
-        """First indices of the blocks that it has already."""
-
-    def write(self, first: int, result: BlockResult) -> None:
-        """Keep the result of the block that begins with body number `first`."""
-
-
-def fill(
-    sink: Sink, results: Generator[tuple[int, BlockResult], None, None], counts: tuple[int, int], progress: Tell | None
-) -> None:
-    """Hand all results to a sink, and tell after each of them how many bodies are done; counts are those left, and all."""
-    begun, (left, total) = perf_counter(), counts
-    done = total - left
-    with closing(results):
-        for first, result in results:
-            sink.write(first, result)
-            done += len(result)
-            if progress is not None:
-                progress(ProgressOfMany(perf_counter() - begun, done, total, total - counts[0]))

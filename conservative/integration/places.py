@@ -31,7 +31,7 @@ class Place:
     Raises
     ------
     BadInput
-        The path is none, or there is nothing to go on from.
+        The path is none, or `resume` is no truth value, or is asked for without a path.
     """
 
     threads: int

@@ -1,4 +1,7 @@
-"""How an ensemble looks: as tables, and as a card in a notebook. pandas is imported when asked for."""
+"""How an ensemble looks: as tables, and as a card in a notebook. pandas is imported when asked for.
+
+Source: our own.
+"""
 
 from __future__ import annotations
 

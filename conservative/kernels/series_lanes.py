@@ -175,23 +175,19 @@ class Emitter:
                 loaded[key] = self._builder.load(at, align=_BYTES)
         return tuple(loaded[place, id(byte)] for place in places)
 
-    def sum_terms(self, p, first, second):
-        """The sum of terms 1 to p, which varies, the last of them and the one before; the places of two terms are given."""
-        builder, step = self._builder, (second[0] - first[0]) * _BYTES
-        places = tuple(place - step // _BYTES for place in first)
-        before, body, after = builder.block, *(builder.append_basic_block(name) for name in ("sum", "sum_end"))
-        totals = self.load_places({}, first, _bytes(0))
-        last = builder.mul(p, _bytes(step))
-        builder.branch(body)
-        builder.position_at_end(body)
-        at, phis = self._phi(_bytes(2 * step), before), self._phis(totals, before)
-        found = self.plus(phis, self.load_places({}, places, at))
-        following = builder.add(at, _bytes(step))
-        for phi, value in ((at, following), *zip(phis, found, strict=True)):
-            phi.add_incoming(value, body)
-        _keep_rolled(builder.module, builder.cbranch(builder.icmp_unsigned("<=", following, last), body, after))
-        builder.position_at_end(after)
-        return found, self.load_places({}, places, last), self.load_places({}, first, builder.sub(last, _bytes(2 * step)))
+    def merge(self, *ways):
+        """The values of a block that can be come to in several ways, each (values, block they come from)."""
+        phis = tuple(self._builder.phi(_VECTOR) for _ in ways[0][0])
+        for values, block in ways:
+            for phi, value in zip(phis, values, strict=True):
+                phi.add_incoming(value, block)
+        return phis
+
+    def load_term(self, p, first, second):
+        """Term number p, which varies; the places of two terms are given."""
+        step = second[0] - first[0]
+        byte = self._builder.mul(p, _bytes(step * _BYTES))
+        return self.load_places({}, tuple(place - step for place in first), byte)
 
 
 def _bytes(count):
@@ -230,21 +226,33 @@ class _Distinct(ir.MDValue):  # type: ignore[misc]  # llvmlite has no types
 
 def sum_to_order(series, numbers, p, h, start, K):
     """What a step of order p and length h adds to g, a and w, and its last two terms (`series_llvm`); all of `traced`."""
-    builder, emit, end = p.builder, Emitter(p.builder), p.builder.append_basic_block("series_end")
+    builder, emit = p.builder, Emitter(p.builder)
     field = series(emit, *map(_registers, numbers))
-    terms = find_terms(emit, _registers(h), tuple(map(_registers, start)), _registers(K), field)
-    places = []
-    for order, term in enumerate(terms, 1):
+    orders, places = enumerate(find_terms(emit, _registers(h), tuple(map(_registers, start)), _registers(K), field), 1), []
+    sums = {order: builder.append_basic_block(f"sum_{order}") for order in range(LOWEST, HIGHEST + 1)}
+    terms = {}
+    for order, term in orders:
         places.append(tuple(place for v in term for place in emit.store(v)))
         if order == HIGHEST:
-            builder.branch(end)
             break
         if order >= LOWEST:
+            terms[order] = sum(term, ()), builder.block
             proceed = builder.append_basic_block(f"order_{order + 1}")
-            builder.cbranch(builder.icmp_signed("<=", p.ir, p.ir.type(order)), end, proceed)
+            builder.cbranch(builder.icmp_signed("<=", p.ir, p.ir.type(order)), sums[order], proceed)
             builder.position_at_end(proceed)
-    builder.position_at_end(end)
-    found = emit.sum_terms(p.ir, *places[:2])
+    total = sum(term, ())
+    builder.branch(sums[HIGHEST])
+    # Straight code, which every order enters where its own terms begin: loops would fill what the processor learns of branches.
+    for order in range(HIGHEST, 0, -1):
+        if order in sums:
+            before = builder.block
+            builder.position_at_end(sums[order])
+            total = emit.merge((total, before), *([terms[order]] if order in terms else []))
+        if order > 1:
+            total = emit.plus(total, emit.load(places[order - 2]))
+            if order - 1 in sums:
+                builder.branch(sums[order - 1])
+    found = total, *(emit.load_term(builder.sub(p.ir, _bytes(back)), *places[:2]) for back in (0, 1))
     return tuple(tuple(Axes(*map(h.make, nine[k : k + 3])) for k in (0, 3, 6)) for nine in found)
 
 

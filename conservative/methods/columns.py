@@ -36,16 +36,22 @@ def find_units_of_moments(moments: Array) -> Array:
 
 
 def fill_columns(rows: Array, width: int) -> Array:
-    """Return the numbers (n, k) of n bodies as columns (k, m), m the next multiple of `width`, filled up with the last body."""
+    """Return the rows (n, 3) of n bodies, of any units and length, as columns (3, m), filled up with the last body.
+
+    m is the next multiple of `width`.
+    """
     missing = -len(rows) % width
     return np.ascontiguousarray(np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]).T)
 
 
-def make_room(rows: int, width: int) -> Array:
-    """Return room (rows, width) that begins where a line of the cache does: loading a number across two lines costs two."""
-    room = np.empty(rows * width + LINE)
+def make_room(n: int, m: int) -> Array:
+    """Return room (n, m) for numbers, dimensionless, that begins where a line of the processor's cache does.
+
+    Loading what lies across two lines costs as much as two loads.
+    """
+    room = np.empty(n * m + LINE)
     first = -(room.ctypes.data // room.itemsize) % LINE
-    return room[first : first + rows * width].reshape(rows, width)
+    return room[first : first + n * m].reshape(n, m)
 
 
 def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:

@@ -193,7 +193,10 @@ def prepare_lanes(method: Lame, bodies: Bodies, grid: Grid) -> RunMany | None:
 
 
 def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
-    """Return the run of prepared tops, of n bodies; moments are in units of their own, times in those of the step."""
+    """Return the run of tops among n bodies: moments in units of their own, times in that of the step.
+
+    The table (32, m) is what the kernel made of them, without a unit.
+    """
     kernel, s, m, k, time = kernels("lame_many"), grid.n_samples, table.shape[1], len(tops.places), find_unit_of_time(grid)
     q, L = np.empty((m, s, 4)), np.empty((m, s, 3))
     q[:k, 0], L[:k, 0] = tops.q, tops.L

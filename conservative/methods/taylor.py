@@ -58,6 +58,11 @@ class Taylor(_Settings):
     package for the numerical integration of ODEs by means of high-order Taylor methods (2005); the order is 6 and two thirds of
     the tolerance's digits, by a measurement of random bodies near an attracting point.
 
+    Many bodies (`integrate_many`) move several at a time, each in a lane of a register, with steps of one length. Their numbers
+    are those of one at a time but for round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps, by 4e-13 after
+    1,000, and where motions are chaotic, in the end as those of two starts that round-off tells apart. With a tolerance, and in
+    fields that turn, bodies run one by one.
+
     Free bodies have `MoserVeselov`, which has no truncation error at all, symmetric tops `Lame`, and potentials given as Python
     functions `Projected`, as a function has no recurrence.
 

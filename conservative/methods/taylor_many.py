@@ -112,7 +112,8 @@ def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
     model = build_model(frames, fields, units, grid.dt, w, np.where(energy > 0, energy, 1.0), R_DP)
     state = (model.g, model.a, model.L / model.J, np.zeros((len(w), 1)))
     spin, width = find_spins(frames, w) if frames.spinning.any() else None, kernels("lanes").REGISTER
-    return Start(build_likes(fields.like), *(fill_columns(np.column_stack(parts), width) for parts in (model, state)), spin)
+    columns, states = (fill_columns(np.column_stack(parts), width) for parts in (model, state))
+    return Start(build_likes(fields.like), columns, states, spin)
 
 
 def find_frames(bodies: Bodies) -> Frames:

@@ -123,7 +123,7 @@ def lengths(vectors: Array) -> Array:
 
 
 def fill(potential: Any, parameters: Mapping[str, Array], *names: str) -> list[Array]:
-    """Return numbers (n, ...) of a potential, of any unit: those of `parameters`, else its own for all n."""
+    """Return numbers of a potential, (n,), (n, 3) or (n, 3, 3), of any unit: of `parameters`, else its own for all n."""
     n = len(next(iter(parameters.values())))
     own = ((name, np.asarray(getattr(potential, name), dtype=float)) for name in names)
     return [parameters.get(name, np.broadcast_to(value, (n, *value.shape))) for name, value in own]

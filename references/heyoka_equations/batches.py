@@ -88,7 +88,7 @@ def recommended_width() -> int:
 
 
 def march_batches(batches: Batches, t: Array) -> Array:
-    """Return states (samples, m, bodies), batch after batch; nan from where a body does not get on."""
+    """Return states (..., m, n) at times t (s,), s, batch after batch; nan from where a body does not get on."""
     states = np.full((len(t), *batches.start.shape), np.nan)
     states[0] = batches.start
     with batches.integrators.borrow() as integrator:
@@ -102,7 +102,10 @@ def march_batches(batches: Batches, t: Array) -> Array:
 
 
 def march_ensemble(batches: Batches, t: Array) -> Array:
-    """Return the same from `ensemble_propagate_until_batch`, which copies its integrator for each batch; one thread."""
+    """Return states (..., m, n) at times t (s,), s, from `ensemble_propagate_until_batch` on one thread.
+
+    It copies its integrator for each batch.
+    """
     hy, states = forms.heyoka(), np.full((len(t), *batches.start.shape), np.nan)
     states[0] = batches.start
     count = batches.start.shape[1] // batches.width

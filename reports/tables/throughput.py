@@ -21,8 +21,8 @@ TERMS = (
     "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
     "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
     "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
-    "not count. Exact solutions are a class apart: they take steps of 0.1 s, and would take any. Where nothing else is said, "
-    "bodies run at once on one thread; `one at a time` is a loop over them in Python."
+    "not count. Closed forms, which are exact, are a class apart: they take steps of 0.1 s, and would take any. Where nothing "
+    "else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
 )
 """What the tables mean."""
 
@@ -75,7 +75,7 @@ def _contest_row(contest: Contest) -> list[str | Cell]:
     )
     times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
     names = [each.label if each else "does not get there" for each in (ours, theirs)]
-    kind, of_ours = contest.kind.replace("_", " "), "exact solutions" if contest.exact else "integrators"
+    kind, of_ours = contest.kind.replace("_", " "), "closed forms" if contest.exact else "integrators"
     return [kind, of_ours, contest.engine, f"{contest.error:.0e}", contest.which, f"{contest.size:,}", graded, *times, *names]
 
 
@@ -90,7 +90,7 @@ def cost_table(found: Iterable[Line]) -> Table:
 def _cost_row(line: Line) -> list[str]:
     rate, prepare = line.best(Measure.BODY_STEPS, max), line.best(Measure.PREPARE, min)
     costs = [_cost_text(line, error) for error in ERRORS]
-    kind = "exact solution" if line.exact else "integrator"
+    kind = "closed form" if line.exact else "integrator"
     return [line.kind.replace("_", " "), line.label, kind, number(rate / 1e6, 3), number(prepare * 1e6, 3), *costs]
 
 
@@ -119,7 +119,7 @@ def statements(compared: Iterable[Contest]) -> Iterator[str]:
         if contest.which == MEDIAN:
             groups.setdefault((contest.kind, contest.engine, contest.exact), []).append(contest)
     for (kind, engine, exact), members in groups.items():
-        ours = "exact solution" if exact else "integrator"
+        ours = "closed form" if exact else "integrator"
         yield f"{kind.replace('_', ' ')}, our cheapest {ours} against {engine}: {'; '.join(map(_words, members))}."
 
 

@@ -16,7 +16,7 @@ from conservative.benchmarks.studies.studies import THROUGHPUT
 from conservative.benchmarks.studies.throughput_extent import ERRORS, EXACT, MEDIAN, MOST
 from conservative.method import Role
 
-_SIZE = re.compile(r"(\d+) bodies")
+_SIZE = re.compile(r"(\d+) (?:body|bodies)")
 Setting = dict[tuple[str, int], float]
 """Values of one setting by measure and number of bodies; errors by which one they are, and 0."""
 

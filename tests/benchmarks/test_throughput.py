@@ -62,7 +62,7 @@ def test_errors_fall_and_times_are_of_each_number_of_bodies(rows):
     errors = [row.value for row in of(rows, "ours", Measure.ATTITUDE_MAX, "median")]
     assert len(errors) >= 4
     assert errors[-1] < 1e-4 < errors[0]
-    for size in ("1 bodies", "3 bodies", "3 bodies, one at a time", "3 bodies, 2 threads"):
+    for size in ("1 body", "3 bodies", "3 bodies, one at a time", "3 bodies, 2 threads"):
         times = of(rows, "ours", Measure.TIME, size)
         assert times
         assert all(row.value > 0 or row.outcome.kind is OutcomeKind.SKIPPED for row in times)
@@ -107,7 +107,7 @@ def test_a_setting_that_would_take_too_long_says_so():
 
 def test_a_lucky_setting_decides_nothing():
     errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
-    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0) for each in errors]
+    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
     assert throughput.decide(line) == line[1:]
 
 

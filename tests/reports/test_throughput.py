@@ -74,7 +74,7 @@ def test_what_does_not_get_there_is_no_ratio(compared):
 def test_exact_solutions_are_a_class_of_their_own(compared):
     assert {key[2] for key in compared if key[0] == "free_bodies"} == {True}
     (said,) = [text for text in throughput.statements(compared.values()) if "free bodies" in text]
-    assert "our cheapest exact solution" in said
+    assert "our cheapest closed form" in said
 
 
 def test_the_table_has_every_line_and_at_how_many_bodies():
@@ -82,7 +82,7 @@ def test_the_table_has_every_line_and_at_how_many_bodies():
     assert ["heavy tops", "taylor, one at a time"] in [row[:2] for row in rows]
     (heyoka,) = [row for row in rows if row[:2] == ["heavy tops", "heyoka"]]
     assert heyoka[5:7] == ["8 (10)", "20 (10)"]
-    assert {row[2] for row in rows} == {"integrator", "exact solution"}
+    assert {row[2] for row in rows} == {"integrator", "closed form"}
 
 
 def test_what_did_not_run_has_its_reason():
