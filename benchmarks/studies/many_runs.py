@@ -131,7 +131,7 @@ class ManyDone:
     spent: float
 
 
-def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone | Outcome:
+def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
     """Return the run of bodies after a first call and a second, which is timed; or how that ends.
 
     Exceptions out of our own methods are bugs and are not caught.
@@ -139,7 +139,7 @@ def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone
     Raises
     ------
     MissingEngine
-        The engine is not installed.
+        The engine is not installed, and `skip_missing` is False.
     """
     if reason := way.method.unsupported(bodies.take(0)):
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
@@ -152,8 +152,10 @@ def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float) -> ManyDone
                 run = prepare_blocks(way, bodies, grid)
                 spent = perf_counter() - start
             return ManyDone(run, run(), spent, wall_time(run))
-    except MissingEngine:
-        raise
+    except MissingEngine as error:
+        if not skip_missing:
+            raise
+        return Outcome(OutcomeKind.MISSING, str(error))
     except BadInput as error:  # a step that the method does not have
         return Outcome(OutcomeKind.UNSUPPORTED, str(error))
     except IntegrationFailed as failure:

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conservative.attitude import Array, angle_between
+from conservative.errors import MissingEngine
 from conservative.method import Grid, Method
 from conservative.methods.many import Bodies
 from conservative.outcome import Outcome, OutcomeKind
@@ -34,7 +35,7 @@ from ..measures.timing import Timing, time_interleaved
 from .case import Case
 from .ensembles import DURATION, draw
 from .many_runs import ManyDone, Way, attempt_many, list_ways
-from .selection import at_tolerance, takes_exact_steps, tolerance_setting
+from .selection import Missing, at_tolerance, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
 from .study import Progress, Study
 from .throughput_extent import (
@@ -88,7 +89,14 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     ways = [way for method in study.competitors for way in list_ways(method)]
     pieces = len(ways) + len(study.sizes)
     for i, scene in enumerate(study.scenes):
-        kind = yield from find_kind(study, scene.name)
+        try:
+            kind = yield from find_kind(study, scene.name)
+        except MissingEngine as error:
+            if not study.skip_missing:
+                raise
+            case = Case(study.name, scene, Missing("heyoka", "heyoka", "heyoka"), Grid(DURATION / SAMPLES, SAMPLES))
+            yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
+            continue
         points: list[Point] = []
         for j, way in enumerate(ways):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {way.method.name}")
@@ -139,7 +147,9 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
     for case in list_cases(kind, way.method):
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
             break
-        found = attempt_many(replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit)
+        found = attempt_many(
+            replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit, kind.study.skip_missing
+        )
         if isinstance(found, Outcome):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, name_of(way, MEDIAN)), found)
             if way.method.unsupported(kind.bodies.scene):

@@ -74,7 +74,7 @@ def _contest_row(contest: Contest) -> list[str | Cell]:
         else Cell(f"{'✓' if good else '✗'} {ratio_text(ratio)}", Grade.GOOD if good else Grade.BAD)
     )
     times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
-    names = [each.label if each else "does not get there" for each in (ours, theirs)]
+    names = [each.label if each else "no time" for each in (ours, theirs)]
     kind, of_ours = contest.kind.replace("_", " "), "closed forms" if contest.exact else "integrators"
     return [kind, of_ours, contest.engine, f"{contest.error:.0e}", contest.which, f"{contest.size:,}", graded, *times, *names]
 
@@ -127,7 +127,7 @@ def _words(contest: Contest) -> str:
     at = f"at {contest.error:.0e} rad"
     if not contest.ours or not contest.theirs:
         missing = [name for name, side in (("ours", contest.ours), (contest.engine, contest.theirs)) if not side]
-        return f"{at} {' and '.join(missing)} did not get there"
+        return f"{at} there is no time of {' and '.join(missing)}"
     ratio, among = contest.ratio, f"among {contest.size:,}"
     return (
         f"{at} {contest.engine} takes {ratio_text(ratio)} times as long ({among})"

@@ -6,11 +6,12 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from conservative import BadInput
+from conservative import BadInput, MissingEngine
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import many_runs, studies, throughput
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.benchmarks.studies.many_runs import Way
+from conservative.benchmarks.studies.selection import Missing
 from conservative.method import Grid, Role
 from conservative.outcome import OutcomeKind
 from conservative.references.engines.mujoco import MuJoCo
@@ -81,6 +82,24 @@ def test_an_engine_that_raises_has_a_row(rows):
     assert {row.outcome.kind for row in found} == {OutcomeKind.CRASHED}
     with pytest.raises(RuntimeError):
         many_runs.attempt_many(Way(OursFails()), draw("heavy_tops", 2), Grid(0.1, 2), 10.0)
+
+
+def test_an_engine_that_is_missing_is_told_or_skipped():
+    absent, bodies, grid = Missing("mjx", "MJX", "mjx"), draw("free_bodies", 2), Grid(0.1, 2)
+    assert many_runs.attempt_many(Way(absent), bodies, grid, 10.0, skip_missing=True).kind is OutcomeKind.MISSING
+    with pytest.raises(MissingEngine):
+        many_runs.attempt_many(Way(absent), bodies, grid, 10.0)
+
+
+def test_without_a_truth_there_is_one_row_of_each_kind(monkeypatch):
+    def refuse(*_):
+        raise MissingEngine("heyoka", "heyoka")
+
+    monkeypatch.setattr(throughput, "Heyoka", refuse)
+    skipping = studies.throughput_study((Ours(),), quick=True, skip_missing=True)
+    assert [row.outcome.kind for row in studies.rows(skipping)] == [OutcomeKind.MISSING] * 2
+    with pytest.raises(MissingEngine):
+        list(studies.rows(studies.throughput_study((Ours(),), quick=True)))
 
 
 class OursFails(Fails):

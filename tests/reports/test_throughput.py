@@ -67,7 +67,7 @@ def test_a_peer_that_wins_is_said_to(compared):
 
 def test_what_does_not_get_there_is_no_ratio(compared):
     (said,) = [text for text in throughput.statements(compared.values()) if "against mujoco" in text]
-    assert "at 1e-06 rad mujoco did not get there" in said
+    assert "at 1e-06 rad there is no time of mujoco" in said
     assert compared["heavy_tops", "mujoco", False, 1e-3, "95 %"].theirs is None
 
 
