@@ -11,6 +11,7 @@ from . import entry
 from .lanes import REGISTER
 from .lanes_tuples import any_above, load_tuple, save_samples, save_tuple
 from .taylor import ENOUGH, FAR, LEFT, MOST_CORRECTIONS, find_beginning, find_correction, find_left, take_step
+from .taylor import Free as Free
 from .traced import add, cross, dot, scale, times, trace, where_above
 
 

@@ -48,7 +48,7 @@ class Fields:
 
 @singledispatch
 def find_fields(potential: Any, bodies: Bodies, R_BP: Array) -> Fields | None:
-    """Return the fields of bodies in axes R_BP (n, 3, 3); None of a kind that is not known here."""
+    """Return the fields of n bodies in axes R_BP (n, 3, 3), energies in J; None of a kind that is not known here."""
     return None
 
 
@@ -94,7 +94,7 @@ def _find_gradients(potential: GravityGradient, bodies: Bodies, R_BP: Array) -> 
 
 
 def read_parameter(bodies: Bodies, name: str) -> Array:
-    """Return a number, or numbers, of the potential of each body, (n, ...), of its own unit."""
+    """Return what the field `name` of each body's potential is, (n,), (n, 3) or (n, 3, 3), in its own unit: N, m, rad/s ..."""
     if name in bodies.parameters:
         return np.asarray(bodies.parameters[name], dtype=float)
     value = np.asarray(getattr(bodies.scene.potential, name), dtype=float)

@@ -154,7 +154,7 @@ def find_momenta(bodies: Bodies, frames: Frames, w: Array, scale: Array) -> Fiel
     """
     L = w * frames.moments
     axis_W = (bodies.R_WB0 @ (frames.R_BP @ L[..., None]))[..., 0]
-    return Fields(kernels("taylor").Free(0.0), np.linalg.norm(L, axis=1)[:, None], slice(0), axis_W, scale)
+    return Fields(kernels("taylor_many").Free(0.0), np.linalg.norm(L, axis=1)[:, None], slice(0), axis_W, scale)
 
 
 def directions(axes: Array) -> Array:
@@ -167,7 +167,10 @@ def directions(axes: Array) -> Array:
 
 
 def build_model(frames: Frames, fields: Fields, units: Units, dt: float, w: Array, energy: Array, R_DP: Array) -> Any:
-    """Return `Models` of numbers (n, .), one row for each body, in their units: rates w (n, 3), rad/s, energies (n,), J."""
+    """Return `Models` of numbers (n, .), a row for each body, in its units, for steps dt, s.
+
+    Rates w (n, 3), rad/s, energies (n,), J, and attitudes R_DP (n, 3, 3) against axes D are those of the start.
+    """
     moments, J = (each / units.moment[:, None] for each in (frames.moments, frames.J))
     L, energy = w * units.time[:, None] * moments, energy / units.energy
     spin = np.where(frames.spinning, J[:, 2] / moments[:, 2], 1.0)
@@ -189,10 +192,13 @@ def build_model(frames: Frames, fields: Fields, units: Units, dt: float, w: Arra
 
 
 def find_numbers(fields: Fields, units: Units, spinning: Any, L: Array) -> Array:
-    """Return the numbers (n, k) of fields in units of the bodies; along the axis where a body is symmetric about it."""
+    """Return the numbers (n, k) of fields in units of the bodies, with momenta L (n, 3) in these units, kg m^2/s if they are 1.
+
+    Of `spinning` bodies (n,) the moment of gravity is along the axis.
+    """
     numbers = fields.numbers.copy()
     numbers[:, fields.energies] /= units.energy[:, None]
-    if isinstance(fields.like, kernels("taylor").Free):
+    if isinstance(fields.like, kernels("taylor_many").Free):
         return np.linalg.norm(L, axis=1)[:, None]
     if isinstance(fields.like, kernels("fields").Uniform):
         numbers[spinning, :2] = 0.0  # along the axis but for round-off

@@ -50,7 +50,7 @@ def run(**options):
     w = np.random.default_rng(14).normal(size=(N, 3)) * 3
     w[3] = 1e9
     weight = {"weight": np.linspace(1.0, 2.0, N)}
-    given = {"parameters": weight, "dt": 1e-4, "t_end": 2.0, "sample_every": 5000, "method": "convected", "threads": 1}
+    given = {"parameters": weight, "dt": 1e-3, "t_end": 2.0, "sample_every": 500, "method": "convected", "threads": 1}
     return cv.integrate_many(cv.scenes.lagrange_top(), w_WB_B0=w, **given, **options)
 
 
