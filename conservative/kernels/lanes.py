@@ -10,7 +10,7 @@ from __future__ import annotations
 from . import COMPILED
 
 if COMPILED:
-    from .lanes_llvm import (
+    from .lanes_llvm import (  # type: ignore[attr-defined]
         REGISTER,
         choose,
         every,

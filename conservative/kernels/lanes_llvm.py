@@ -362,7 +362,8 @@ def save_rows(typing, array, index, stride, values):
 def _transpose(builder, numbers):
     """Out of up to four registers, one for each number, four registers, one for each lane."""
     pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, REGISTER), at))  # noqa: E731
-    a, b, c, d = (*numbers, *[ir.Constant(numbers[0].type, ir.Undefined)] * (REGISTER - len(numbers)))
+    nothing = ir.Constant(numbers[0].type, ir.Undefined)
+    a, b, c, d = [*numbers] + [nothing] * (REGISTER - len(numbers))
     ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
     near, far = (0, 1, 4, 5), (2, 3, 6, 7)
     return pick(ab[0], cd[0], near), pick(ab[1], cd[1], near), pick(ab[0], cd[0], far), pick(ab[1], cd[1], far)

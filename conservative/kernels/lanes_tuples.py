@@ -108,19 +108,19 @@ else:
     def _flatten_plain(values):
         return [x for each in values for x in _flatten_plain(each)] if isinstance(values, tuple) else [values]
 
-    def load_tuple(like, array, at):
+    def load_tuple(like, array, at):  # type: ignore[misc]  # the same name twice, of which one is made
         """The tuple of a column."""
         return _arrange(like, map(float, array[:, at]))
 
-    def save_tuple(array, at, values):
+    def save_tuple(array, at, values):  # type: ignore[misc]  # the same name twice, of which one is made
         """Store a tuple as a column."""
         array[:, at] = _flatten_plain(values)
 
-    def save_samples(array, at, distance, values):
+    def save_samples(array, at, distance, values):  # type: ignore[misc]  # the same name twice, of which one is made
         """Store the numbers of a body one after the other."""
         found = _flatten_plain(values)
         array[at : at + len(found)] = found
 
-    def any_above(x, limit):
+    def any_above(x, limit):  # type: ignore[misc]  # the same name twice, of which one is made
         """Whether a number is above a limit."""
         return x > limit

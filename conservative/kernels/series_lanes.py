@@ -139,7 +139,8 @@ class Emitter:
         """The totals with the products of i and n - i for i = 1 ... n-1."""
         builder, step = self._builder, _line(sums[0][0][0])[1] * _BYTES
         totals = [total or self.constant(0.0) * _width(*pairs[0]) for total, pairs in zip(totals, sums, strict=True)]
-        before, body, after = builder.block, *(builder.append_basic_block(f"{name}_{n}") for name in ("loop", "after"))
+        before, body = builder.block, builder.append_basic_block(f"loop_{n}")
+        after = builder.append_basic_block(f"after_{n}")
         builder.branch(body)
         builder.position_at_end(body)
         i, phis = self._phi(_bytes(step), before), [self._phis(total, before) for total in totals]

@@ -166,9 +166,9 @@ def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany |
 
 
 def find_given(bodies: Bodies) -> tuple[Array, Array, Array, Array]:
-    """Return moments and R_BP of all bodies, or of one where it is for all, and R_WB0 and w_WB_B0, rad/s, of all.
+    """Return moments (n, 3) and R_BP (n, 3, 3), of one body where it is for all, and R_WB0 (n, 3, 3), w_WB_B0 (n, 3), rad/s.
 
-    The largest moment of each body is of order one.
+    Moments are in units in which the largest of each body is of order one.
     """
     body = bodies.scene.body
     moments, R_BP = (body.moments[None], body.R_BP[None]) if bodies.inertia is None else bodies.principal
@@ -177,7 +177,7 @@ def find_given(bodies: Bodies) -> tuple[Array, Array, Array, Array]:
 
 
 def writable(values: Array) -> Array:
-    """Return the values as an array of the one kind that kernels are compiled for; a copy where it is not that."""
+    """Return an array (...) of any unit as one (...) of the kind that kernels are compiled for; a copy where it is not."""
     return np.require(values, np.float64, ("C", "W"))
 
 
