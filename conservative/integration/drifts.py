@@ -19,18 +19,8 @@ from ..potentials.turning import Turning, static_part
 
 ORTHONORMALITY = "orthonormality"
 AXIAL = "axial momentum"
-
-
-@dataclass(frozen=True, eq=False)
-class Scales:
-    """What departures of n bodies are relative to: energies (n,), J, and momenta (n,), kg m^2/s.
-
-    `bounds` are those momenta (n,), kg m^2/s, that the bounds of a method are relative to.
-    """
-
-    energy: Array
-    momentum: Array
-    bounds: Array
+NEARLY = 1e-11
+"""Relative difference of moments up to which a body is asked whether it is symmetric: more than what counts as equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,17 +55,17 @@ def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
     t, R_WB, w_WB_B
         Times (m,), s, attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     """
-    scales, found = find_scales(bodies), np.empty((len(bodies), 4))
-    V = field_energies(bodies, t, R_WB, w_WB_B)
-    fixed = inertia_of(bodies), find_axes(bodies), expect(bodies, scales)
-    kernels("drifts_of_many").measure(R_WB, w_WB_B, V, *fixed, found)
+    inertia, axes, axial = inertia_of(bodies), find_axes(bodies), find_axial(bodies)
+    expected, scales = find_start(bodies, inertia, axes, axial)
+    found, V = np.empty((len(bodies), 4)), field_energies(bodies, t, R_WB, w_WB_B)
+    kernels("drifts_of_many").measure(R_WB, w_WB_B, V, inertia, axes, expected, found)
     values = np.stack([_drift_of(each, found, bodies, (R_WB, w_WB_B)) for each in (None, *bodies.scene.invariants)], axis=1)
     bounded = values.copy()
     for column, each in enumerate(bodies.scene.invariants, start=1):
         if each.unit == MOMENTUM_UNIT and each not in bodies.scene.extra_invariants:
-            bounded[:, column] *= scales.momentum / scales.bounds
+            bounded[:, column] *= scales[:, 1] / scales[:, 2]
         if each.name == AXIAL:
-            values[np.isnan(find_axial(bodies))[:, 0] & np.ones(len(bodies), dtype=bool), column] = np.nan
+            values[np.isnan(axial[:, 0]) & np.ones(len(bodies), dtype=bool), column] = np.nan
     return Drifts(values, bounded)
 
 
@@ -110,31 +100,31 @@ def momenta_of(bodies: Bodies) -> Array:
     return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
 
 
-def find_scales(bodies: Bodies) -> Scales:
-    """Return what drifts are relative to, body by body, by the rule of `Scene.energy_scale` and `invariants_of`."""
-    momenta, largest = momenta_of(bodies), bodies.principal[0].max(axis=1)
-    energy = np.sum(momenta * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
-    energy[energy == 0] = 1.0
-    most = np.sqrt(largest) * np.sqrt(energy)
-    size = np.hypot(np.hypot(momenta[:, 0], momenta[:, 1]), momenta[:, 2])
-    momentum = np.where(size > 0, size, most)
-    if isinstance(bodies.scene.potential, Turning):
-        energy = energy + bodies.scene.potential.orbit.rate * np.sqrt(2) * most
-    return Scales(energy, momentum, np.maximum(momentum, np.sqrt(2) * most))
+def find_start(bodies: Bodies, inertia: Array, axes: Array, axial: Array) -> tuple[Array, Array]:
+    """Return what the start has of what is conserved, and what departures are relative to.
 
-
-def expect(bodies: Bodies, scales: Scales) -> Array:
-    """Return what `conservative.kernels.drifts_of_many` takes as `expected` (n, 10), in SI units, kg, m and s."""
-    found, L_B = np.zeros((len(bodies), 10)), momenta_of(bodies)
-    V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], bodies.w_WB_B0[:, None])
-    found[:, 0] = np.sum(L_B * bodies.w_WB_B0, axis=1) / 2 + (V[:, 0] if len(V) else 0.0)
+    The rule is that of `Scene.energy_scale`, `invariants_of` and `kept_sizes`, and both are what
+    `conservative.kernels.drifts_of_many` says of `expected` (n, 10) and `scales` (n, 3), in SI units, kg, m and s. The inertia
+    is (n or 1, 3, 3), kg m^2, body axes, `axes` are those of `find_axes` (n or 1, 3, 3), `axial` those of `find_axial` (n or
+    1, 3).
+    """
+    n, potential = len(bodies), bodies.scene.potential
+    R, w = np.ascontiguousarray(bodies.R_WB0), np.ascontiguousarray(bodies.w_WB_B0)
+    V = field_energies(bodies, np.zeros(1), R[:, None], w[:, None])
+    of_field, largest = np.atleast_1d(np.asarray(field_scales(bodies), dtype=float)), largest_moments(bodies)
+    expected, scales = np.zeros((n, 10)), np.empty((n, 3))
+    fixed = inertia, axes, np.nan_to_num(axial), of_field, largest
+    kernels("drifts_of_many").find_start(R, w, V[:, 0] if len(V) else np.zeros(n), *fixed, expected, scales)
+    if isinstance(potential, Turning):
+        scales[:, 0] += potential.orbit.rate * np.sqrt(2) * np.sqrt(largest) * np.sqrt(scales[:, 0])
     if any(each.unit == "J" for each in bodies.scene.invariants):
-        found[:, 1] = 1 / scales.energy
-    found[:, 2:5] = (find_axes(bodies) @ (bodies.R_WB0 @ L_B[..., None]))[..., 0]
-    found[:, 5] = 1 / scales.momentum
-    found[:, 7:] = np.nan_to_num(find_axial(bodies)) / scales.momentum[:, None]
-    found[:, 6] = np.sum(found[:, 7:] * L_B, axis=1)
-    return found
+        expected[:, 1] = 1 / scales[:, 0]
+    return expected, scales
+
+
+def largest_moments(bodies: Bodies) -> Array:
+    """Return the largest moment (n,) of each body, kg m^2; (1,) where all have the scene's."""
+    return bodies.scene.body.moments.max(keepdims=True) if bodies.inertia is None else bodies.principal[0].max(axis=1)
 
 
 def find_axial(bodies: Bodies) -> Array:
@@ -144,8 +134,17 @@ def find_axial(bodies: Bodies) -> Array:
         return none
     if bodies.inertia is None and not bodies.parameters:
         return bodies.scene.symmetry_axis_B[None]
-    found = (bodies.take(i).symmetry_axis_B for i in range(len(bodies)))
-    return np.stack([none[0] if axis is None else axis for axis in found])
+    found = np.repeat(none, len(bodies), axis=0)
+    for i in np.flatnonzero(find_nearly_symmetric(bodies)).tolist():
+        axis = bodies.take(i).symmetry_axis_B
+        found[i] = none[0] if axis is None else axis
+    return found
+
+
+def find_nearly_symmetric(bodies: Bodies) -> Any:
+    """Return which of n bodies (n,) have two moments that differ by no more than `NEARLY` of the largest."""
+    J = np.sort(bodies.principal[0], axis=1)
+    return np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]
 
 
 def find_axes(bodies: Bodies) -> Array:

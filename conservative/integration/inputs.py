@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
+from ..attitude import ROTATION_TOLERANCE, Array
 from ..body import RigidBody
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
+from ..deferred_imports import kernels
 from ..errors import BadInput, nearest
 from ..methods.many import Bodies
 from ..potentials.turning import static_part
@@ -103,8 +104,7 @@ def _are_in_range(values: Array) -> Any:
 
 
 def _are_rotations(R: Array) -> Any:
-    with np.errstate(all="ignore"):
-        return _are_in_range(R) & (orthonormality(R) <= ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
+    return kernels("drifts_of_many").are_rotations(np.ascontiguousarray(R), ROTATION_TOLERANCE)
 
 
 def _read_inertia(value: Array) -> Array:

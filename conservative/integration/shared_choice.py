@@ -89,7 +89,8 @@ def pick_hardest(bodies: Bodies) -> list[int]:
     """Return the numbers of the bodies that turn fastest with all their energy, the hardest first."""
     energy = np.sum(momenta_of(bodies) * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
     rates = np.sqrt(energy) / np.sqrt(bodies.principal[0].min(axis=1))
-    return np.argsort(-rates, kind="stable")[:HARDEST].tolist()
+    fastest = np.argpartition(-rates, min(HARDEST, len(rates) - 1))[:HARDEST]
+    return fastest[np.argsort(-rates[fastest], kind="stable")].tolist()
 
 
 def cut_step(bodies: Bodies, chosen: Sequence[int], method: Method, dt: float, goal: Goal) -> Attempts:
