@@ -171,8 +171,8 @@ def settings(method: Method) -> tuple[Method, ...]:
     return method.many_settings() if takes_many(method) else ()
 
 
-def families(methods: tuple[Method, ...]) -> Iterator[Method]:
-    """Yield those settings of each family among some methods, once."""
+def families(methods: tuple[Method, ...], quick: bool = False) -> Iterator[Method]:
+    """Yield those settings of each family among some methods, once; the first alone if it is to be quick."""
     for family in dict.fromkeys(type(method) for method in methods):
         first = next(method for method in methods if type(method) is family)
-        yield from settings(first)
+        yield from settings(first)[: 1 if quick else None]

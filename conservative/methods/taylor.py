@@ -140,7 +140,7 @@ class Taylor(_Settings):
 
     @classmethod
     def many_settings(cls) -> tuple[Taylor, ...]:
-        return tuple(cls(order) for order in (8, 10, 12, 14))
+        return tuple(cls(order) for order in (12, 8, 10, 14))
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -140,7 +140,7 @@ class Heyoka(Method):
     @classmethod
     def many_settings(cls) -> tuple[Method, ...]:
         widths = (cls(frame="base_vectors", width=width) for width in (None, 8, 16))
-        return cls(frame="lean"), *widths, cls(frame="base_vectors", driver="ensemble")
+        return *widths, cls(frame="base_vectors", driver="ensemble"), cls(frame="lean")
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:

@@ -101,7 +101,7 @@ class Plan:
     @cached_property
     def _throughput(self) -> tuple[Study, ...]:
         """The study of many bodies, where the report has random ones and a method that runs many at once."""
-        methods = tuple(many_runs.families((*self.methods, *self.engines)))
+        methods = tuple(many_runs.families((*self.methods, *self.engines), self.quick))
         if not (self.bodies and methods):
             return ()
         limits = {"skip_missing": self.skip_missing, "time_limit": self.time_limit}
