@@ -223,7 +223,7 @@ class Method(ABC):
 
     @classmethod
     def many_settings(cls) -> tuple[Method, ...]:
-        """Return the settings whose throughput on many bodies is measured, first what stands for all; by default the suite's."""
+        """Return the settings measured on many bodies, first the one that stands for all; by default those of the suite."""
         return cls.suite_settings()
 
     @classmethod
