@@ -176,7 +176,7 @@ def run_blocks(
             if not pending:
                 return
             ended, _ = wait(pending, LONGEST_WAIT, FIRST_COMPLETED)
-            for future in ended:
+            for future in [each for each in pending if each in ended]:  # in the order in which they were handed over
                 yield pending.pop(future), future.result()
     finally:
         for future in pending:

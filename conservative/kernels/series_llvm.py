@@ -19,6 +19,7 @@ class VolatileLoad(ir.instructions.LoadInstr):  # type: ignore[misc]  # llvmlite
     """A load that is made once, here: LLVM would keep all coefficients in registers otherwise, which spills them."""
 
     def descr(self, buf):
+        """Write the instruction to a list of texts, as llvmlite asks it to."""
         (pointer,) = self.operands
         kind = pointer.type
         buf.append(f"load volatile {kind.pointee}, {kind} {pointer.get_reference()}, align {8 * kind.pointee.count}\n")

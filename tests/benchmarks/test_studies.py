@@ -32,8 +32,8 @@ KINDS = {
 BROKEN = tuple(Broken(how) for how in KINDS)
 FACTS = (Measure.PRECISION, Measure.ORDER_EXPECTED)
 """What is known of a method however its runs end."""
-CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "import_time")]
-"""Studies with a row for every method, whatever comes of it."""
+CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "import_time", "throughput")]
+"""Studies with a row for every method, whatever comes of it. That of throughput has a test of its own: it draws its bodies."""
 
 
 def rows(name, *methods, quick=True, **settings):

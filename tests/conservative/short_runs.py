@@ -104,6 +104,7 @@ def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
         block = run and run()
         if block:
             find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B)
+            kernels.drifts_of_many.are_rotations(bodies.R_WB0, 1e-9)
     return block
 
 

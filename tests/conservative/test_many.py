@@ -75,7 +75,7 @@ def test_one_body_costs_no_other_bits():
 
 
 def test_numbers_depend_neither_on_blocks_nor_on_threads(monkeypatch):
-    runs = [{"threads": 1}, {"threads": 1}, {"threads": 2}, {}]
+    runs, before = [{"threads": 1}, {"threads": 1}, {"threads": 2}, {}], threading.active_count()
     found = []
     for most, run in zip((1024, 4, 4, 3), runs, strict=True):
         monkeypatch.setattr(blocks, "MOST_BODIES", most)
@@ -84,7 +84,7 @@ def test_numbers_depend_neither_on_blocks_nor_on_threads(monkeypatch):
         np.testing.assert_array_equal(other.R_WB, found[0].R_WB)
         np.testing.assert_array_equal(other.w_WB_B, found[0].w_WB_B)
         assert all((values == found[0].drifts[name]).all() for name, values in other.drifts.items())
-    assert threading.active_count() == 1
+    assert threading.active_count() <= before
 
 
 def test_blocks_are_as_large_as_their_samples_allow():
