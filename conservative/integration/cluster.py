@@ -55,10 +55,12 @@ def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
     """
     require_extra("scheduler", "cluster")
     from distributed import Client
+    from distributed.comm import get_address_host_port
 
     with ExitStack() as stack:
         stack.enter_context(_silence("distributed", "distributed.client", "tornado.application"))
         try:
+            get_address_host_port(address)  # first, as a client that is made of no address raises again when it is collected
             client = stack.enter_context(Client(address, timeout=limit, set_as_default=False))
         except Exception as error:  # whatever else listens there can answer anything
             got = f"{address!r}, where no scheduler answers ({error or type(error).__name__})"
