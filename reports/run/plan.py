@@ -100,12 +100,15 @@ class Plan:
 
     @cached_property
     def _throughput(self) -> tuple[Study, ...]:
-        """The study of many bodies, where the report has random ones and a method that runs many at once."""
-        methods = tuple(many_runs.families((*self.methods, *self.engines), self.quick))
-        if not (self.bodies and methods):
+        """The study of many bodies, where the report has random ones and a method that runs many at once.
+
+        It is the coarse one, of one setting of each family, and a quick report has none: preparing engines takes minutes.
+        """
+        methods = tuple(many_runs.families((*self.methods, *self.engines), quick=True))
+        if self.quick or not (self.bodies and methods):
             return ()
         limits = {"skip_missing": self.skip_missing, "time_limit": self.time_limit}
-        return (studies.throughput_study(methods, quick=self.quick, seed=self.seed, **limits),)
+        return (studies.throughput_study(methods, quick=True, seed=self.seed, **limits),)
 
     @property
     def names(self) -> tuple[str, ...]:

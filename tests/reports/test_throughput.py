@@ -94,7 +94,7 @@ def test_what_did_not_run_has_its_reason():
 
 
 def test_the_report_has_a_section_with_a_picture(tmp_path):
-    plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], quick=True, bodies=1), measurements()
+    plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], bodies=1), measurements()
     assert plan.names[-1] == "throughput"
     built = view.build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
     document.render(built, tmp_path, png=False, announce=lambda what: None)
@@ -105,5 +105,6 @@ def test_the_report_has_a_section_with_a_picture(tmp_path):
     assert 'data-figure="many_bodies"' in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
-def test_a_report_of_scenes_alone_has_no_such_section():
-    assert "throughput" not in plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], quick=True).names
+def test_a_report_of_scenes_alone_and_a_quick_one_have_no_such_section():
+    for extent in ({}, {"quick": True, "bodies": 1}):
+        assert "throughput" not in plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], **extent).names
