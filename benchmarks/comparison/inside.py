@@ -1,6 +1,6 @@
 """What runs in the environment of a version: the worker's program loads this file, and what it imports is that version's own.
 
-It asks of a version no more than `conservative` has had since its methods are registered: names of methods and scenes, `Grid`,
+It asks of a version no more than `conservative` has had since methods are registered: names of methods and scenes, `Grid`,
 `prepare`, `check`. What `given` has beside `task`, its name, is said with each task.
 """
 
@@ -25,14 +25,17 @@ def prepare(given: SimpleNamespace) -> Callable[[], Any]:
 
 
 def list_methods(given: SimpleNamespace) -> Callable[[], Answer]:
-    """Return what lists the methods of the suite that are called `names`, by default all that are under test."""
+    """Return what lists the settings of the suite of methods that are called `names`, by default of all that are under test."""
     return lambda: {"methods": [_describe(method) for method in _methods(given.names)]}
 
 
 def _methods(names: list[str]) -> Iterator[Method]:
     families = registry.list_families()
     for name in names or sorted(name for name, family in families.items() if family.role == Role.OURS):
-        yield from (_suite_settings(families[name]) if name in families else [registry.method(name)])
+        if name in families:
+            yield from _suite_settings(families[name])
+        elif name.partition(":")[0] in families:  # one that this version does not have is missing, and no error
+            yield registry.method(name)
 
 
 def _suite_settings(family: type[Method]) -> tuple[Method, ...]:
@@ -41,24 +44,28 @@ def _suite_settings(family: type[Method]) -> tuple[Method, ...]:
 
 
 def _describe(method: Method) -> Answer:
-    return {"name": method.name, "label": method.label, "family": method.family, "order": method.order}
+    engine = method.label if method.role == Role.ENGINE else ""
+    return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
 
 def describe_scene(given: SimpleNamespace) -> Callable[[], Answer]:
-    """Return what says what motion a `scene` is, with its energies at attitudes `probes` (n, 3, 3), and what `method` says."""
-    scene, method = _scene(given.scene), registry.method(given.method)
+    """Return what says which motion a `scene` is, with its energies at attitudes `probes` (n, 3, 3)."""
+    scene = _scene(given.scene)
     energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in given.probes]
-    found = {
+    return lambda: {
         "inertia": scene.body.inertia,
         "R_WB0": scene.R_WB0,
         "w_WB_B0": scene.w_WB_B0,
         "ends": [scene.t_end, scene.dt],
         "energies": energies,
         "invariants": [invariant.name for invariant in scene.invariants],
-        "unsupported": method.unsupported(scene) or "",
-        "longest_step": float(method.longest_step(scene)),
     }
-    return lambda: found
+
+
+def describe_pair(given: SimpleNamespace) -> Callable[[], Answer]:
+    """Return what says why a `method` cannot do a `scene`, empty if it can, and its longest step there, s."""
+    scene, method = _scene(given.scene), registry.method(given.method)
+    return lambda: {"unsupported": method.unsupported(scene) or "", "longest_step": float(method.longest_step(scene))}
 
 
 def solve(given: SimpleNamespace) -> Callable[[], Answer]:
@@ -70,8 +77,10 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
     def solve_once() -> Answer:
         found = method.check(scene, grid, run())
         counts = {name: count for name, count in vars(found.counters).items() if count is not None}
-        failure = "" if found.failure is None else str(found.outcome)
-        return {"t": found.t, "R_WB": found.R_WB, "w_WB_B": found.w_WB_B, "counts": counts, "failure": failure}
+        outcome = found.outcome
+        failure = [outcome.kind.value, outcome.reason, outcome.step, outcome.time, outcome.residual]
+        states = {"t": found.t, "R_WB": found.R_WB, "w_WB_B": found.w_WB_B}
+        return {**states, "counts": counts, "failure": [] if outcome.ok else failure}
 
     return solve_once
 
@@ -86,4 +95,4 @@ def _scene(name: str) -> Scene:
     return registry.scene(name)
 
 
-TASKS = {"list": list_methods, "describe": describe_scene, "solve": solve, "time": keep_running}
+TASKS = {"list": list_methods, "scene": describe_scene, "pair": describe_pair, "solve": solve, "time": keep_running}
