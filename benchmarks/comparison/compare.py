@@ -71,7 +71,7 @@ def compare_versions(base: Version, head: Version, question: Question, tell: Tel
     """
     places = [Place.of(name) for name in question.scenes]
     with ExitStack() as stack:
-        sides = [Side(version) for version in (base, head)]
+        sides = Side(base), Side(head)
         for side in sides:
             stack.callback(side.close)
         was, now = (dict(_measure(side, places, question.methods, number, tell)) for number, side in enumerate(sides))
@@ -79,13 +79,11 @@ def compare_versions(base: Version, head: Version, question: Question, tell: Tel
             raise BadInput("methods", ", ".join(question.methods) or "none", "methods that a version has")
         timed = _timed(places, was, now)
         tell(0.5, f"timing {len(timed)} rows")
-        times = compare_times(*sides, timed, question.processes)
+        times = compare_times(sides[0], sides[1], timed, question.processes)
     return judge(base, head, was, now, times)
 
 
-def _measure(
-    side: Side, places: Sequence[Place], names: Sequence[str], number: int, tell: Tell
-) -> Iterator[tuple[str, Found]]:
+def _measure(side: Side, places: Sequence[Place], names: Sequence[str], number: int, tell: Tell) -> Iterator[tuple[str, Found]]:
     """Yield the rows of a version, by id."""
     settings = side.settings(names)
     for done, place in enumerate(places):
@@ -158,8 +156,10 @@ def _packages(base: Version, head: Version) -> Iterator[str]:
     """Yield what differs between the environments, beside the project itself: a ratio of times may be due to that."""
     own = base.environment.engine
     pythons = [(f"Python {version.environment.python}",) for version in (base, head)]
-    packages = [sorted(set(version.environment.packages) - set(other.environment.packages)) for version, other in
-                ((base, head), (head, base))]
+    packages = [
+        sorted(set(version.environment.packages) - set(other.environment.packages))
+        for version, other in ((base, head), (head, base))
+    ]
     if pythons[0] != pythons[1]:
         yield f"another Python: was {pythons[0][0]}, is {pythons[1][0]}"
     names = [[each for each in found if not each.replace("_", "-").startswith(own)] for found in packages]

@@ -35,7 +35,7 @@ class FailedThere(IntegrationFailed):
 
 @dataclass(frozen=True)
 class Setting:
-    """A method with its settings in one version: name, label, order (see `Method`), and `engine`, its label if it is foreign."""
+    """A method with its settings in one version: name, label and order as `Method` has them; its label as `engine` if foreign."""
 
     name: str
     label: str

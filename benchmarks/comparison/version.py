@@ -93,8 +93,12 @@ def _take_out(found: str, project: Path, folder: Path) -> None:
     """Write the files of a commit into a folder."""
     top = git(project, "rev-parse", "--show-toplevel")
     try:
-        done = subprocess.run(["git", "-C", top, "archive", "--format=tar", found], capture_output=True, check=True, timeout=600)
+        done = subprocess.run(
+            ["git", "-C", top, "archive", "--format=tar", found], capture_output=True, check=True, timeout=600
+        )
     except (OSError, subprocess.SubprocessError) as error:
         raise BadInput("against", f"{found}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
     with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
-        archive.extractall(folder, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))  # not before 3.11.4
+        if hasattr(tarfile, "data_filter"):  # not before 3.11.4
+            archive.extraction_filter = tarfile.data_filter
+        archive.extractall(folder)

@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         choices=("required", "known"),  # those of `compare.Times`, which is not imported here
         default="known",
         dest="conservative_gate_times",
-        help="known, the default: where the baseline has no times of this machine, gate all but time, and say so; required: fail.",
+        help="known (default): where the baseline has no times of this machine, gate all but time, and say so; required: fail.",
     )
 
 

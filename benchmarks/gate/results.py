@@ -19,7 +19,7 @@ FOLDER = Path(".benchmarks") / "gate"
 FILE = "results.json"
 TIME_RATIO = "time ratio"
 RUNAWAY = 1.0
-"""Energy drift, relative, above which a run has failed, whatever it says of itself: the energy is no longer that of its start."""
+"""Energy drift, relative, above which a run has failed, whatever it says of itself: its energy is not that of its start."""
 ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
 
 

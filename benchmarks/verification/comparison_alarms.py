@@ -1,4 +1,6 @@
-"""How often `conservative gate --against` is wrong about times: `python -m conservative.benchmarks.verification.comparison_alarms`.
+"""How often the comparison of two versions is wrong about times.
+
+    python -m conservative.benchmarks.verification.comparison_alarms --runs 100
 
 It compares one version of this project with itself, in one environment, as the command does: two sides, several processes of
 each, what looks slower measured again. Every row is measured three times over: as it is, which must raise no alarm, and with
@@ -51,7 +53,10 @@ def compare_once(version: Version, rows: Sequence[Timed], processes: int) -> dic
 
 def as_record(found: dict[str, TimeRow]) -> dict[str, Any]:
     """Return the ratios of a comparison as JSON has them, by row."""
-    return {id: {"first": vars(row.first), "again": row.again and vars(row.again), "failed": row.failed} for id, row in found.items()}
+    return {
+        id: {"first": vars(row.first), "again": row.again and vars(row.again), "failed": row.failed}
+        for id, row in found.items()
+    }
 
 
 def summarize(records: Iterable[dict[str, Any]]) -> dict[str, Any]:
