@@ -35,6 +35,8 @@ ROUNDS = 50
 """Samples of each run in a process."""
 LAYOUTS = 3
 """Runs of each version in a process, each with its data elsewhere."""
+MOST_TURNS = 3
+"""How often at most so many processes are measured until it is no longer open whether a row is slower."""
 RESAMPLES = 4999
 MOST_CALLS = 10_000
 
@@ -93,21 +95,25 @@ Times = dict[str, list[tuple[float, float]]]
 
 
 def compare_times(base: Side, head: Side, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[str, TimeRow]:
-    """Return what the times of two versions say, by the id of each row.
-
-    Rows that are slower beyond doubt are measured again in new processes, and those of which that is open in twice as many.
-    """
+    """Return what the times of two versions say, by the id of each row; what is slower beyond doubt is measured again."""
     clock = Clock(base, head)
-    taken = clock.measure(rows, processes)
-    found = {row.id: ratio_of(taken[row.id]) for row in rows}
-    unclear = [row for row in rows if found[row.id].open]
-    more = clock.measure(unclear, processes)
-    found |= {row.id: ratio_of(taken[row.id] + more[row.id]) for row in unclear}
+    first = settle(clock, rows, processes)
+    found = {row.id: ratio_of(first[row.id]) for row in rows}
     slower = [row for row in rows if found[row.id].slower]
-    again = clock.measure(slower, processes)
+    again = settle(clock, slower, processes)
     repeated = {row.id: ratio_of(again[row.id]) for row in slower}
-    every = {row.id: [*taken[row.id], *more.get(row.id, []), *again.get(row.id, [])] for row in rows}
+    every = {row.id: [*first[row.id], *again.get(row.id, [])] for row in rows}
     return {id: _row(every[id], found[id], repeated.get(id), clock.failures.get(id, "")) for id in every}
+
+
+def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
+    """Return the times of rows from so many processes, and of rows of which it is open whether they are slower from more."""
+    found: Times = {row.id: [] for row in rows}
+    for _ in range(MOST_TURNS):
+        for id, times in clock.measure(rows, processes).items():
+            found[id] += times
+        rows = [row for row in rows if ratio_of(found[row.id]).open]
+    return found
 
 
 def _row(times: Sequence[tuple[float, float]], first: Ratio, again: Ratio | None, reason: str) -> TimeRow:

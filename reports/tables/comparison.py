@@ -33,8 +33,8 @@ SHOWN = (Measure.ATTITUDE_MAX.text, ENERGY_DRIFT, Measure.ORDER.text)
 """Measures that the table has a column of; all are compared, and stand in the JSON."""
 EXPLANATION = (
     "Times are in times of the earlier version, each from several processes of both, which take turns; an interval holds at "
-    f"each end with {CONFIDENCE:.0%} confidence. A row fails if all of it is more than {SLOWER:.0%} slower, and is so again in new "
-    "processes, or if another value is worse than round-off explains."
+    f"each end with {CONFIDENCE:.0%} confidence. A row fails if all of it is more than {SLOWER:.0%} slower, and is so again in "
+    "new processes, or if another value is worse than round-off explains."
 )
 
 
