@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import zip_longest
 
 from conservative.errors import BadInput
 
@@ -17,7 +17,7 @@ from ..gate.results import Results, Row, Status
 from ..suite import points
 from .rows import Found, Place, measure_rows
 from .side import Side
-from .times import CONFIDENCE, PROCESSES, SLOWER, Timed, TimeRow, compare_times
+from .times import PROCESSES, SLOWER, Timed, TimeRow, compare_times
 from .version import Version
 
 TIME = "time of a step"
@@ -130,10 +130,9 @@ def _time_violations(row: ComparedRow) -> Iterator[Violation]:
     time = row.time
     if time is None or not time.failed:
         return
-    allowed = f"at most {1 + SLOWER:g} times as long, or not {CONFIDENCE:.0%} sure, twice"
     last = time.again or time.first
     now = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
-    yield Violation(TIME, row.scene, row.method, f"{time.was:.3g} s", now, allowed)
+    yield Violation(TIME, row.scene, row.method, f"{time.was:.3g} s", now, f"at most {1 + SLOWER:g} times as long")
 
 
 def _notes(rows: Sequence[ComparedRow]) -> Iterator[str]:
@@ -154,14 +153,13 @@ def _notes(rows: Sequence[ComparedRow]) -> Iterator[str]:
 
 def _packages(base: Version, head: Version) -> Iterator[str]:
     """Yield what differs between the environments, beside the project itself: a ratio of times may be due to that."""
-    own = base.environment.engine
-    pythons = [(f"Python {version.environment.python}",) for version in (base, head)]
-    packages = [
-        sorted(set(version.environment.packages) - set(other.environment.packages))
-        for version, other in ((base, head), (head, base))
-    ]
-    if pythons[0] != pythons[1]:
-        yield f"another Python: was {pythons[0][0]}, is {pythons[1][0]}"
-    names = [[each for each in found if not each.replace("_", "-").startswith(own)] for found in packages]
-    for was, now in zip_longest(*names, fillvalue="not there"):
-        yield f"another package: was {was}, is {now}"
+    was, now = _by_name(base), _by_name(head)
+    for name in sorted(was.keys() | now.keys()):
+        if was.get(name) != now.get(name):
+            yield f"another {name}: was {was.get(name, 'not there')}, is {now.get(name, 'not there')}"
+
+
+def _by_name(version: Version) -> dict[str, str]:
+    environment = version.environment
+    found = {re.split("[ =@]", text)[0]: text for text in environment.packages}
+    return {name: text for name, text in found.items() if name != environment.engine} | {"Python": environment.python}

@@ -27,7 +27,7 @@ class Version:
     Attributes
     ----------
     name
-        What it was called by who asked for it.
+        The ref, or the name of the folder or of the wheel.
     commit
         Its commit; of a folder with changes that are not committed with "+changes", of a wheel empty.
     environment
@@ -37,6 +37,11 @@ class Version:
     name: str
     commit: str
     environment: Environment
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """All that is installed beside it, as `name==version` or the file of a wheel."""
+        return tuple(text.rpartition("/")[2] for text in self.environment.packages)
 
     @property
     def title(self) -> str:
@@ -69,7 +74,7 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
         return Version(path.name, "", environment_of(keep_wheel("", lambda folder: path), requirements, source))
     if path.is_dir():
         wheel = keep_wheel("", build_project(path, source))
-        return Version(name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
+        return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
     found = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
     if not found:
         raise BadInput("against", repr(name), _ALLOWED)

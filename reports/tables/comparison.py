@@ -109,7 +109,7 @@ class Answer:
     def environments(self) -> Table:
         """What both versions ran with."""
         versions = (self.comparison.base, self.comparison.head)
-        rows = [(each.title, each.environment.python, ", ".join(each.environment.packages)) for each in versions]
+        rows = [(each.title, each.environment.python, ", ".join(each.packages)) for each in versions]
         return ("version", "Python", "packages"), rows
 
     def __str__(self) -> str:
@@ -123,7 +123,7 @@ class Answer:
             "made": dict(self.made),
             "passed": self.passed,
             "versions": {
-                when: {"name": version.name, "commit": version.commit, "packages": version.environment.packages}
+                when: {"name": version.name, "commit": version.commit, "packages": version.packages}
                 for when, version in (("was", found.base), ("is", found.head))
             },
             "violations": [asdict(each) for each in found.violations],
