@@ -35,7 +35,7 @@ class FailedThere(IntegrationFailed):
 
 @dataclass(frozen=True)
 class Setting:
-    """A method with its settings in one version: name, label and order as `Method` has them; its label as `engine` if foreign."""
+    """A method with its settings in one version, as `Method` has them; `engine` is its label if it is somebody else's."""
 
     name: str
     label: str

@@ -72,7 +72,7 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     path = Path(name)
     if path.suffix == ".whl" and path.is_file():
         return Version(path.name, "", environment_of(keep_wheel("", lambda folder: path), requirements, source))
-    if path.is_dir():
+    if name and path.is_dir():
         wheel = keep_wheel("", build_project(path, source))
         return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
     found = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")

@@ -203,7 +203,7 @@ def test_rows_that_cannot_be_compared():
 
 def test_a_foreign_machine():
     elsewhere = replace(RUN, machine="elsewhere")
-    (each,) = compare.judge(KEPT, elsewhere).violations
+    (each,) = compare.judge(KEPT, elsewhere, "required").violations
     assert (each.measure, each.was, each.now) == ("foreign machine", "here", "elsewhere")
     known = compare.judge(KEPT, elsewhere, "known")
     assert known.passed
