@@ -12,6 +12,7 @@ from .results import ENERGY_DRIFT, RUNAWAY, TIME_RATIO, Results, Row, Status, fi
 
 Times = Literal["required", "known"]
 """required: the baseline has to know times on this machine. known: where it does not, time is not gated, and that is said."""
+ANYWHERE = "on any machine: conservative gate --against REF"
 ACCEPT = 'accept with: conservative gate --update "REASON"'
 
 
@@ -64,7 +65,7 @@ def judge(baseline: Baseline, results: Results, times: Times = "known") -> Verdi
     if foreign and times == "required":
         violations.append(_foreign(results.machine, known))
     elif foreign:
-        notes.append(f"unbaselined machine: no time is gated, as the baseline has none of {results.machine}")
+        notes.append(f"unbaselined machine: no time is gated, as the baseline has none of {results.machine}; {ANYWHERE}")
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results, foreign)
     violations += _runaways(baseline, results)

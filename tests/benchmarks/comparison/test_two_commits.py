@@ -79,7 +79,7 @@ def test_a_step_of_another_order_fails(gate):
 
 
 def test_a_slower_step_fails(gate):
-    # Twice the work, so that three processes of each are enough on a busy machine; the ratio was 1.5.
+    # About twice the work: three processes of each are enough for that on a busy machine.
     code, answer = gate(STEP, f"{STEP}\n                for _ in range(12):\n                    hat(w)")
     assert (code, measures(answer)) == (1, {"time of a step"})
     assert answer["rows"][0]["time"]["again"]["low"] > 1.05
