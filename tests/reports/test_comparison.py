@@ -17,6 +17,7 @@ from conservative.reports.page.comparison import WIDEST, bar, place, render
 from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
+from ..environments import ROOT
 
 SAME, SLOW, FAST = (1.0, 0.98, 1.02), (1.1, 1.08, 1.12), (0.8, 0.79, 0.81)
 
@@ -157,3 +158,12 @@ def test_a_file_that_cannot_be_written_is_an_error_before_any_work(gate, tmp_pat
     code, text = gate("--against", "main", "--html", tmp_path / "nowhere" / "page.html")
     assert code == 2
     assert "html: got" in text
+
+
+def test_the_action_and_the_workflow_use_options_that_there_are():
+    known = {option for parameter in main.commands["gate"].params for option in parameter.opts}
+    for path in (".github/actions/gate/action.yml", "tests/example_package/pull_request.yml"):
+        text = (ROOT / path).read_text()
+        used = set(re.findall(r"(?<= )--(?!quiet|disable|no-tags|depth)[a-z-]+", text))
+        assert used
+        assert used <= known, used - known
