@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -73,6 +74,7 @@ def _compare(options: dict[str, Any]) -> Answer:
 def _write(answer: Answer, streams: dict[str, IO[str]]) -> None:
     from ..page.comparison import render
 
-    contents = {"junit": answer.junit_text, "markdown": answer.markdown_text, "html": partial(render, answer)}
+    contents: dict[str, Callable[[], str]] = {"junit": answer.junit_text, "markdown": answer.markdown_text}
+    contents["html"] = partial(render, answer)
     for name, stream in streams.items():
         stream.write(contents[name]())
