@@ -26,6 +26,7 @@ ALLOWED = {
     "references/truth.py": ("exact precise scipy", "which truth a scene has, by the table at its top"),
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
+    "benchmarks/verification/comparison_alarms.py": ("moser_veselov reduced", "the rows that are slowed"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (
         "convected exact gauss moser_veselov reduced substepped",
