@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from .methods.projected import Projected as Projected
     from .methods.reduced import Reduced as Reduced
     from .methods.substepped import Substepped as Substepped
+    from .methods.taylor import Taylor as Taylor
     from .outcome import Outcome as Outcome
     from .outcome import OutcomeKind as OutcomeKind
     from .potentials.gravity_gradient import GravityGradient as GravityGradient
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
     from .potentials.point_to_point import PointAttraction as PointAttraction
     from .potentials.potential import Potential as Potential
     from .potentials.python_function import FunctionPotential as FunctionPotential
+    from .potentials.turning import Orbit as Orbit
+    from .potentials.turning import Turning as Turning
     from .potentials.uniform_gravity import UniformGravity as UniformGravity
     from .scene import Scene as Scene
     from .trajectory import Bounds as Bounds
@@ -81,6 +84,7 @@ _PLACES = {
     "NotConserved": "errors",
     "NotConverged": "errors",
     "NotWritten": "errors",
+    "Orbit": "potentials.turning",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
     "PointAttraction": "potentials.point_to_point",
@@ -92,7 +96,9 @@ _PLACES = {
     "Role": "method",
     "Scene": "scene",
     "Substepped": "methods.substepped",
+    "Taylor": "methods.taylor",
     "Trajectory": "trajectory",
+    "Turning": "potentials.turning",
     "UniformGravity": "potentials.uniform_gravity",
     "Unsupported": "errors",
     "WrongBranch": "errors",
@@ -123,6 +129,7 @@ __all__ = [
     "NotConserved",
     "NotConverged",
     "NotWritten",
+    "Orbit",
     "Outcome",
     "OutcomeKind",
     "PointAttraction",
@@ -134,7 +141,9 @@ __all__ = [
     "Role",
     "Scene",
     "Substepped",
+    "Taylor",
     "Trajectory",
+    "Turning",
     "UniformGravity",
     "Unsupported",
     "WrongBranch",

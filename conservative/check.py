@@ -36,6 +36,7 @@ LONGEST_SHOWN = 200
 
 MOST_STEPS = 2**53
 """Steps of a run at most: floats, which times are made of, count no farther."""
+_COUNT = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
 SAMPLE_BYTES = 1000
 """Memory that a run takes for a sample, bytes, with all that is in between."""
 MEMORY_SHARE = 0.5
@@ -115,6 +116,8 @@ def finite_number(argument: str, value: object, allowed: str) -> float:
 
 def real_number(value: object) -> float | None:
     """Return a real number, of any unit, as a float, finite or not; None for a truth value and for all that is no number."""
+    if type(value) is float:
+        return value
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     try:
@@ -126,6 +129,8 @@ def real_number(value: object) -> float | None:
 
 def positive_number(argument: str, value: object, allowed: str = "a finite number above 0") -> float:
     """Return `value`, of any unit, as a float of `SMALLEST` to `LARGEST`. Raise `BadInput` otherwise."""
+    if type(value) is float and SMALLEST <= value <= LARGEST:
+        return value
     number = real_number(value)
     if number is None or not 0 < number < math.inf:
         raise BadInput(argument, describe(value), allowed)
@@ -206,15 +211,19 @@ def convert_steps(dt: object, n_steps: object, every: object) -> tuple[float, in
     step = real_number(dt)  # no range: steps of scenes in other units are no longer in SI units
     if step is None or not 0 < step < math.inf:
         raise BadInput("dt", describe(dt), "a finite step above 0, s")
-    allowed = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
-    counts = positive_integer("n_steps", n_steps, allowed), positive_integer("every", every, allowed)
-    for argument, count in zip(("n_steps", "every"), counts, strict=True):
-        if count > MOST_STEPS:
-            raise BadInput(argument, describe(count), allowed)
+    counts = _convert_count("n_steps", n_steps), _convert_count("every", every)
     if not math.isfinite(step * counts[0]):
         raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
     require_memory("every", *counts)
     return step, *counts
+
+
+def _convert_count(argument: str, value: object) -> int:
+    """Return a number of steps as an int. Raise `BadInput` unless it is of 1 to `MOST_STEPS`."""
+    count = positive_integer(argument, value, _COUNT)
+    if count > MOST_STEPS:
+        raise BadInput(argument, describe(count), _COUNT)
+    return count
 
 
 def power_of_two(size: float) -> float:

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, TypedDict, Unpack
+
+from numpy.typing import ArrayLike
 
 from . import registry
-from .check import choice, describe, positive_integer, positive_number
+from .attitude import Array
+from .check import MOST_STEPS, choice, describe, positive_integer, positive_number
 from .errors import BadInput, Unsupported
 from .method import Method, grid_for
 from .methods.automatic import integrate_to_error
+from .methods.between import Samples, grid_before, read_times, sample_between
 from .methods.reduced import Reduced
+from .outcome import Progress
 from .scene import Scene
 from .trajectory import Trajectory
 
 DEFAULT_DT = 0.01
 """Step, s, where nobody names one: the paper's."""
+
+
+class Details(TypedDict, total=False):
+    """What `integrate` can be given by keyword only, and seldom is."""
+
+    t_eval: ArrayLike | int | None
+    progress: Callable[[Progress], object] | None
 
 
 def require_support(method: Method, scene: Scene) -> None:
@@ -33,6 +46,7 @@ def integrate(
     *,
     error: float | None = None,
     on_failure: Literal["raise", "return"] = "raise",
+    **details: Unpack[Details],
 ) -> Trajectory:
     """Integrate a scene.
 
@@ -50,10 +64,18 @@ def integrate(
         Keep every so many steps (and the first and last state).
     error
         Attitude error over the run, rad, instead of a method and a step: `conservative.methods.automatic` chooses both, and
-        `trajectory.choice` has them and the estimated error; a warning `AccuracyNotReached` where round-off is in the way.
-        What takes more than 10^10 steps is refused.
+        `trajectory.choice` has them and the estimated error; a warning `AccuracyNotReached` where round-off is in the way. What
+        takes more than 10^10 steps is refused. What the trial runs show is kept: the next call for a scene with the same
+        numbers makes one run.
     on_failure
         "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
+    t_eval
+        By keyword, as `progress`: times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0
+        to t_end, instead of `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step
+        before it, by short steps that leave nothing but round-off. The run ends with the last sample.
+    progress
+        Called with a `Progress`, whose text is a line, before a trial run for an `error`: from one second on, and not more
+        often than ten times a second. `print` will do. Nothing is shown by itself.
 
     Raises
     ------
@@ -75,11 +97,13 @@ def integrate(
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     choice("on_failure", on_failure, ("raise", "return"))
+    at, progress = _read_details(scene, t_end, sample_every, details) if details else (None, None)
     try:
-        if error is None:
-            trajectory = _integrate_with(method, scene, dt, t_end, sample_every)
+        if error is not None:
+            _require_choice(error, dt, method, at)
+            trajectory = _integrate_to(error, scene, dt, t_end, sample_every, at, progress)
         else:
-            trajectory = _integrate_to(error, scene, dt, method, t_end, sample_every)
+            trajectory = _integrate_with(method, scene, dt, t_end, sample_every, at)
     except SystemError as failure:
         raise _interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
     if trajectory.failure is not None and on_failure == "raise":
@@ -95,25 +119,62 @@ def _interrupt_of(failure: SystemError) -> BaseException:
     return reason if isinstance(reason, KeyboardInterrupt) else failure
 
 
+def _read_details(
+    scene: Scene, t_end: float | None, sample_every: int, details: Details
+) -> tuple[Array | None, Callable[[Progress], object] | None]:
+    """Return the times of samples asked for, s, and the function to tell progress to."""
+    unknown = sorted(set(details) - set(Details.__annotations__))
+    if unknown:
+        raise TypeError(f"integrate() got an unexpected keyword argument {unknown[0]!r}")
+    t_eval, progress = details.get("t_eval"), details.get("progress")
+    if progress is not None and not callable(progress):
+        raise BadInput("progress", describe(progress), "a function of a Progress, such as print, or None")
+    if t_eval is None:
+        return None, progress
+    if sample_every != 1:
+        raise BadInput("sample_every", describe(sample_every), "1, the default, together with t_eval, which says what is kept")
+    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    return read_times(t_eval, end), progress
+
+
+def _require_choice(error: float, dt: float | None, method: Method | str | None, at: Array | None) -> None:
+    """Raise `BadInput` unless a method and a step can be chosen for an error, rad, with no step dt, s, asked for as well."""
+    positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
+    if dt is not None and at is not None:
+        raise BadInput(
+            "dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples"
+        )
+
+
 def _integrate_with(
-    method: Method | str | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int
+    method: Method | str | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int, at: Array | None
 ) -> Trajectory:
     if isinstance(method, str):
         method = registry.method(method)
     method = Reduced() if method is None else method
     if not isinstance(method, Method):
         raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
-    grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every)
+    step = DEFAULT_DT if dt is None else dt
+    grid = grid_for(scene, step, t_end, sample_every if at is None else MOST_STEPS)
     require_support(method, scene)
-    return method.solve(scene, grid)
+    if at is None:
+        return method.solve(scene, grid)
+    grid = grid_before(scene, method, grid.dt, at)
+    return sample_between(method.solve(scene, grid), method, grid, at)
 
 
 def _integrate_to(
-    error: float, scene: Scene, dt: float | None, method: Method | str | None, t_end: float | None, sample_every: int
+    error: float,
+    scene: Scene,
+    dt: float | None,
+    t_end: float | None,
+    sample_every: int,
+    at: Array | None,
+    progress: Callable[[Progress], object] | None,
 ) -> Trajectory:
-    positive_number("error", error, "a finite attitude error above 0, rad")
-    if method is not None:
-        raise BadInput("method", describe(method), "None together with error, which chooses the method")
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     spacing = None if dt is None else grid_for(scene, dt, end).dt
-    return integrate_to_error(scene, error, end, spacing, positive_integer("sample_every", sample_every))
+    samples = Samples(spacing, positive_integer("sample_every", sample_every), at)
+    return integrate_to_error(scene, error, end if at is None else at[-1] or end, samples, progress)

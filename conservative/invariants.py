@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,11 +13,14 @@ from .attitude import Array
 from .body import RigidBody
 from .check import describe, geometric_mean, length, printable_text, real_number
 from .errors import BadInput
-from .potentials.potential import Potential
+from .potentials.potential import AnyPotential, depends_on_time, energy_at
+from .potentials.turning import Turning
 from .potentials.uniform_gravity import UniformGravity
 
 _NAME = "a text of one character or more"
 MOMENTUM_UNIT = "kg m^2/s"
+JACOBI_INTEGRAL = "Jacobi integral"
+"""Name of what a field that turns conserves in place of the energy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,8 @@ class Invariant:
     """A conserved quantity.
 
     `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
-    which has the unit `unit` and is above 0.
+    which has the unit `unit` and is above 0. In a field that turns, the attitudes it is given are R_OB, those in the axes O
+    that turn with the field (`Scene.in_field_axes`): what is conserved does not depend on the time there.
 
     Raises
     ------
@@ -54,10 +58,33 @@ def sizes(drift: Array) -> Array:
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
 
 
-def energy(body: RigidBody, potential: Potential | None, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3) and rates (..., 3), rad/s, body axes."""
-    kinetic = np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2
-    return kinetic if potential is None else kinetic + potential.energy(R_WB)
+def kinetic_energy(body: RigidBody, w_WB_B: Array) -> Array:
+    """Return the kinetic energy (...), J, at rates (..., 3), rad/s, body axes."""
+    return np.asarray(np.sum(body.momentum(w_WB_B) * w_WB_B, axis=-1) / 2)
+
+
+def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B: Array, t: Array) -> Array:
+    """Return kinetic plus potential energy (...), J, at attitudes (..., 3, 3), rates (..., 3), rad/s, and times (...), s."""
+    kinetic = kinetic_energy(body, w_WB_B)
+    return kinetic if potential is None else kinetic + energy_at(potential, R_WB, t)
+
+
+def conserved_part(body: RigidBody, potential: AnyPotential | None, R: Array, w_WB_B: Array) -> Array:
+    """Return what makes a conserved quantity of the kinetic energy, (...), J: V, or V - rate n.l of a field that turns.
+
+    Attitudes (..., 3, 3) are those in axes that the field is fixed in (`Scene.in_field_axes`), rates (..., 3), rad/s, those of
+    the body in the world. It is 0 for a free body, and where nothing of the kind is conserved.
+    """
+    if isinstance(potential, Turning):
+        return potential.potential.energy(R) - potential.orbit.rate * (momentum_W(body, R, w_WB_B) @ potential.orbit.normal_W)
+    if potential is None or depends_on_time(potential):
+        return np.zeros(R.shape[:-2])
+    return energy_at(potential, R, np.zeros(()))
+
+
+def jacobi_scale(body: RigidBody, field: Turning, energy_scale: float) -> float:
+    """Return what errors of the Jacobi integral are relative to, J: the energy's scale and what the turning adds to it."""
+    return energy_scale + field.orbit.rate * geometric_mean(2 * energy_scale, float(body.moments.max()))
 
 
 def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
@@ -68,11 +95,14 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
     return (R_WB @ body.momentum(w_WB_B)[..., None])[..., 0]
 
 
-def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, energy_scale: float) -> tuple[Invariant, ...]:
+def invariants_of(
+    body: RigidBody, potential: AnyPotential | None, w_WB_B0: Array, energy_scale: float
+) -> tuple[Invariant, ...]:
     """Return what follows from the body and the potential alone; drifts are relative to sizes at the start.
 
-    Energy always. World momentum (a vector) for a free body, its component along the axis of a field that has one (the vertical
-    in uniform gravity). The axial momentum where body and field are symmetric about one axis.
+    Energy, unless the field depends on the time; the Jacobi integral where it turns. World momentum (a vector) for a free body,
+    its component along the axis of a field that has one (the vertical in uniform gravity). The axial momentum where body and
+    field are symmetric about one axis.
 
     Parameters
     ----------
@@ -83,7 +113,7 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     energy_scale
         What energy errors are relative to, J, above 0.
     """
-    found = [Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w))]
+    found = list(_energies(body, potential, energy_scale))
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
     scale = length(body.momentum(w_WB_B0)) or geometric_mean(float(body.moments.max()), energy_scale)
     if potential is None:
@@ -95,6 +125,23 @@ def invariants_of(body: RigidBody, potential: Potential | None, w_WB_B0: Array, 
     if axis is not None:
         found.append(Invariant("axial momentum", MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(found)
+
+
+def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: float) -> Iterator[Invariant]:
+    """Yield the energy, or the Jacobi integral, or nothing."""
+
+    def evaluate(R: Array, w: Array) -> Array:
+        return kinetic_energy(body, w) + conserved_part(body, potential, R, w)
+
+    if isinstance(potential, Turning):
+        yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), evaluate)
+    elif not depends_on_time(potential):
+        yield Invariant("energy", "J", energy_scale, evaluate)
+
+
+def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
+    """Return the energy among invariants, in a field that turns the Jacobi integral, None where neither is conserved."""
+    return next((each for each in invariants if each.name in ("energy", JACOBI_INTEGRAL)), None)
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
@@ -116,7 +163,7 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
     body, potential, rows = scene.body, scene.potential, np.zeros((5, 4))
     for invariant, size in kept_sizes(scene, kept).items():
         start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])[0]
-        if invariant.name == "energy":
+        if invariant.unit == "J":
             rows[0] = 1 / size, 0.0, 0.0, start
         elif invariant.name == "axial momentum":
             rows[4, :3], rows[4, 3] = scene.symmetry_axis_B / size, start / size
@@ -127,7 +174,7 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
     return np.array(body.inertia), rows
 
 
-def axial_direction(body: RigidBody, potential: Potential | None, tolerance: float = 1e-12) -> Array | None:
+def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-12) -> Array | None:
     """Return the unit vector (3,), body axes, about which body and field are symmetric; None where they are not.
 
     In uniform gravity it points to the side of the centre of mass. Fields of other kinds are not looked into: None.

@@ -6,32 +6,21 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, convert_steps, positive_integer, positive_number, require_memory
-from .declarations import Candidacy, Claims, Cost, settings_text
+from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory
+from .declarations import Candidacy, Claims, Cost, refuse_time, settings_text
+from .declarations import Role as Role
 from .errors import BadInput
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, accept
 from .version import VERSION
 
 Run = Callable[[], Trajectory]
-
-
-class Role(StrEnum):
-    """Which side a method is on."""
-
-    OURS = "ours"
-    """Compared with the engines in verdicts; its time is gated."""
-    ENGINE = "engine"
-    """Somebody else's code."""
-    TRUTH = "truth"
-    """Measured against, never a competitor."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +77,7 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         the samples would not fit in memory.
     """
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    step = positive_number("dt", dt, f"a finite step above 0 and at most t_end = {end:g}, s")
-    if step > end:
-        raise BadInput("dt", f"{step:g}", f"a finite step above 0 and at most t_end = {end:g}, s")
+    step = dt if type(dt) is float and SMALLEST <= dt <= end else _read_step(dt, end)
     # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
     n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
     if n_steps > MOST_STEPS:
@@ -100,6 +87,14 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
     return Grid(step, n_steps, every)
 
 
+def _read_step(dt: object, end: float) -> float:
+    """Return a step, s; raise `BadInput` if it cannot be used, or is longer than the run to `end`, s."""
+    allowed = f"a finite step above 0 and at most t_end = {end:g}, s"
+    if (step := positive_number("dt", dt, allowed)) > end:
+        raise BadInput("dt", f"{step:g}", allowed)
+    return step
+
+
 class Method(ABC):
     """A way to integrate scenes: a frozen value, defined in one file and registered in one line.
 
@@ -107,22 +102,21 @@ class Method(ABC):
 
     Attributes
     ----------
-    family
-        The name that the class is registered with.
-    role
-        The side it is on.
+    family, role
+        The name that the class is registered with, and the side it is on.
     candidacy
         How the automatic choice considers it; None where it does not.
     claims
         What is claimed of it, and where: reports check `order` and `conserves` against that. None where nobody claims anything.
     colour
         A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
-    module
-        Module of an engine, whose import reports time; "" for none.
-    kernel
-        Module in `conservative.kernels` whose function `enter` takes all steps of a run; "" where there is none.
+    module, kernel
+        Module of an engine, whose import reports time, and module in `conservative.kernels` whose function `enter` takes all
+        steps of a run; "" for none.
     step_goals
         Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
+    time_dependent
+        Whether it takes potentials that depend on the time; of others `unsupported` says that by itself, whatever else it says.
     """
 
     family: ClassVar[str]
@@ -133,6 +127,11 @@ class Method(ABC):
     module: ClassVar[str] = ""
     kernel: ClassVar[str] = ""
     step_goals: ClassVar[tuple[tuple[str, float], ...]] = ()
+    time_dependent: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        if "unsupported" in vars(cls):
+            cls.unsupported = refuse_time(cls.unsupported)  # type: ignore[method-assign]
 
     @property
     def name(self) -> str:
@@ -170,6 +169,7 @@ class Method(ABC):
         """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
         return Cost(step=340.0)
 
+    @refuse_time
     def unsupported(self, scene: Scene) -> str | None:
         """Return why the scene cannot be done, None if it can."""
         return None
@@ -182,16 +182,17 @@ class Method(ABC):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
 
-        Timing calls the run, so all that happens once per model belongs before it. What is converted may be kept for later runs
-        of the same scene, which never changes. A run may be called many times and starts afresh each time. Runs that were
-        prepared apart may overlap, in threads; nobody calls one run twice at a time.
+        All that happens once per model belongs before the run, which timing calls, and who has many short runs: a run by itself
+        is not checked, `check(scene, grid, run())` is. What is converted may be kept for later runs of the scene, which never
+        changes. A run may be called many times and starts afresh each time. Runs that were prepared apart may overlap, in
+        threads; nobody calls one run twice at a time.
         """
 
     def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
         """Return what a run of this method gave if it may be called ok, else what is good of it, with the failure.
 
-        Every run of every method goes through here. To be ok, a run has to give a `Trajectory` of the scene with all samples of
-        the grid, arrays of float64 of the right shapes, at the right times, finite, and within `bounds`.
+        Every run goes through here. To be ok, it has to give a `Trajectory` of the scene with all samples of the grid, float64
+        of the right shapes, at the right times, finite, and within `bounds`.
         """
         return accept(found, scene, grid, self, self.bounds(scene, grid))
 

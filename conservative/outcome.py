@@ -87,6 +87,30 @@ class Counters:
 
 
 @dataclass(frozen=True)
+class Progress:
+    """How far `integrate(scene, error=...)` has got with its trial runs; its text is a line for people.
+
+    Attributes
+    ----------
+    elapsed
+        Time since the call, s.
+    runs
+        Runs made so far.
+    method, dt, n_steps
+        The `Method` that runs next, its step, s, and the number of its steps.
+    """
+
+    elapsed: float
+    runs: int
+    method: Any  # a `Method`, as in `Choice`
+    dt: float
+    n_steps: int
+
+    def __str__(self) -> str:
+        return f"{self.elapsed:.1f} s, {self.runs} trial runs; now {self.method.name}, {self.n_steps} steps of {self.dt:.3g} s"
+
+
+@dataclass(frozen=True)
 class Choice:
     """What `integrate(scene, error=...)` chose.
 

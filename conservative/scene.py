@@ -15,7 +15,8 @@ from .body import RigidBody
 from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation
 from .errors import BadInput
 from .invariants import Invariant, axial_direction, invariants_of
-from .potentials.potential import Potential
+from .potentials.potential import AnyPotential, Potential, PotentialInTime
+from .potentials.turning import Turning
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -34,7 +35,7 @@ class _Fields:
     R_WB0: Array
     w_WB_B0: Array
     t_end: float
-    potential: Potential | None
+    potential: AnyPotential | None
     dt: float
     extra_invariants: tuple[Invariant, ...] = ()
     group: str = "your own"
@@ -70,7 +71,8 @@ class Scene(_Fields):
     t_end
         Duration, s.
     potential
-        What acts on the body; None for a free body, which then carries no torque code anywhere.
+        What acts on the body; None for a free body, which then carries no torque code anywhere. One that depends on the time
+        is `Turning`, or is given by functions of attitude and time.
     dt
         By keyword, as all that follow: step of the source, s, which commands and studies take unless told otherwise; default
         a 20th of a radian of the start's rate, at most a hundredth of t_end.
@@ -92,7 +94,7 @@ class Scene(_Fields):
         R_WB0: ArrayLike | Rotation,
         w_WB_B0: ArrayLike,
         t_end: float,
-        potential: Potential | None = None,
+        potential: AnyPotential | None = None,
         **details: Unpack[Details],
     ) -> None:
         _check_parts(name, body, potential)
@@ -129,6 +131,10 @@ class Scene(_Fields):
     def invariants(self) -> tuple[Invariant, ...]:
         """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
         return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
+
+    def in_field_axes(self, R_WB: Array, t: Array) -> Array:
+        """Return attitudes (n, 3, 3) at times (n,), s, in axes that the field is fixed in: the world's, or those that turn."""
+        return self.potential.in_orbit(R_WB, t) if isinstance(self.potential, Turning) else R_WB
 
     @cached_property
     def symmetry_axis_B(self) -> Array | None:
@@ -168,7 +174,7 @@ def _check_parts(name: object, body: object, potential: object) -> None:
         raise BadInput("name", "''", _NAME)
     if not isinstance(body, RigidBody):
         raise BadInput("body", describe(body), "a RigidBody")
-    if isinstance(potential, type) or not isinstance(potential, Potential | None):
+    if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
         raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
 
 

@@ -29,18 +29,14 @@ class Trajectory:
 
     Attributes
     ----------
-    scene
-        What was integrated.
-    t
-        Times (n,), s.
+    scene, t
+        What was integrated, and times (n,), s.
     R_WB
         Attitudes (n, 3, 3), body to world, as the method has them: not tidied up.
     w_WB_B
         Angular velocities (n, 3), rad/s, body axes.
-    label
-        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`.
-    counters
-        Work done.
+    label, counters
+        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`, and work done.
     failure
         What ended the run early, as the exception that `integrate` raises; the samples then end before it. Else None.
     choice
@@ -68,8 +64,8 @@ class Trajectory:
 
     @cached_property
     def energy(self) -> Array:
-        """Kinetic plus potential energy (n,), J."""
-        return invariants.energy(self.scene.body, self.scene.potential, self.R_WB, self.w_WB_B)
+        """Kinetic plus potential energy (n,), J; in a field that depends on the time that of the moment, which changes."""
+        return invariants.energy(self.scene.body, self.scene.potential, self.R_WB, self.w_WB_B, self.t)
 
     @cached_property
     def momentum_W(self) -> Array:
@@ -87,7 +83,8 @@ class Trajectory:
         `conservative.invariants.sizes` makes sizes of it, of a vector its length.
         """
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
-        return np.asarray((invariant.evaluate(self.R_WB, self.w_WB_B) - start) / invariant.scale)
+        R = self.scene.in_field_axes(self.R_WB, self.t)
+        return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row for each sample: t, R_WB (by rows), w_WB_B, energy, momentum_W; units as above.
@@ -124,8 +121,6 @@ class Trajectory:
 
 START_TOLERANCE = 1e-6
 """How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
-
-
 Steps = Any
 """A `conservative.method.Grid`: naming the type would close a circle, as that file imports this one."""
 
@@ -167,6 +162,12 @@ def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) 
         return _cut_at_drift(_cut_to_finite(found), kept, bounds)
 
 
+def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
+    """Return samples at any times of a run, those up to the first that breaks the bounds of invariants of the names `kept`."""
+    with np.errstate(all="ignore"):
+        return _cut_at_drift(_cut_to_finite(found), kept, bounds)
+
+
 def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
     """Return what is wrong with the form of a result, None if nothing is."""
     if not isinstance(found, Trajectory):
@@ -202,7 +203,7 @@ def _find_misplaced(found: Trajectory, steps: Steps) -> str | None:
 def _is_kept(found: Trajectory, steps: Steps, kept: frozenset[str], bounds: Bounds) -> bool:
     """Return whether compiled code finds all samples within the bounds and all times right."""
     scene = found.scene
-    V = np.zeros(len(found)) if scene.potential is None else scene.potential.energy(found.R_WB)
+    V = invariants.conserved_part(scene.body, scene.potential, scene.in_field_axes(found.R_WB, found.t), found.w_WB_B)
     J, constants = scene.derive(invariants.kernel_constants, kept)
     times, allowed = (steps.dt, steps.every, steps.n_steps, found.t), (bounds.drift, bounds.orthonormality)
     return bool(kernels("drifts").are_kept(*times, found.R_WB, found.w_WB_B, V, J, constants, *allowed))

@@ -22,13 +22,14 @@ from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
+from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from .engine import STEP_LIMIT, Axes, limit_reason, pace_reason, version
 from .heyoka_equations import forms
-from .heyoka_equations.torques import FIELDS, Field, Number
+from .heyoka_equations.torques import FIELDS, Field, Number, find_field
 
 Reals = NDArray[Any]
 """An array of `heyoka.real`."""
@@ -59,6 +60,7 @@ class Precise(Method):
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
     colour: ClassVar[str] = "grey"
+    time_dependent: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)
@@ -73,13 +75,13 @@ class Precise(Method):
         return None
 
     def unsupported(self, scene: Scene) -> str | None:
-        if scene.potential is None or type(scene.potential) in FIELDS:
+        if scene.potential is None or find_field(scene.potential) is not None:
             return None
-        kind, table = type(scene.potential).__name__, "conservative.references.heyoka_equations.torques.FIELDS"
+        kind, table = type(static_part(scene.potential)).__name__, "conservative.references.heyoka_equations.torques.FIELDS"
         return f"no multi-precision expressions for {kind}; add them to {table}"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        field = None if scene.potential is None else FIELDS[type(scene.potential)]
+        field = find_field(scene.potential)
         values = () if field is None else field.values(scene.potential)
         solve = _solver(scene.body.inertia.tolist(), to_quaternion(scene.R_WB0), scene.w_WB_B0, field, values, self.bits)
         axes = Axes(scene, np.eye(3), np.diag(scene.body.inertia))

@@ -11,7 +11,7 @@ from typing import Any
 from conservative import files
 from conservative.errors import BadInput
 
-from .page import engines, markdown, page, scene_charts
+from .page import engines, markdown, page, random_bodies, scene_charts
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
@@ -59,11 +59,11 @@ def render(view: View, folder: Path, png: bool, announce: Callable[[str], None])
     """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
     announce("pictures")
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
-    of_engines = engines.charts(view.engines)
-    text = markdown.render(view, charts, of_engines, lambda name, chart: draw(chart, folder / name, png))
+    of_engines, of_random = engines.charts(view.engines), random_bodies.chart(view.random)
+    text = markdown.render(view, charts, of_engines, lambda name, chart: draw(chart, folder / name, png), of_random)
     files.write_text(folder / "report.md", text, "out")
     announce("page")
-    files.write_text(folder / "index.html", page.render(view, charts, of_engines), "out")
+    files.write_text(folder / "index.html", page.render(view, charts, of_engines, of_random), "out")
     files.write_text(folder / "measurements.csv", view.table.to_csv(index=False, lineterminator="\n"), "out")
     names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
     files.write_text(folder / MANIFEST, manifest(view, names), "out")

@@ -9,7 +9,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import sphere_curves
-from conservative.benchmarks.studies.studies import ENGINES
+from conservative.benchmarks.studies.studies import ENGINES, RANDOM
 from conservative.method import Method
 from conservative.scene import Scene
 
@@ -27,6 +27,7 @@ from .tables import (
     orders,
     overview,
     paper,
+    random_ratios,
     runs,
     scene,
     work_precision,
@@ -102,8 +103,10 @@ class View:
         Whether the report is coarser than it could be.
     table
         The measurements, a row each.
+    random
+        What was found on random bodies; None where the report has no such study.
     headline
-        Where an engine beats us, and where it does not.
+        Where an engine beats us on the scenes, and where it does not.
     failed
         What of ours failed at the steps of the paper, one line each.
     hard_cases, stability
@@ -115,6 +118,7 @@ class View:
     source: Provenance
     quick: bool
     table: pd.DataFrame
+    random: random_ratios.RandomView | None
     headline: tuple[headline.Statement, ...]
     failed: tuple[str, ...]
     verdict: Table
@@ -135,12 +139,13 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     """Return the view of measurements; every number that a report shows is computed here, and once."""
     every, samples = with_names(measurements.table), with_names(measurements.samples)
     of_engines = every["study"].isin(ENGINES)
-    table = every[~of_engines].reset_index(drop=True)
+    table = every[~every["study"].isin((*ENGINES, RANDOM))].reset_index(drop=True)
     builder = _Builder.of(table, samples, plan.methods)
     return View(
         source=source,
         quick=plan.quick,
         table=measurements.table,
+        random=random_ratios.view(every, plan.bodies, plan.seed) if RANDOM in plan.names else None,
         headline=tuple(headline.statements(builder.contests)),
         failed=tuple(runs.failures_of_ours(table)),
         verdict=overview.verdict(table, builder.points),

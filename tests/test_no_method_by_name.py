@@ -13,7 +13,7 @@ from .environments import ROOT
 from .test_house import sources
 
 ALLOWED = {
-    "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped", "the public names"),
+    "conservative/__init__.py": ("convected gauss lame moser_veselov projected reduced substepped taylor", "the public names"),
     "conservative/deferred_imports.py": ("reduced", "the default of every option that names a method"),
     "conservative/errors.py": ("heyoka mujoco pinocchio", "packages that an extra brings"),
     "conservative/integration.py": ("reduced", "the default of `integrate`"),
@@ -26,6 +26,7 @@ ALLOWED = {
     "references/truth.py": ("exact precise scipy", "which truth a scene has, by the table at its top"),
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
+    "benchmarks/studies/random.py": ("precise", "the truth of a body in any field"),
     "benchmarks/verification/comparison_alarms.py": ("moser_veselov reduced", "the rows that are slowed"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (

@@ -10,7 +10,7 @@ from conservative import deferred_imports, registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
-from conservative.methods import automatic
+from conservative.methods import search
 from conservative.reports.charts import style
 from conservative.reports.tables import claims, orders
 
@@ -98,12 +98,12 @@ def installed(tmp_path, monkeypatch):
 
 def test_the_automatic_choice_considers_it(installed):
     top = cv.scenes.asymmetric_top(t_end=0.5)
-    before = [method.family for method in automatic.candidates(top)]
+    before = [method.family for method in search.candidates(top)]
     assert "borrowed" not in before
     installed(SOURCE)
-    found = [method.family for method in automatic.candidates(top)]
-    assert found == ["borrowed"] * 3 + ["projected"]  # of its group the first, and still what is in no group
-    assert automatic.candidates(cv.scenes.brick_flip()) == (cv.MoserVeselov(),)  # an exact family stays alone
+    found = [method.family for method in search.candidates(top)]
+    assert found == ["borrowed"] * 3 + ["taylor"] * 3  # of its group the first, and still what is in no group
+    assert search.candidates(cv.scenes.brick_flip()) == (cv.MoserVeselov(),)  # an exact family stays alone
     assert cv.integrate(top, error=1e-3).choice.method.family == "borrowed"
 
 
@@ -157,7 +157,7 @@ def test_a_method_need_not_say_anything(installed):
     assert method in hard_cases.settings(selection.methods())
     assert method in sphere_curves.select_methods(selection.methods())
     assert style.colours({"borrowed": "borrowed"})["borrowed"] not in style.PALETTE.values()
-    assert "borrowed" not in {each.family for each in automatic.candidates(cv.scenes.asymmetric_top())}
+    assert "borrowed" not in {each.family for each in search.candidates(cv.scenes.asymmetric_top())}
 
 
 NEEDY = SOURCE.replace(
@@ -171,10 +171,10 @@ def test_a_method_without_what_it_needs_breaks_nothing(installed):
     top = cv.scenes.asymmetric_top()
     nothing = frame([])
     fits = orders.fits(orders.errors(nothing, Measure.ATTITUDE_MAX))
-    before = automatic.candidates(top), claims.findings(nothing, fits, [])
+    before = search.candidates(top), claims.findings(nothing, fits, [])
     installed(NEEDY)
     assert "borrowed" in registry.list_families()
-    assert (automatic.candidates(top), claims.findings(nothing, fits, [])) == before
+    assert (search.candidates(top), claims.findings(nothing, fits, [])) == before
     missing = [point.method for point in points.points() if point.method.name == "borrowed"]
     assert {type(method) for method in missing} == {selection.Missing}
 
@@ -190,8 +190,8 @@ BROKEN = {
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_broken_entry_point_breaks_nothing(installed, what):
     top = cv.scenes.asymmetric_top()
-    families, chosen = registry.list_families(), automatic.candidates(top)
+    families, chosen = registry.list_families(), search.candidates(top)
     installed(*BROKEN[what])
     assert registry.list_families() == families
-    assert automatic.candidates(top) == chosen
+    assert search.candidates(top) == chosen
     assert list(style.order_lines({"mujoco 4.0.0 RK4": "mujoco", "reduced": "reduced"})) == ["reduced", "mujoco 4.0.0 RK4"]

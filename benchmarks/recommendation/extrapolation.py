@@ -9,7 +9,7 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.invariants import sizes
-from conservative.methods.automatic import ASYMPTOTIC
+from conservative.methods.trials import ASYMPTOTIC
 from conservative.trajectory import Trajectory
 
 from ..measures.errors import secular_slope

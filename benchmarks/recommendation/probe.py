@@ -15,7 +15,8 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.method import Grid, Method
-from conservative.methods.automatic import ASYMPTOTIC, SAFETY
+from conservative.methods.search import SAFETY
+from conservative.methods.trials import ASYMPTOTIC
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 

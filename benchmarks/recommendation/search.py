@@ -12,7 +12,9 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import BadInput
 from conservative.method import Method
-from conservative.methods.automatic import ASYMPTOTIC, ATTEMPTS, stops_falling
+from conservative.methods.automatic import ATTEMPTS
+from conservative.methods.search import stops_falling
+from conservative.methods.trials import ASYMPTOTIC
 from conservative.outcome import OutcomeKind
 
 from ..measures.convergence_order import MIN_POINTS

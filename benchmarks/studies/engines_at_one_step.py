@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from conservative.invariants import find_energy
 from conservative.method import Grid, grid_for
 from conservative.outcome import OK, Outcome
 from conservative.references.environments.client import time_limit
@@ -103,9 +104,9 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
 
 def direction(value: Value, trajectory: Trajectory) -> str:
     """Return whether energy was gained or lost at the end of a run, for the row of its drift; empty for other rows."""
-    if (value.measure, value.quantity) != (Measure.DRIFT_MAX, "energy"):
+    energy = find_energy(trajectory.scene.invariants)
+    if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
         return ""
-    energy = next(each for each in trajectory.scene.invariants if each.name == "energy")
     return "gained" if trajectory.drift(energy)[-1] > 0 else "lost"
 
 

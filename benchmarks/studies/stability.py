@@ -25,6 +25,7 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import Diverged
+from conservative.invariants import find_energy
 from conservative.method import Grid, Method
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
@@ -125,11 +126,13 @@ def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: f
 
 
 def detect_divergence(trajectory: Trajectory) -> Outcome | None:
-    """Return the outcome of a run whose energy leaves its own scale; None where it stays."""
-    energy = next(invariant for invariant in trajectory.scene.invariants if invariant.name == "energy")
+    """Return the outcome of a run whose energy, or Jacobi integral, leaves its own scale; None where it stays."""
+    energy = find_energy(trajectory.scene.invariants)
+    if energy is None:
+        return None
     with np.errstate(over="ignore", invalid="ignore"):
         off = ~(np.abs(trajectory.drift(energy)) <= 1.0)
-    return Diverged(float(trajectory.t[int(np.argmax(off))]), "energy").outcome if off.any() else None
+    return Diverged(float(trajectory.t[int(np.argmax(off))]), energy.name).outcome if off.any() else None
 
 
 def detect_wrong_branch(trajectory: Trajectory, motion: TrueMotion, size: int) -> Outcome | None:

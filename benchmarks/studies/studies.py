@@ -23,6 +23,7 @@ from . import (
     long_runs,
     paper,
     paper_figures,
+    random,
     selection,
     speed,
     sphere_curves,
@@ -44,13 +45,16 @@ MAKERS: Mapping[str, Maker] = {
     "engines_over_steps": engines_over_steps.findings,
     "stability": stability.findings,
     "hard_cases": hard_cases.findings,
+    "random": random.findings,
 }
 """What makes each study, by its name, which is that of its file."""
 HARD = ("stability", "hard_cases")
 """Studies of the hard cases: of scenes chosen for it, and of every registered scene."""
 ENGINES = ("engines_at_one_step", "engines_over_steps")
 """Studies of the scenes that are chosen, and of engines alone."""
-CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES))
+RANDOM = "random"
+"""Study of bodies that are drawn for it."""
+CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES, RANDOM))
 """Studies of the scenes and methods that are chosen."""
 
 
@@ -87,6 +91,17 @@ def list_hard_studies(
         Study("stability", selection.scenes(stability.SCENES), methods, **options),
         Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), **options),
     )
+
+
+def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False) -> Study:
+    """Return the study of that many random bodies in each field.
+
+    Raises
+    ------
+    BadInput
+        bodies is not an integer of 1 or more, seed not one of 0 or more, or there is no method.
+    """
+    return Study(RANDOM, random.bodies(bodies, seed), methods, quick, skip_missing, Truths(random.precise))
 
 
 def _silent(done: int, total: int, what: str) -> None:

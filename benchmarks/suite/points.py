@@ -12,6 +12,7 @@ import numpy as np
 
 from conservative.attitude import rotation_about
 from conservative.method import Grid, Method, Role, grid_for
+from conservative.potentials.potential import depends_on_time, energy_at
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -101,7 +102,10 @@ def define(words: list[str], values: Iterable[object]) -> str:
 def motion_numbers(scene: Scene) -> list[list[float]]:
     """Return what makes the motion of a scene over its own steps: body, start, steps, and energies of the field."""
     grid = grid_for(scene, scene.dt)
-    energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in PROBES]
+    times = np.linspace(0, scene.t_end, len(PROBES)) if depends_on_time(scene.potential) else np.zeros(len(PROBES))
+    energies = (
+        [] if scene.potential is None else [float(energy_at(scene.potential, *at)) for at in zip(PROBES, times, strict=True)]
+    )
     values = (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.t_end, grid.dt, grid.n_steps], energies)
     return [_digits(each) for each in values]
 

@@ -188,7 +188,7 @@ def _attraction(draw: Generator, body: cv.RigidBody, energy: float) -> cv.PointA
 
 
 def _gradient(draw: Generator, body: cv.RigidBody, energy: float) -> cv.GravityGradient:
-    return cv.GravityGradient(math.sqrt(energy / body.moments.max()), body.inertia, draw.normal(size=3))
+    return cv.GravityGradient(math.sqrt(energy / body.moments.max() / 3), body.inertia, draw.normal(size=3))
 
 
 FIELDS = (_nothing, _gravity, _gravity, _spring, _attraction, _gradient)

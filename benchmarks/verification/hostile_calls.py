@@ -58,7 +58,7 @@ def warm_up() -> None:
                 cv.integrate(scene, 0.005, method, t_end=0.01, on_failure="return")
 
 
-def _scene_in(potential: cv.Potential) -> cv.Scene:
+def _scene_in(potential: cv.Potential | cv.Turning) -> cv.Scene:
     return cv.Scene("s", _body(), np.eye(3), (0.1, 0.2, 3.0), 1.0, potential)
 
 
@@ -91,7 +91,12 @@ CONSTRUCTORS: dict[Callable[..., object], dict[str, Any]] = {
     cv.LinearSpring: {"stiffness": 1.0, "point_B": (1, 0, 0), "anchor_W": (0, 0, 1), "rest_length": 0.5},
     cv.PointAttraction: {"strength": 1.0, "point_B": (1, 0, 0), "anchor_W": (0, 0, 2)},
     cv.GravityGradient: {"rate": 1.0, "inertia": (1.0, 2.0, 2.5), "direction_W": (0, 0, 1)},
-    cv.FunctionPotential: {"energy": _quartic, "gradient": _quartic_gradient, "scale": 1.0, "axis_W": (0, 0, 1)},
+    cv.FunctionPotential: {
+        **{"energy": _quartic, "gradient": _quartic_gradient, "scale": 1.0, "axis_W": (0, 0, 1), "time_dependent": False}
+    },
+    cv.Orbit: {"rate": 1.0, "normal_W": (0, 0, 1)},
+    cv.Turning: {"potential": cv.UniformGravity(1.0, (0, 0, 0.1)), "orbit": cv.Orbit(1.0, (1, 0, 0))},
+    cv.Orbit(1.0, (0, 0, 1)).gravity_gradient: {"inertia": (1.0, 2.0, 2.5), "direction_W": (1, 0, 0)},
     cv.Invariant: {"name": "i", "unit": "J", "scale": 1.0, "evaluate": lambda R, w: w[:, 0]},
     cv.Grid: {"dt": 0.1, "n_steps": 10, "every": 2},
     cv.shapes.box: {"size": (1, 2, 3), "mass": 1.0, "density": None},
@@ -118,8 +123,8 @@ def _use(value: object) -> object:
         return value.body
     if isinstance(value, cv.Grid):
         return value.n_samples < 10**6 and value.t
-    if isinstance(value, cv.FunctionPotential):
-        return cv.integrate(_scene_in(value), 0.1, t_end=0.2)
+    if isinstance(value, cv.FunctionPotential | cv.Turning):
+        return cv.integrate(_scene_in(value), 0.1, cv.Projected(), t_end=0.2)
     return value
 
 

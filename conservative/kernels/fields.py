@@ -2,7 +2,7 @@
 
 A kernel is compiled once for each type of field; `None` is the free body, for which the torque code is not compiled at all.
 A new field is a named tuple in a module of its own that implements the four functions below. Newton's method relies on the
-derivatives that they return: it expects quadratic convergence.
+derivatives that they return: it expects quadratic convergence. A field with an axis can have a recurrence as well (`axial`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 from numba.extending import overload
 
 from . import SMALL, small
+from .axial import axial_constants, axial_energy, start_series
+from .traced import join
 from .vector import cross, dot, scale, vertical
 
 
@@ -46,6 +48,21 @@ def energy(field, q):
 def body_torque(field, q):
     """Return the torque in N m, principal axes, at the attitude of the quaternion q, whose length does not matter."""
     raise TypeError(f"not a field: {field!r}")
+
+
+@singledispatch
+def at_time(field, t):
+    """Return the field as it is at a time t, s: itself, unless it is one of those of `field_in_time`."""
+    return field
+
+
+def _stay(field, t):
+    return field
+
+
+@overload(at_time, jit_options=SMALL)
+def _choose_to_stay(field, t):
+    return None if getattr(field, "instance_class", None) in at_time.registry else _stay
 
 
 @singledispatch
@@ -123,3 +140,35 @@ def _finite_derivative_uniform(field, q0, q1):
     V_star = np.zeros(9)
     V_star[2], V_star[5], V_star[8] = field.x, field.y, field.z
     return V_star, np.zeros((9, 9))
+
+
+class UniformSeries:
+    """J^-1 (g x m), with M1 and M2 of `turned_moment`."""
+
+    def __init__(self, emit, M1, M2):
+        self._emit, self._M1, self._M2 = emit, M1, M2
+
+    def accelerate(self, c, n):
+        """Coefficient n of J^-1 T."""
+        return self._emit.subtract(self._emit.add(None, self._M2, c[n, 0]), self._M1, c[n, 1])
+
+
+def turned_moment(J_inverse, m):
+    """J^-1 (m2, m3, m1) and J^-1 (m3, m1, m2), with which J^-1 (g x m) is a difference of two products."""
+    i = J_inverse
+    return join(i[0] * m[1], i[1] * m[2], i[2] * m[0], 0.0), join(i[0] * m[2], i[1] * m[0], i[2] * m[1], 0.0)
+
+
+@axial_constants.register(Uniform)
+def _axial_constants_uniform(field, J_inverse):
+    return turned_moment(J_inverse, field)
+
+
+@axial_energy.register(Uniform)
+def _axial_energy_uniform(field, constants, g):
+    return field.x * g[0] + field.y * g[1] + field.z * g[2], field
+
+
+@start_series.register(Uniform)
+def _start_series_uniform(field, constants, g):
+    return UniformSeries, constants

@@ -1,7 +1,7 @@
 """A field given by Python functions, called from the compiled loop.
 
 For each evaluation the loop writes the inputs into a new buffer, and what it calls writes the outputs behind them. All of the
-arithmetic is Python's, in `conservative.potentials.python_function`: nothing but these few lines is compiled.
+arithmetic is Python's, in `conservative.potentials.callback`: nothing but these few lines is compiled.
 """
 
 from __future__ import annotations
@@ -77,14 +77,15 @@ def _allocate(field):
 
 
 @kernel
-def _fill(field, q):
+def fill(field, q):
+    """Return a new buffer with the frame and the quaternion."""
     buffer = _allocate(field)
     buffer[STATE], buffer[STATE + 1], buffer[STATE + 2], buffer[STATE + 3] = q
     return buffer
 
 
 @kernel
-def _evaluate(field, what, buffer):
+def evaluate(field, what, buffer):
     """Return the outputs, a view into the buffer."""
     _call(np.int64(field.address), np.int64(what), np.int64(buffer.ctypes.data))
     return buffer[N_INPUTS:]
@@ -97,19 +98,19 @@ def _triple(v, i):
 
 @implements(energy, Function)
 def _energy_function(field, q):
-    return _evaluate(field, ENERGY, _fill(field, q))[0]
+    return evaluate(field, ENERGY, fill(field, q))[0]
 
 
 @implements(body_torque, Function)
 def _body_torque_function(field, q):
-    return _triple(_evaluate(field, BODY_TORQUE, _fill(field, q)), 0)
+    return _triple(evaluate(field, BODY_TORQUE, fill(field, q)), 0)
 
 
 @implements(finite_torque, Function)
 def _finite_torque_function(field, q, a):
-    buffer = _fill(field, q)
+    buffer = fill(field, q)
     buffer[STATE + 4], buffer[STATE + 5], buffer[STATE + 6] = a
-    v = _evaluate(field, FINITE_TORQUE, buffer)
+    v = evaluate(field, FINITE_TORQUE, buffer)
     return _triple(v, 0), (_triple(v, 3), _triple(v, 6), _triple(v, 9))
 
 
@@ -117,5 +118,5 @@ def _finite_torque_function(field, q, a):
 def _finite_derivative_function(field, q0, q1):
     buffer = _allocate(field)
     buffer[STATE : STATE + 9], buffer[STATE + 9 : N_INPUTS] = q0, q1
-    v = _evaluate(field, FINITE_DERIVATIVE, buffer)
+    v = evaluate(field, FINITE_DERIVATIVE, buffer)
     return v[:9].copy(), v[9:].copy().reshape(9, 9)

@@ -1,6 +1,6 @@
-"""The gradient of a far centre's gravity: V = rate^2/2 u' I u with u = R' e, quadratic in the base vectors.
+"""The gradient of a far centre's gravity: V = 3/2 rate^2 u' I u with u = R' e, quadratic in the base vectors.
 
-V* is therefore the gradient at their mean, with the columns rate^2 (I ubar)_j e, and the torque is rate^2 e x (Rbar I ubar).
+V* is therefore the gradient at their mean, with the columns 3 rate^2 (I ubar)_j e, and the torque 3 rate^2 e x (Rbar I ubar).
 """
 
 from __future__ import annotations
@@ -9,15 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import kernel
+from . import kernel, traced
+from .axial import axial_constants, axial_energy, start_series
 from .fields import body_torque, energy, finite_derivative, finite_torque, halfway, implements, in_body
+from .series import History, outwards
+from .traced import join
 from .vector import add, cross, dot, scale
 
 Triple = tuple[float, float, float]
 
 
 class Gradient(NamedTuple):
-    """Rows of rate^2 I, J, in the axes of the kernel; e, the direction of the centre, in world axes."""
+    """Rows of 3 rate^2 I, J, in the axes of the kernel; e, the direction of the centre, in world axes."""
 
     first: Triple
     second: Triple
@@ -74,3 +77,46 @@ def _finite_derivative_gradient(field, q0, q1):
         for k in range(3):
             dV_star[3 * j : 3 * j + 3, 3 * k : 3 * k + 3] = rows[j][k] * ee
     return V_star, dV_star
+
+
+class GradientSeries:
+    """J^-1 (g x u), u = rate^2 I g: (r, s) of u over J are rows of a matrix each, by which r, s and g itself are multiplied."""
+
+    def __init__(self, emit, *rows):
+        self._emit, self._rows = emit, (rows[:3], rows[3:])
+        self._u = (History(emit), History(emit))
+
+    def accelerate(self, c, n):
+        """Coefficient n of J^-1 T."""
+        emit, (r, s) = self._emit, self._u
+        for u, (by_r, by_s, by_g) in zip(self._u, self._rows, strict=True):
+            u.push(emit.add(emit.add(emit.times(by_g, c.newest[0]), by_r, c[n, 0]), by_s, c[n, 1]))
+        plus = minus = None
+        for i in outwards(n):
+            plus, minus = emit.add(plus, c[n - i, 0], s[i]), emit.add(minus, c[n - i, 1], r[i])
+        return emit.minus(plus, minus)
+
+
+@axial_constants.register(Gradient)
+def _axial_constants_gradient(field, J_inverse):
+    x, y, z = field.first, field.second, field.third
+    i, j, k = J_inverse
+    return (
+        join(i * y[1], j * z[2], k * x[0], 0.0),
+        join(i * y[2], j * z[0], k * x[1], 0.0),
+        join(i * y[0], j * z[1], k * x[2], 0.0),
+        join(i * z[1], j * x[2], k * y[0], 0.0),
+        join(i * z[2], j * x[0], k * y[1], 0.0),
+        join(i * z[0], j * x[1], k * y[2], 0.0),
+    )
+
+
+@axial_energy.register(Gradient)
+def _axial_energy_gradient(field, constants, g):
+    u = (traced.dot(field.first, g), traced.dot(field.second, g), traced.dot(field.third, g))
+    return 0.5 * traced.dot(g, u), u
+
+
+@start_series.register(Gradient)
+def _start_series_gradient(field, constants, g):
+    return GradientSeries, constants

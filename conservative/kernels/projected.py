@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .fields import body_torque, energy, in_body
+from .fields import at_time, body_torque, energy, in_body
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
 from .simd import LANES, four, fuse, join, lane, put, splat, spread
-from .vector import add, cross, dot, product, scale, times
+from .vector import add, cross, dot, product, scale, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -41,24 +41,30 @@ be 0."""
 class Model(NamedTuple):
     """1/J, the field, its axis of symmetry and the scales of energy and momentum; q and L at the start, principal axes.
 
-    `axis` is a world vector of length one, or None; `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative
-    to.
+    `axis` is a world vector of length one, or None; `turn` the angular velocity, rad/s, world axes, of the axes in which the
+    field is fixed, or None where it does not turn; `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative
+    to, the first of them inf where no energy is conserved.
     """
 
     J_inverse: Any
     field: Any
     axis: Any
+    turn: Any
     scales: Any
     q: Any
     L: Any
 
 
 class Coefficients(NamedTuple):
-    """Non-zero coefficients of all stages and of the step: factors (n,), their columns, where each row starts; step h, s."""
+    """Non-zero coefficients of all stages and of the step: factors (n,), their columns, where each row starts; step h, s.
+
+    `nodes` are the times of the stages, in steps.
+    """
 
     weights: Any
     columns: Any
     starts: Any
+    nodes: Any
     h: float
 
 
@@ -93,14 +99,14 @@ def combine(q, L, weights, columns, first, last, slopes):
 
 
 @small
-def take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes):
-    """The state after one step. Of stage i, weights and columns begin at starts[i]; those of the step itself come last."""
+def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slopes):
+    """The state after a step from t, s. Of stage i, weights and columns begin at starts[i]; those of the step come last."""
     q0, L0 = join(q[0], q[1], q[2], q[3]), join(L[0], L[1], L[2], 0.0)
     stages = len(starts) - 2
     for stage in range(stages):
         qs, Ls = combine(q0, L0, weights, columns, starts[stage], starts[stage + 1], slopes)
         q, L = (lane(qs, 0), lane(qs, 1), lane(qs, 2), lane(qs, 3)), (lane(Ls, 0), lane(Ls, 1), lane(Ls, 2))
-        rates(J_inverse, field, q, L, slopes, 2 * LANES * stage)
+        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * LANES * stage)
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
     dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
     q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
@@ -115,71 +121,88 @@ def near_unit(q):
 
 
 @small
-def values(J_inverse, field, axis, q, L):
-    """Energy, J, and momentum about the world vector `axis`, kg m^2/s; without an axis, `None`, the latter is 0."""
+def values(J_inverse, field, axis, turn, q, L):
+    """Energy, J, and momentum about the world vector `axis`, kg m^2/s; without an axis, `None`, the latter is 0.
+
+    Of a field that turns, the Jacobi integral E - turn.l in place of the energy.
+    """
     momentum = 0.0 if axis is None else dot(L, in_body(q, axis))
-    return 0.5 * dot(L, times(J_inverse, L)) + energy(field, q), momentum
+    lacking = 0.0 if turn is None else dot(L, in_body(q, turn))
+    return (0.5 * dot(L, times(J_inverse, L)) + energy(field, q)) - lacking, momentum
 
 
 @small
-def shortest_move(J_inverse, field, axis, size, e, m, q, L):
+def gradient(J_inverse, field, turn, q, L):
+    """(w, T): the gradients of what `values` has in the energy's place are w by L, and -T by a turn of the body.
+
+    Of the Jacobi integral these are the rates relative to the axes that turn, and the torque plus L x turn.
+    """
+    w, T = times(J_inverse, L), body_torque(field, q)
+    if turn is None:
+        return w, T
+    o = in_body(q, turn)
+    return subtract(w, o), add(T, cross(L, o))
+
+
+@small
+def shortest_move(J_inverse, field, axis, turn, size, e, m, q, L):
     """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order.
 
     Gradients are with respect to (L / size, turn): (size w, -T) and (size axis, L x axis). Both are scaled to length one here,
     and regularised by DEPENDENT, so that parallel gradients share the correction.
     """
-    w, T = times(J_inverse, L), body_torque(field, q)
+    w, T = gradient(J_inverse, field, turn, q, L)
     by_energy = 1.0 / math.sqrt(size * size * dot(w, w) + dot(T, T) + TINY)
     if axis is None:
         a = e * by_energy * by_energy
         return scale(a * size * size, w), scale(-a, T)
     v = in_body(q, axis)
-    turn = cross(L, v)
-    by_momentum = 1.0 / math.sqrt(size * size + dot(turn, turn))
-    cosine = (size * size * dot(w, v) - dot(T, turn)) * by_energy * by_momentum
+    across = cross(L, v)
+    by_momentum = 1.0 / math.sqrt(size * size + dot(across, across))
+    cosine = (size * size * dot(w, v) - dot(T, across)) * by_energy * by_momentum
     one = 1.0 + DEPENDENT
     over = 1.0 / (one * one - cosine * cosine)
     a = over * by_energy * (one * (e * by_energy) - cosine * (m * by_momentum))
     b = over * by_momentum * (one * (m * by_momentum) - cosine * (e * by_energy))
-    return scale(size * size, add(scale(a, w), scale(b, v))), add(scale(-a, T), scale(b, turn))
+    return scale(size * size, add(scale(a, w), scale(b, v))), add(scale(-a, T), scale(b, across))
 
 
 @small
-def project(J_inverse, field, axis, kept, scales, q, L):
+def project(J_inverse, field, axis, turn, kept, scales, q, L):
     """Return (q, L, corrections, relative defect left) of a state brought back to the energy and momentum `kept`."""
     q = near_unit(q)
     corrections = 0
     while True:
-        now = values(J_inverse, field, axis, q, L)
-        e, m = kept[0] - now[0], kept[1] - now[1]
+        now = values(J_inverse, field, axis, turn, q, L)
+        e, m = kept[0] - now[0] if scales[0] < math.inf else 0.0, kept[1] - now[1]
         defect = max(abs(e) / scales[0], abs(m) / scales[1])
         if corrections == MOST_CORRECTIONS or not ROUND_OFF < defect < FAR:
             return q, L, corrections, defect
         corrections += 1
-        dL, turn = shortest_move(J_inverse, field, axis, scales[1], e, m, q, L)
+        dL, way = shortest_move(J_inverse, field, axis, turn, scales[1], e, m, q, L)
         L = add(L, dL)
-        q = near_unit(product(q, (1.0, 0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2])))
+        q = near_unit(product(q, (1.0, 0.5 * way[0], 0.5 * way[1], 0.5 * way[2])))
 
 
 @kernel
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
-    J_inverse, field, axis, scales, q, L = model
-    weights, columns, starts, h = coefficients
+    J_inverse, field, axis, turn, scales, q, L = model
+    weights, columns, starts, nodes, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     weights = weights.copy()
     weights[: starts[-2]] *= h
     stages = len(starts) - 2
     slopes = np.empty(2 * LANES * stages)
     q_out[0, :], L_out[0, :] = q, L
-    kept = values(J_inverse, field, axis, q, L)
+    kept = values(J_inverse, field, axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done = 0
     while done < n_steps:
         last = end_of_block(done, n_steps, pause)
         for step in range(done + 1, last + 1):
-            q, L = take_step(h, J_inverse, field, weights, columns, starts, q, L, slopes)
-            q, L, more, defect = project(J_inverse, field, axis, kept, scales, q, L)
+            q, L = take_step(h, (step - 1) * h, J_inverse, field, weights, columns, starts, nodes, q, L, slopes)
+            q, L, more, defect = project(J_inverse, at_time(field, step * h), axis, turn, kept, scales, q, L)
             corrections += more
             if not defect < LEFT:
                 work = (step - 1) * stages

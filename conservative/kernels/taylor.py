@@ -1,25 +1,37 @@
-"""Steps of a Taylor series, each projected back onto the invariants. Uniform gravity.
+"""Steps of a Taylor series, each projected back onto the invariants, in any field that has an axis and a recurrence.
 
-The state is g and a, third and first row of the attitude's matrix, and the rates w, all in principal axes:
+Axes D of the world have the field's axis for their third one; for a free body that is the direction of its momentum. The state
+is g and a, third and first row of the attitude's matrix against D, and the rates w, all in principal axes:
 
-    g' = g x w        a' = a x w        J w' = J w x w + g x m
+    g' = g x w        a' = a x w        J w' = J w x w + T        T = g x dV/dg
 
-where m is the weight times the centre of mass. The coefficients of a step come from `series_llvm`. After the step g and a are
-made orthonormal, and energy and vertical momentum are brought back to their values at the start as in `projected`: by Newton's
-method along their gradients with respect to L and to a turn of the body.
+Where the field turns about an axis at right angles to its own, axes D turn with it about their second one at the rate u: then
+g' has u a more and a' has u g less, and the Jacobi integral E - u b.L, b the second row, takes the place of the energy, without
+the momentum about the axis.
+
+The coefficients of a step come from the field's recurrence (`axial`, `series`). After the step g and a are made orthonormal,
+and energy and momentum about the axis are brought back to their values at the start as in `projected`: by Newton's method along
+their gradients with respect to L and to a turn of the body. A momentum about an axis of symmetry, which the series keeps, is
+left out of these gradients. The momentum of a free body is l g, whatever g, so that w follows from g, and only energy is left
+to be restored. Source: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration (2006), IV.4.
 """
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import Any, NamedTuple
 
-from . import entry, kernel, small
-from .fields import in_body
+from . import COMPILED, entry, kernel, small, vector
+from .axial import axial_constants, axial_energy, start_series
 from .protocol import Result, Workspace, find_ends, loosen
-from .series_llvm import orders
+from .series import FreeSeries, TurningSeries
+from .series_numpy import sum_to_order as sum_to_order_numpy
 from .signals import call_handlers, end_of_block
-from .simd import join, lane
-from .vector import add, cross, dot, scale, subtract, times
+from .traced import Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
+
+if COMPILED:
+    from .series_llvm import sum_to_order as sum_to_order_llvm
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -28,100 +40,224 @@ PAUSE = 2**16
 MOST_CORRECTIONS = 8
 ENOUGH = 2.0**-26
 """Relative defect whose square, which a correction leaves, is round-off."""
+ROUND_OFF = 2.0**-50
+"""Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6
 """Largest relative defect a step may have before projection, and after it."""
-DEPENDENT, TINY = 1e-8, 1e-300
-"""Regularisation: relative, of the gradients' Gram determinant, and added to squares that can be 0."""
+SAFETY, SHORTEST = 0.8, 2.0**-30
+"""Share of the longest part that a tolerance allows, and the shortest part of a step."""
+DEPENDENT, FLAT, TINY = 1e-8, 1e-8, 1e-300
+"""Regularisation: relative, of the gradients' Gram determinant and of squares of gradients, and added to what can be 0."""
 
 
 class Model(NamedTuple):
-    """J, 1/J, moment of the weight, scales of energy and momentum; q and L at the start, all in principal axes.
+    """The body, its field and its start in principal axes.
 
-    `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative to.
+    `J` and `J_inverse` are moments and their inverses, `loose` is 1 for each component of L that a projection may change, else
+    0, `scales` is what errors of energy, J, and momentum, kg m^2/s, are relative to. `left` is the quaternion that turns axes D
+    to the world's, `g` and `a` are third and first row of the matrix against D, `q` and `L` attitude against the world and
+    momentum, all at the start.
     """
 
     J: Any
     J_inverse: Any
-    moment: Any
+    field: Any
+    loose: Any
     scales: Any
+    left: Any
+    g: Any
+    a: Any
     q: Any
     L: Any
 
 
 class Coefficients(NamedTuple):
-    """Order of the series and length of the step, s."""
+    """Order of the series, length of the step, s, and the largest size of the last two terms of its parts, 0 for no parts."""
 
     order: int
     h: float
+    tolerance: float
+
+
+class Free(NamedTuple):
+    """No field; the size of the momentum, kg m^2/s, of which g is the direction."""
+
+    momentum: float
+
+
+@axial_constants.register(Free)
+def _axial_constants_free(field, J_inverse):
+    return J_inverse
+
+
+@axial_energy.register(Free)
+def _axial_energy_free(field, constants, g):
+    return 0.0, (0.0, 0.0, 0.0)
+
+
+@start_series.register(Free)
+def _start_series_free(field, constants, g):
+    return FreeSeries, ()
+
+
+class Revolving(NamedTuple):
+    """A field that turns with axes D about their second one, and the rate, rad/s."""
+
+    field: Any
+    turn: float
+
+
+@axial_constants.register(Revolving)
+def _axial_constants_revolving(field, J_inverse):
+    return axial_constants(field.field, J_inverse)
+
+
+@axial_energy.register(Revolving)
+def _axial_energy_revolving(field, constants, g):
+    return axial_energy(field.field, constants, g)
+
+
+@start_series.register(Revolving)
+def _start_series_revolving(field, constants, g):
+    inner, numbers = start_series(field.field, constants, g)
+    return partial(TurningSeries, inner), (field.turn, *numbers)
+
+
+def values(field, constants, L, n, g, w):
+    """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
+    V, slope = axial_energy(field, constants, g)
+    return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
+
+
+def turning_values(field, constants, L, n, g, upright, w):
+    """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, with g longer by n and a upright."""
+    energy, momentum, slope = values(field, constants, L, n, g, w)
+    o = scale(field.turn * n, cross(g, upright))
+    return energy - dot(L, o), momentum, slope, o
+
+
+@trace
+def begin(model):
+    """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
+    J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
+    constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
+    K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
+    n, upright, _ = straighten(model.g, model.a)
+    if isinstance(field, Revolving):
+        jacobi, momentum, *_ = turning_values(field, constants, times(J, w), n, model.g, upright, w)
+        kept = jacobi, momentum
+    else:
+        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
+    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
+
+
+@trace
+def take_step(field, constants, order, h, K, g, a, w):
+    """The state after one step, not projected, and its last two terms as fours."""
+    first = tuple(join(*v, 0.0) for v in (g, a, w))
+    sum_to_order = sum_to_order_llvm if isinstance(order, Value) else sum_to_order_numpy
+    added, last, before = sum_to_order(*start_series(field, constants, g), order, h, first, K)
+    return tuple(split(v + d) for v, d in zip(first, added, strict=True)), last, before
+
+
+@trace
+def sizes(scales, last, before):
+    """The sizes of two terms: of rows of a rotation, and of rates in units of what all energy makes of the largest moment."""
+    over = 0.5 * scales[1] * scales[2]
+    return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (map(split, last), map(split, before)))
 
 
 @small
-def constants(J, J_inverse, moment):
-    """K, M1 and M2 of `orders`."""
-    i, m = J_inverse, moment
-    K = join((J[1] - J[2]) * i[0], (J[2] - J[0]) * i[1], (J[0] - J[1]) * i[2], 0.0)
-    return K, join(i[0] * m[1], i[1] * m[2], i[2] * m[0], 0.0), join(i[0] * m[2], i[1] * m[0], i[2] * m[1], 0.0)
+def stretch(tolerance, order, large):
+    """By which factor a step may be longer, by the sizes of its last two terms."""
+    last, before = large[0] + TINY, large[1] + TINY
+    return min((tolerance / last) ** (1.0 / order), (tolerance / before) ** (1.0 / (order - 1)))
 
 
-@small
-def split(v):
-    """The first three lanes."""
-    return (lane(v, 0), lane(v, 1), lane(v, 2))
+def significant(x, scale):
+    """x, less in size by what counts as round-off of that scale: a continuous function, which amplifies no noise."""
+    least = ROUND_OFF * scale
+    return where_above(x - least, least, x) + where_above(x + least, least, -x)
 
 
-@small
-def shortest_move(w, L, moment, size, e, m, g):
-    """Return (dL, turn of the body) that changes energy by e and vertical momentum by m, to first order, and moves least.
+def straighten(g, a):
+    """Return 1/|g|, the vector a of length one and at right angles to g, both to first order, and by how much they were not."""
+    n, m, c = 0.5 - 0.5 * dot(g, g), 0.5 - 0.5 * dot(a, a), dot(a, g)
+    return 1.0 + n, subtract(scale(1.0 + m, a), scale(c, g)), abs(n) + abs(m) + abs(c)
 
-    Gradients are with respect to (L / size, turn): (size w, -T) and (size g, L x g), with the torque T.
+
+def shortest_move(loose, scales, w, L, T, e, m, g):
+    """Return (dL, turn of the body) that changes energy by e and momentum about the axis by m, to first order, and moves least.
+
+    Gradients are with respect to (L / size, turn): (size w, -T) and (size g, L x g) with the torque T.
     """
-    T, turn, square = cross(g, moment), cross(L, g), size * size
-    ee = square * dot(w, w) + dot(T, T) + TINY
-    mm = square + dot(turn, turn)
+    turn, square = cross(L, g), scales[1] * scales[1]
+    w, g = times(loose, w), times(loose, g)
+    ee = square * dot(w, w) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY
+    mm = square * dot(g, g) + dot(turn, turn) + FLAT * square
     em = square * dot(w, g) - dot(T, turn)
     over = 1.0 / ((1.0 + DEPENDENT) * (ee * mm) - em * em)
     x, y = over * (mm * e - em * m), over * (ee * m - em * e)
     return scale(square, add(scale(x, w), scale(y, g))), add(scale(-x, T), scale(y, turn))
 
 
-@small
-def values(J, moment, g, w):
-    """Energy, J, and vertical momentum, kg m^2/s."""
-    L = times(J, w)
-    return 0.5 * dot(L, w) + dot(moment, g), dot(L, g)
-
-
-@small
-def correct(J, J_inverse, moment, kept, scales, g, a, w):
-    """Return (g, a, w, relative defect before) of a state brought closer to orthonormality and to what is `kept`.
+def correct_in_field(field, constants, body, kept, scales, g, a, w):
+    """`correct` where a field acts.
 
     The inverse length of g is two terms of its series (`projected.near_unit`), and energy and momentum are taken with g that
-    long, so that no product waits for another. What is left is of the size of the defect's square.
+    long to first order, so that no product waits for another. What is left is of the size of the defect's square.
     """
-    L, n = times(J, w), 1.5 - 0.5 * dot(g, g)
-    e = kept[0] - (0.5 * dot(L, w) + n * dot(moment, g))
-    m = kept[1] - n * dot(L, g)
-    dL, turn = shortest_move(w, L, moment, scales[1], e, m, g)
-    upright = subtract(scale(1.5 - 0.5 * dot(a, a), a), scale(dot(a, g), g))
+    J, J_inverse, loose = body
+    L, (n, upright, off) = times(J, w), straighten(g, a)
+    energy, momentum, slope = values(field, constants, L, n, g, w)
+    e, m = kept[0] - energy, kept[1] - momentum
+    wanted = significant(e, scales[0]), significant(m, scales[1])
+    dL, turn = shortest_move(loose, scales, w, L, cross(g, slope), *wanted, g)
     g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
-    return g, a, add(w, times(J_inverse, dL)), max(abs(e) * scales[2], abs(m) * scales[3])
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + abs(m) * scales[3] + off
 
 
-@small
-def project(J, J_inverse, moment, kept, scales, g, a, w):
-    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
-    corrections = 0
-    while True:
-        g, a, w, defect = correct(J, J_inverse, moment, kept, scales, g, a, w)
-        corrections += 1
-        if corrections == MOST_CORRECTIONS or not ENOUGH < defect < FAR:
-            return g, a, w, corrections, defect * defect
+def correct_free(field, constants, body, kept, scales, g, a):
+    """`correct` of a free body: the momentum is along g, so that w follows from g, and energy is brought back by turning g."""
+    J_inverse, (n, upright, off) = body[1], straighten(g, a)
+    L = scale(n * field.momentum, g)
+    e, slope = kept[0] - 0.5 * dot(L, times(J_inverse, L)), cross(times(J_inverse, L), L)
+    turn = scale(significant(e, scales[0]) / (dot(slope, slope) + FLAT * (scales[0] * scales[0]) + TINY), slope)
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, times(J_inverse, scale(field.momentum, g)), abs(e) * scales[2] + off
+
+
+def correct_revolving(field, constants, body, kept, scales, g, a, w):
+    """`correct` where the field turns: the Jacobi integral's gradients are the rates less those of D, and -(T + L x these)."""
+    J, J_inverse, _ = body
+    L, (n, upright, off) = times(J, w), straighten(g, a)
+    jacobi, _, slope, o = turning_values(field, constants, L, n, g, upright, w)
+    e = kept[0] - jacobi
+    v, T = subtract(w, o), add(cross(g, slope), cross(L, o))
+    square = scales[1] * scales[1]
+    x = significant(e, scales[0]) / (square * dot(v, v) + dot(T, T) + FLAT * (scales[0] * scales[0]) + TINY)
+    dL, turn = scale(x * square, v), scale(-x, T)
+    g, a = add(scale(n, g), cross(g, turn)), add(upright, cross(a, turn))
+    return g, a, add(w, times(J_inverse, dL)), abs(e) * scales[2] + off
+
+
+@trace
+def correct(field, constants, body, kept, scales, g, a, w):
+    """Return (g, a, w, relative defect before) of a state brought closer to orthonormality and to what is `kept`.
+
+    `body` is (J, J_inverse, loose) of `Model`.
+    """
+    if isinstance(field, Free):
+        return correct_free(field, constants, body, kept, scales, g, a)
+    if isinstance(field, Revolving):
+        return correct_revolving(field, constants, body, kept, scales, g, a, w)
+    return correct_in_field(field, constants, body, kept, scales, g, a, w)
 
 
 @small
 def quaternion(g, a):
     """The quaternion, of any length, of the matrix with third row g and first row a."""
-    b = cross(g, a)
+    b = vector.cross(g, a)
     trace = a[0] + b[1] + g[2]
     if trace > 0.0:
         return (1.0 + trace, g[1] - b[2], a[2] - g[0], b[0] - a[1])
@@ -139,39 +275,60 @@ def record(q_out, L_out, row, q, L):
     L_out[row, 0], L_out[row, 1], L_out[row, 2] = L[0], L[1], L[2]
 
 
-@kernel
+@partial(kernel, inline="always")
+def project(field, constants, body, kept, scales, g, a, w):
+    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
+    corrections = 0
+    defect = 1.0
+    while corrections == 0 or (corrections < MOST_CORRECTIONS and ENOUGH < defect < FAR):
+        g, a, w, defect = correct(field, constants, body, kept, scales, g, a, w)
+        corrections += 1
+    return g, a, w, corrections, defect * defect
+
+
+@partial(kernel, inline="always")
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
-    J, J_inverse, moment, scales, q, L = model
-    order, h = coefficients
+    field, left, g, a = model.field, model.left, model.g, model.a
+    order, h, tolerance = coefficients
     n_steps, every, pause, q_out, L_out = workspace
-    K, M1, M2 = constants(J, J_inverse, moment)
-    scales = (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
-    record(q_out, L_out, 0, q, L)
-    g, a, w = in_body(q, (0.0, 0.0, 1.0)), in_body(q, (1.0, 0.0, 0.0)), times(J_inverse, L)
-    kept = values(J, moment, g, w)
+    constants, K, w, kept, scales = begin(model)
+    body = (model.J, model.J_inverse, model.loose)
+    record(q_out, L_out, 0, model.q, model.L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
-    done = 0
-    while done < n_steps:
+    done, parts, computed, part = 0, 0, 0, h
+    while done < n_steps and defect < LEFT:
         last = end_of_block(done, n_steps, pause)
-        for step in range(done + 1, last + 1):
-            g4, a4, w4 = join(g[0], g[1], g[2], 0.0), join(a[0], a[1], a[2], 0.0), join(w[0], w[1], w[2], 0.0)
-            dg, da, dw = orders(order, h, g4, a4, w4, K, M1, M2)
-            g, a, w = split(g4 + dg), split(a4 + da), split(w4 + dw)
-            g, a, w, more, defect = project(J, J_inverse, moment, kept, scales, g, a, w)
-            corrections += more
+        while done < last:
+            left_over, taken = h, 0
+            while left_over > 0.0 and defect < LEFT:
+                (g1, a1, w1), last_term, before = take_step(field, constants, order, part, K, g, a, w)
+                computed += 1
+                if tolerance > 0.0:
+                    factor = stretch(tolerance, order, sizes(scales, last_term, before))
+                    if not factor >= 1.0 and part > SHORTEST * h:
+                        part = part * (SAFETY * factor if factor > 0.1 else 0.1)
+                        continue
+                    longest = SAFETY * factor * part
+                left_over -= part
+                taken += 1
+                g, a, w, more, defect = project(field, constants, body, kept, scales, g1, a1, w1)
+                corrections += more
+                if tolerance > 0.0:
+                    rest = left_over if left_over > 0.0 else h
+                    part = rest / math.ceil(rest / longest) if longest < rest else rest
             if not defect < LEFT:
-                work = (step - 1) * order
-                return Result(step - 1, work, corrections, work, defect, False)
+                break
+            done += 1
+            parts += taken
             until_sample -= 1
-            if until_sample == 0 or step == n_steps:
+            if until_sample == 0 or done == n_steps:
                 until_sample = every
                 row += 1
-                record(q_out, L_out, row, quaternion(g, a), times(J, w))
-        done = last
+                record(q_out, L_out, row, vector.product(left, quaternion(g, a)), vector.times(model.J, w))
         if done < n_steps:
             call_handlers()
-    return Result(n_steps, n_steps * order, corrections, n_steps * order, defect, False)
+    return Result(done, parts * order, corrections, computed * order, defect, False)
 
 
 MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)

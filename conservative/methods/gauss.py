@@ -35,8 +35,14 @@ class Gauss(Method):
     IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
     the implicit midpoint rule.
 
-    Steps of a radian and more are solved on the branch that leads to them continuously from a step of 0; where that ends
-    before, the run fails: `WrongBranch` if there is a solution elsewhere, else `NotConverged`.
+    It is the better-behaved method in long runs, not the cheaper one: being symmetric in time, its error in the attitude of a
+    regular motion grows in proportion to the time at first, where that of `Taylor` and `Projected`, which are not, grows as
+    its square. Of runs with the same error after 250 s, its error after 10^6 steps is 7 to 30 times smaller than theirs; to
+    reach an error, `Taylor` with a shorter step needs 0.6 to 0.8 of its time even there. The equations are therefore solved to
+    round-off, and the projection takes nothing but round-off off the invariants: what looser stages leave is not symmetric.
+
+    A step of some radians, for which the iteration does not converge, fails at once, as `NotConverged`. Where it converges, it
+    is to the solution that a step of 0 leads to continuously.
 
     Parameters
     ----------
@@ -56,7 +62,7 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit")
+    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit", longest=1.5)
     claims: ClassVar[Claims] = Claims(README)
     colour: ClassVar[str] = "indigo"
     kernel: ClassVar[str] = "gauss"
@@ -80,7 +86,7 @@ class Gauss(Method):
 
     @property
     def cost(self) -> Cost:
-        return Cost(step=50.0, correction=12.0 * self.stages)
+        return Cost(step=90.0, correction=6.5 * self.stages, corrections=12.0)
 
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
@@ -141,6 +147,7 @@ def closed_system(start: PrincipalStart) -> Any:
         unit,
         triple(unit * np.array(start.J_inverse)),
         triple(moment / unit),
+        (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # momentum about the axis of symmetry is kept as it is
         triple(L / unit),
         triple(R_WP[2] if falls else L / size),
         quadruple(R_WV.T @ R_WP),

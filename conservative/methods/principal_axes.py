@@ -7,6 +7,7 @@ definitions.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +16,9 @@ import numpy as np
 from ..attitude import Array, axes_about, to_quaternion, triple
 from ..attitude import Triple as Triple
 from ..errors import BadInput
+from ..invariants import jacobi_scale
+from ..potentials.potential import depends_on_time
+from ..potentials.turning import Turning
 from ..scene import Scene
 from .non_spinning import Resolved
 
@@ -81,3 +85,21 @@ def quadruple(R: Array) -> Quadruple:
     """Return the quaternion of a rotation (3, 3) as the tuple of floats that kernels take."""
     w, x, y, z = to_quaternion(R).tolist()
     return w, x, y, z
+
+
+def field_axis(scene: Scene) -> Triple | None:
+    """Return the axis about which the field is symmetric, three floats in world axes, or None."""
+    axis = None if scene.potential is None else scene.potential.axis_W
+    return None if axis is None else triple(axis / np.linalg.norm(axis))
+
+
+def invariant_scales(scene: Scene) -> tuple[float, float]:
+    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes.
+
+    The first is inf where neither energy nor Jacobi integral is conserved.
+    """
+    energy, potential = scene.energy_scale, scene.potential
+    momentum = math.sqrt(2 * energy * float(scene.body.moments.max()))
+    if isinstance(potential, Turning):
+        return jacobi_scale(scene.body, potential, energy), momentum
+    return math.inf if depends_on_time(potential) else energy, momentum

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,12 +10,14 @@ import numpy as np
 from ..attitude import Triple, triple
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
+from ..invariants import JACOBI_INTEGRAL
 from ..method import Grid, Method, Role, Run
+from ..potentials.turning import Turning
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .coefficients.explicit import DORMAND_PRINCE_8
-from .principal_axes import PrincipalStart, principal_start
+from .principal_axes import PrincipalStart, field_axis, invariant_scales, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
@@ -32,14 +33,18 @@ class Projected(Method):
     Near a steady precession, where energy and momentum depend on each other, what a step loses of them is put back to the
     square of its error only.
 
+    Fields may depend on the time. In one that turns the Jacobi integral takes the place of the energy; in one that is given as
+    functions of attitude and time nothing does, and no energy is put back.
+
     Free bodies have `MoserVeselov`, which has no truncation error at all.
     """
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(2)
+    candidacy: ClassVar[Candidacy] = Candidacy(2, "explicit")
     colour: ClassVar[str] = "teal"
     kernel: ClassVar[str] = "projected"
+    time_dependent: ClassVar[bool] = True
 
     @property
     def order(self) -> int:
@@ -47,7 +52,7 @@ class Projected(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        return frozenset({"energy", "vertical momentum", "momentum along the field's axis"})
+        return frozenset({"energy", JACOBI_INTEGRAL, "vertical momentum", "momentum along the field's axis"})
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid)
@@ -62,25 +67,19 @@ class Projected(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         kernel, (label, start, model) = kernels("projected"), scene.derive(convert, self)
-        coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, grid.dt)
+        coefficients = kernel.Coefficients(*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c), grid.dt)
         return prepare_run(scene, grid, label, start, kernel, model, coefficients)
 
 
 def convert(scene: Scene, method: Projected) -> tuple[str, PrincipalStart, Any]:
     """Return the label of a run, its start in principal axes and the kernel's model of it."""
     start = principal_start(scene)
-    model = kernels("projected").Model(
-        start.J_inverse, start.field, field_axis(scene), invariant_scales(scene), start.q, start.L
-    )
+    axis, turn, scales = field_axis(scene), field_turn(scene), invariant_scales(scene)
+    model = kernels("projected").Model(start.J_inverse, start.field, axis, turn, scales, start.q, start.L)
     return method.label, start, model
 
 
-def field_axis(scene: Scene) -> Triple | None:
-    """Return the axis about which the field is symmetric, three floats in world axes, or None."""
-    axis = None if scene.potential is None else scene.potential.axis_W
-    return None if axis is None else triple(axis / np.linalg.norm(axis))
-
-
-def invariant_scales(scene: Scene) -> tuple[float, float]:
-    """Return what errors of energy, J, and momentum, kg m^2/s, are relative to: the latter is what all that energy makes."""
-    return scene.energy_scale, math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
+def field_turn(scene: Scene) -> Triple | None:
+    """Return the angular velocity of the axes that the field is fixed in, three floats in rad/s, world axes, or None."""
+    potential = scene.potential
+    return triple(potential.orbit.rate * potential.orbit.normal_W) if isinstance(potential, Turning) else None

@@ -88,7 +88,7 @@ class Reduced(Method):
 
     @property
     def cost(self) -> Cost:
-        return Cost(step=10.0, correction=50.0)
+        return Cost(step=10.0, correction=50.0, corrections=len(composition_of(self.order, self.composition).lengths(1.0)))
 
     def unsupported(self, scene: Scene) -> str | None:
         return frame_unsupported(self.frame, scene)

@@ -40,6 +40,7 @@ class Substepped(Method):
 
     family: ClassVar[str] = "substepped"
     role: ClassVar[Role] = Role.OURS
+    time_dependent: ClassVar[bool] = True  # `unsupported` asks the other method
 
     def __post_init__(self) -> None:
         positive_integer("most", self.most)

@@ -15,11 +15,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..body import RigidBody
 from ..check import build_unchecked, read_only
 from ..method import Grid, Method, Run
+from ..potentials.potential import depends_on_time
+from ..potentials.turning import static_part
 from ..scene import Scene
 from ..trajectory import Trajectory
 
@@ -41,7 +43,7 @@ class Units:
 
     def convert(self, scene: Scene) -> Scene:
         """Return the scene in these units. Its numbers may be outside the range that constructors allow."""
-        potential, energy = scene.potential, self.moment / self.time / self.time
+        energy = self.moment / self.time / self.time
         return build_unchecked(
             Scene,
             name=scene.name,
@@ -49,7 +51,7 @@ class Units:
             R_WB0=scene.R_WB0,
             w_WB_B0=read_only(scene.w_WB_B0 * self.time),
             t_end=scene.t_end / self.time,
-            potential=potential and potential.in_units(energy),  # type: ignore[attr-defined]  # `find_units` has looked
+            potential=_convert_potential(scene.potential, energy, self.time),
             dt=scene.dt / self.time,
         )
 
@@ -63,15 +65,27 @@ class Units:
 SI = Units(1.0, 1.0)
 
 
+def _convert_potential(potential: Any, energy: float, time: float) -> Any:
+    """Return a potential or None, for which `find_units` has looked, in units of J and s."""
+    if potential is None:
+        return None
+    return potential.in_units(energy, time) if depends_on_time(potential) else potential.in_units(energy)
+
+
 def find_units(scene: Scene, dt: float) -> Units:
     """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not far below."""
-    if scene.potential is not None and not hasattr(scene.potential, "in_units"):
+    if not _has_units(scene.potential):
         return SI
     moment, rate = scene.derive(find_exponents)
     step = math.frexp(dt)[1]
     time = step if rate is None else min(-rate, step - SHORTEST)
     moment, time = (COARSE * int(exponent / COARSE) for exponent in (moment, time))
     return Units(2.0**moment, 2.0**time) if moment or time else SI
+
+
+def _has_units(potential: Any) -> bool:
+    """Return whether a potential or None, and the one that turns with it, can be converted to other units."""
+    return potential is None or (hasattr(potential, "in_units") and hasattr(static_part(potential), "in_units"))
 
 
 def find_exponents(scene: Scene) -> tuple[int, int | None]:

@@ -11,11 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import build_unchecked, finite_array, positive_number, power_of_two, read_only
-from ..errors import BadInput
-
-_UNIT = 4 * np.finfo(float).eps
-"""A direction whose length is 1 to this stays as it is, so that dividing by the length once more changes nothing."""
+from ..check import build_unchecked, positive_number, power_of_two
+from .direction import unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +24,16 @@ class _Fields:
 
 @dataclass(frozen=True, eq=False, init=False)
 class GravityGradient(_Fields):
-    """The gradient of a far centre's gravity on a body turning about its centre of mass: V = rate^2/2 u'J u, u = R' e.
+    """The gradient of a far centre's gravity on a body turning about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
 
-    The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is rate^2
-    u x J u, body axes. e points to the centre and stays where it is in the world. V is quadratic in the base vectors, so its
-    finite derivative is its gradient at their mean.
+    The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is 3
+    rate^2 u x J u, body axes. e points to the centre and stays where it is in the world: a satellite, whose centre does not,
+    has `Orbit.gravity_gradient`. V is quadratic in the base vectors, so its finite derivative is its gradient at their mean.
 
     Parameters
     ----------
     rate
-        sqrt(3 G M / r^3), 1/s, above 0: sqrt(3) times the rate of a circular orbit at that distance r.
+        sqrt(G M / r^3), rad/s, above 0: the rate of a circular orbit at that distance r.
     inertia
         That of the body: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
     direction_W
@@ -49,18 +46,16 @@ class GravityGradient(_Fields):
     """
 
     def __init__(self, rate: float, inertia: ArrayLike, direction_W: ArrayLike = (0, 0, 1)) -> None:
-        allowed = "three finite numbers (3,), not all 0"
-        direction = finite_array("direction_W", direction_W, ((3,),), allowed)
-        size = np.linalg.norm(direction)
-        if size == 0:
-            raise BadInput("direction_W", direction.tolist(), allowed)
-        if abs(size - 1) > _UNIT:
-            direction = read_only(direction / size)
         super().__init__(
-            positive_number("rate", rate, "a finite rate above 0, 1/s"),
+            positive_number("rate", rate, "a finite rate above 0, rad/s"),
             RigidBody(inertia).inertia,
-            direction,
+            unit_vector("direction_W", direction_W),
         )
+
+    @property
+    def factor(self) -> float:
+        """Return 3 rate^2, 1/s^2: what u x J u is multiplied by."""
+        return 3 * self.rate**2
 
     def _towards(self, R_WB: Array) -> Array:
         """Return u = R' e, (..., 3)."""
@@ -69,11 +64,11 @@ class GravityGradient(_Fields):
     def energy(self, R_WB: Array) -> Array:
         """Return V, (...), in J."""
         u = self._towards(R_WB)
-        return self.rate**2 / 2 * np.sum(u @ self.inertia * u, axis=-1)
+        return self.factor / 2 * np.sum(u @ self.inertia * u, axis=-1)
 
     def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR = rate^2 e (J u)', (..., 3, 3), in J."""
-        return self.rate**2 * self.direction_W[:, None] * (self._towards(R_WB) @ self.inertia)[..., None, :]
+        """Return dV/dR = 3 rate^2 e (J u)', (..., 3, 3), in J."""
+        return self.factor * self.direction_W[:, None] * (self._towards(R_WB) @ self.inertia)[..., None, :]
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return V*, (..., 3, 3), in J: the gradient at the mean, exact for a quadratic V."""
@@ -81,7 +76,7 @@ class GravityGradient(_Fields):
 
     def scale(self) -> float:
         """Return the largest V, J."""
-        return self.rate**2 / 2 * float(np.linalg.eigvalsh(self.inertia)[-1])
+        return self.factor / 2 * float(np.linalg.eigvalsh(self.inertia)[-1])
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
@@ -96,8 +91,8 @@ class GravityGradient(_Fields):
         return self.direction_W
 
     def kernel_field(self, R_BP: Array) -> Any:
-        """Return rate^2 J in principal axes, row by row, and the direction as the kernels want them."""
+        """Return 3 rate^2 J in principal axes, row by row, and the direction as the kernels want them."""
         from ..kernels.gradient_field import Gradient
 
-        first, second, third = self.rate**2 * (R_BP.T @ self.inertia @ R_BP)
+        first, second, third = self.factor * (R_BP.T @ self.inertia @ R_BP)
         return Gradient(triple(first), triple(second), triple(third), triple(self.direction_W))

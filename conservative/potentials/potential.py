@@ -52,7 +52,55 @@ class Potential(Protocol):
         """Return the parameters for the compiled kernels in principal axes (see `conservative.kernels.fields`)."""
 
 
-def torque_W(potential: Potential, R_WB: Array) -> Array:
-    """Return the torque (..., 3) about the fixed point, N m, world axes, at attitudes (..., 3, 3), body to world."""
-    gradient = potential.gradient(R_WB)
+@runtime_checkable
+class PotentialInTime(Protocol):
+    """What a potential offers whose energy depends on the time as well: `Turning`, and functions that say so.
+
+    Energy is then not conserved. It has no `energy` and `gradient` of the attitude alone, so that nobody takes it for a field
+    that stays as it is; methods that take it say so (`conservative.Method.time_dependent`). `scale` and `kernel_field` are
+    those of `Potential`. It may have `in_units(energy, time)`, with a unit of time, s, a power of two as well.
+    """
+
+    @property
+    def time_dependent(self) -> bool:
+        """Return True."""
+
+    def energy_at(self, R_WB: Array, t: Array) -> Array:
+        """Return V, (...), in J at attitudes (..., 3, 3) and times (...), s."""
+
+    def gradient_at(self, R_WB: Array, t: Array) -> Array:
+        """Return dV/dR, (..., 3, 3), in J at matrices (..., 3, 3) and times (...), s."""
+
+    def scale(self) -> float:
+        """Return a size of V in J that is above 0."""
+
+    @property
+    def axis_W(self) -> Array | None:
+        """Return the unit vector (3,), world axes, about which the field is symmetric at all times; None without one."""
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return the parameters for the compiled kernels in principal axes, which R_BP (3, 3) takes to the body's."""
+
+
+AnyPotential = Potential | PotentialInTime
+
+
+def depends_on_time(potential: object) -> bool:
+    """Return whether the energy of a potential, or of None, depends on the time as well as on the attitude."""
+    return bool(getattr(potential, "time_dependent", False))
+
+
+def energy_at(potential: AnyPotential, R_WB: Array, t: Array) -> Array:
+    """Return V, (...), in J of any potential at attitudes (..., 3, 3) and times (...), s."""
+    of_any_kind: Any = potential
+    return of_any_kind.energy_at(R_WB, t) if depends_on_time(potential) else of_any_kind.energy(R_WB)
+
+
+def torque_W(potential: AnyPotential, R_WB: Array, t: Array | None = None) -> Array:
+    """Return the torque (..., 3) about the fixed point, N m, world axes.
+
+    Attitudes (..., 3, 3) are body to world, times (...) in s, of a potential that depends on the time.
+    """
+    of_any_kind: Any = potential
+    gradient = of_any_kind.gradient_at(R_WB, t) if depends_on_time(potential) else of_any_kind.gradient(R_WB)
     return -np.sum(np.cross(R_WB, gradient, axisa=-2, axisb=-2, axisc=-2), axis=-1)

@@ -21,13 +21,14 @@ from ..deferred_imports import BODY_FILES, list_entries, load_body_reader
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction
-from ..potentials.potential import Potential
+from ..potentials.potential import AnyPotential, Potential
+from ..potentials.turning import Orbit, Turning
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
 from .toml_reader import Table, keys_of, read
 
-_TOP = ("name", "t_end", "dt", "body", "potential", "start")
+_TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "start")
 # The keys of a potential or a shape are the parameters of what builds it, so there is no second list to keep.
 _POTENTIALS: dict[str, Callable[..., Potential]] = {
     "uniform_gravity": UniformGravity,
@@ -76,7 +77,7 @@ def load(path: str | Path) -> Scene:
     top.only(_TOP)
     t_end = top.value("t_end", "a finite duration above 0, s")
     body, mass = _body(top.table("body", "inertia, a shape or another file; see `conservative new`"))
-    potential = _potential(top.table("potential", "kind and what it takes"), body, mass) if "potential" in top else None
+    potential = _field(top, body, mass)
     R_WB0, w_WB_B0 = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
     dt = top.value("dt", "a finite step above 0, s") if "dt" in top else None
@@ -115,6 +116,29 @@ def _from_file(table: Table, kind: str) -> MassDistribution:
     name = table.text("name", f"the name of the body in {path}")
     with table.blame(path=kind):
         return load_body_reader(kind)(path, name)
+
+
+def _field(top: Table, body: RigidBody, mass: MassDistribution | None) -> AnyPotential | None:
+    """Return the potential, turned with the orbit if there is one."""
+    if "potential" not in top:
+        if "orbit" in top:
+            raise top.bad("orbit", "an orbit without a potential that turns with it", "a table potential beside it")
+        return None
+    table = top.table("potential", "kind and what it takes")
+    if "orbit" not in top:
+        return _potential(table, body, mass)
+    orbit = _orbit(top.table("orbit", "rate, rad/s, and normal_W"))
+    if table.choice("kind", _POTENTIALS) == "gravity_gradient":
+        if "rate" in table:
+            raise table.bad("rate", "a rate beside an orbit", "none, as a gravity gradient has the rate of the orbit")
+        table.only(("kind", "direction_W"))
+        return table.call(orbit.gravity_gradient, inertia=body.inertia)
+    return Turning(_potential(table, body, mass), orbit)
+
+
+def _orbit(table: Table) -> Orbit:
+    table.only(keys_of(Orbit))
+    return table.call(Orbit)
 
 
 def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:

@@ -20,6 +20,11 @@ from .other_fields import sprung_body as sprung_body
 from .pendulums import hanging_rest as hanging_rest
 from .pendulums import inverted_rest as inverted_rest
 from .pendulums import pendulum_over_top as pendulum_over_top
+from .random_body import random_body as random_body
+from .satellites import librating_satellite as librating_satellite
+from .satellites import stable_satellite as stable_satellite
+from .satellites import tumbling_satellite as tumbling_satellite
+from .satellites import unstable_satellite as unstable_satellite
 from .separatrix import degenerate_separatrix as degenerate_separatrix
 from .separatrix import near_separatrix as near_separatrix
 from .separatrix import separatrix as separatrix

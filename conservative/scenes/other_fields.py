@@ -6,6 +6,8 @@ off-diagonal terms and no point lies on a coordinate axis.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..attitude import rotation_about
@@ -23,7 +25,7 @@ DEFAULT_ANCHOR = (0.4, 0.5, -0.6)
 DEFAULT_STIFFNESS = 8.0
 DEFAULT_REST_LENGTH = 0.3
 DEFAULT_STRENGTH = 1.5
-DEFAULT_RATE = 1.7
+DEFAULT_RATE = 1.7 / math.sqrt(3)
 DEFAULT_CENTRE = (0.2, -0.3, -1.0)
 DEFAULT_T_END = 10.0
 DEFAULT_DT = 0.02
@@ -55,7 +57,7 @@ def attracted_body(strength: float = DEFAULT_STRENGTH, t_end: float = DEFAULT_T_
 
 
 def gravity_gradient_body(rate: float = DEFAULT_RATE, t_end: float = DEFAULT_T_END) -> Scene:
-    """Return the body librating in the gradient of a far centre's gravity, rate = sqrt(3 G M / r^3), 1/s.
+    """Return the body librating in the gradient of a far centre's gravity, rate = sqrt(G M / r^3), rad/s.
 
     Raises
     ------

@@ -12,6 +12,7 @@ from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.units import in_own_units
+from conservative.potentials.turning import static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -63,6 +64,7 @@ class Heyoka(Method):
     role: ClassVar[Role] = Role.ENGINE
     colour: ClassVar[str] = "green"
     module: ClassVar[str] = "heyoka"
+    time_dependent: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         allowed = f"a number above 0, from {SMALLEST_TOL:g}, and below 1"
@@ -80,8 +82,9 @@ class Heyoka(Method):
         return None
 
     def unsupported(self, scene: Scene) -> str | None:
-        if scene.potential is not None and type(scene.potential) not in accelerations.READERS:
-            kind, table = type(scene.potential).__name__, f"{accelerations.__name__}.READERS"
+        potential = static_part(scene.potential)
+        if potential is not None and type(potential) not in accelerations.READERS:
+            kind, table = type(potential).__name__, f"{accelerations.__name__}.READERS"
             return f"no heyoka expressions for {kind}; add them to {table}"
         if self.frame == "non_spinning" and symmetric_axes(scene) is None:
             return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"

@@ -13,7 +13,8 @@ from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.units import in_own_units
-from conservative.potentials.potential import Potential, torque_W
+from conservative.potentials.potential import AnyPotential, torque_W
+from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -25,8 +26,8 @@ INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to this, with a warning
 
 Derivative = Callable[[float, Array], list[float]]
-Acceleration = Callable[[float, float, float, float], Sequence[float]]
-"""Takes the quaternion to what the field adds to the rates' derivatives, rad/s^2, axes F."""
+Acceleration = Callable[[float, float, float, float, float], Sequence[float]]
+"""Takes time and quaternion to what the field adds to the rates' derivatives, rad/s^2, axes F."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ class SciPy(Method):
     role: ClassVar[Role] = Role.ENGINE
     colour: ClassVar[str] = "orange"
     module: ClassVar[str] = "scipy.integrate"
+    time_dependent: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -75,8 +77,8 @@ class SciPy(Method):
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         integrate = load("scipy.integrate", "scipy", "SciPy")
-        axes, R_WD, acceleration = _express(scene)
-        derivative = _derivative(axes, acceleration)
+        axes, R_WD, acceleration, turn_D = _express(scene)
+        derivative = _derivative(axes, acceleration, turn_D)
         start = np.concatenate([to_quaternion(R_WD.T @ axes.R_WF0), axes.w0])
         atol = self.rtol * np.repeat([1.0, _rate_scale(axes)], [4, 3])
         span = (0.0, float(grid.t[-1]))
@@ -96,7 +98,10 @@ class SciPy(Method):
             return finish(y.T, Counters(solver.steps, evaluations=int(found.nfev)), found.message)
 
         def finish(y: Array, work: Counters, *reason: str) -> Trajectory:
-            return axes.trajectory(grid, self.label, R_WD @ from_quaternion(y[:, :4]), y[:, 4:], work, *reason)
+            R_WF = R_WD @ from_quaternion(y[:, :4])
+            if turn_D is not None and isinstance(scene.potential, Turning):
+                R_WF = scene.potential.orbit.R_WO(grid.t[: len(y)]) @ R_WF
+            return axes.trajectory(grid, self.label, R_WF, y[:, 4:], work, *reason)
 
         return run
 
@@ -129,21 +134,24 @@ def _rate_scale(axes: Axes) -> float:
     return float(np.sqrt(2 * axes.scene.energy_scale / axes.J.max()))
 
 
-def _express(scene: Scene) -> tuple[Axes, Array, Acceleration | None]:
-    """Return principal axes F, world axes D (3, 3) with the field's as the third, and the field as a function of F in D."""
+def _express(scene: Scene) -> tuple[Axes, Array, Acceleration | None, Array | None]:
+    """Return principal axes F, axes D (3, 3) with the field's as the third, the field as a function of F in D, rates of D.
+
+    The last, (3,), rad/s, in D, is None where D does not turn.
+    """
     axes, potential = principal_axes(scene), scene.potential
     if potential is None:
-        return axes, np.eye(3), None
+        return axes, np.eye(3), None, None
     if isinstance(potential, UniformGravity):
-        return axes, np.eye(3), _uniform(axes)
-    if type(potential) in READERS:
+        return axes, np.eye(3), _uniform(axes), None
+    if type(static_part(potential)) in READERS:
         field = express_field(scene)
-        return field.axes, field.R_WD, _written_out(field)
-    return axes, np.eye(3), _general(potential, axes)
+        return field.axes, field.R_WD, _written_out(field), field.turn_D if isinstance(potential, Turning) else None
+    return axes, np.eye(3), _general(potential, axes), None
 
 
-def _derivative(axes: Axes, acceleration: Acceleration | None) -> Derivative:
-    """Return Euler's equations and q' = q w / 2 in plain floats: arrays of three cost more than their arithmetic."""
+def _derivative(axes: Axes, acceleration: Acceleration | None, turn_D: Array | None = None) -> Derivative:
+    """Return Euler's equations and q' = (q w - turn q) / 2 in plain floats: arrays of three cost more than their arithmetic."""
     J1, J2, J3 = axes.J.tolist()
     a1, a2, a3 = (J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3
 
@@ -161,19 +169,31 @@ def _derivative(axes: Axes, acceleration: Acceleration | None) -> Derivative:
 
     def in_field(t: float, y: Array) -> list[float]:
         out = free(t, y)
-        b1, b2, b3 = acceleration(*y[:4].tolist())  # type: ignore[misc]
+        b1, b2, b3 = acceleration(t, *y[:4].tolist())  # type: ignore[misc]
         out[4] += b1
         out[5] += b2
         out[6] += b3
         return out
 
-    return free if acceleration is None else in_field
+    def in_turning_field(t: float, y: Array) -> list[float]:
+        out = in_field(t, y)
+        q0, q1, q2, q3 = y[:4].tolist()
+        out[0] += x * q1 + v * q2 + z * q3
+        out[1] -= x * q0 + v * q3 - z * q2
+        out[2] -= v * q0 + z * q1 - x * q3
+        out[3] -= z * q0 + x * q2 - v * q1
+        return out
+
+    if turn_D is None:
+        return free if acceleration is None else in_field
+    x, v, z = (turn_D / 2).tolist()
+    return in_turning_field
 
 
 def _uniform(axes: Axes) -> Acceleration:
     (m1, m2, m3), (J1, J2, J3) = axes.moment.tolist(), axes.J.tolist()
 
-    def acceleration(*q: float) -> tuple[float, float, float]:
+    def acceleration(_: float, *q: float) -> tuple[float, float, float]:
         g1, g2, g3 = _third_row(*q)
         return (g2 * m3 - g3 * m2) / J1, (g3 * m1 - g1 * m3) / J2, (g1 * m2 - g2 * m1) / J3
 
@@ -182,13 +202,13 @@ def _uniform(axes: Axes) -> Acceleration:
 
 def _written_out(field: FieldInAxes) -> Acceleration:
     parameters = tuple(field.parameters)
-    return lambda *q: field.acceleration(parameters, _third_row(*q))
+    return lambda _, *q: field.acceleration(parameters, _third_row(*q))
 
 
-def _general(potential: Potential, axes: Axes) -> Acceleration:
-    def acceleration(*q: float) -> list[float]:
+def _general(potential: AnyPotential, axes: Axes) -> Acceleration:
+    def acceleration(t: float, *q: float) -> list[float]:
         R_WF = from_quaternion(q)
-        return (torque_W(potential, R_WF @ axes.R_BF.T) @ R_WF / axes.J).tolist()
+        return (torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J).tolist()
 
     return acceleration
 

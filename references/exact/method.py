@@ -21,7 +21,7 @@ from conservative.errors import BadInput, Unsupported
 from conservative.invariants import axial_direction
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.bounds import bounds_of
-from conservative.potentials.potential import Potential
+from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Bounds, Counters, Trajectory
@@ -172,7 +172,7 @@ def _pendulum(scene: Scene) -> RigidBody | None:
     return None
 
 
-def _reason(body: RigidBody, potential: Potential | None) -> str | None:
+def _reason(body: RigidBody, potential: AnyPotential | None) -> str | None:
     """Return why there is no closed form, None if there is one."""
     if potential is None:
         return None
@@ -193,7 +193,7 @@ def _free_motion(start: Start) -> ClosedForm:
     return steady_turn(start) if start.steady else free_motion(start)
 
 
-def _motion(start: Start, potential: Potential | None) -> ClosedForm:
+def _motion(start: Start, potential: AnyPotential | None) -> ClosedForm:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
         return _free_motion(start)

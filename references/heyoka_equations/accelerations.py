@@ -6,7 +6,7 @@ the constant moment m, A the anchor's distance from the fixed point, and d the d
     uniform gravity     J w' = J w x w + g x m                          m = weight com
     spring              J w' = J w x w + (1 - rest / d) g x m           m = -stiffness A b      d^2 = b.b + A^2 - 2 A b.g
     attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
-    gravity gradient    J w' = J w x w + g x (rate^2 I g)
+    gravity gradient    J w' = J w x w + g x (3 rate^2 I g)
 
 The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
 three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
@@ -17,7 +17,7 @@ potentials' own torques.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from conservative.attitude import Array, axes_about, hat
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
+from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
@@ -52,21 +53,44 @@ class FieldInAxes:
         Rotation (3, 3) whose third column is the field's axis, world axes.
     acceleration, parameters
         Its expressions, and the values of their parameters.
+    turn_D
+        Rates (3,) at which the axes D turn, with which the field is fixed, rad/s, in D; the first is 0.
     """
 
     axes: Axes
     R_WD: Array
     acceleration: Acceleration
     parameters: list[float]
+    turn_D: Array = field(default_factory=lambda: np.zeros(3))
 
 
 def express_field(scene: Scene) -> FieldInAxes:
-    """Return the field of a scene, whose potential is one of `READERS` or None."""
-    axes, potential = principal_axes(scene), scene.potential
+    """Return the field of a scene, whose potential, or what turns of it, is one of `READERS` or None."""
+    potential = static_part(scene.potential)
     line = None if potential is None else potential.axis_W
-    if potential is None or line is None:
-        return FieldInAxes(axes, np.eye(3), uniform, [0.0] * 9)
-    return READERS[type(potential)](axes, axes_about(line), potential)
+    if not isinstance(scene.potential, Turning):
+        return _express(scene, potential, np.eye(3) if line is None else axes_about(line))
+    orbit = scene.potential.orbit
+    R_WD = _axes_beside(orbit.normal_W if line is None else line, orbit.normal_W)
+    found = _express(scene, potential, R_WD)
+    return replace(found, turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
+
+
+def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInAxes:
+    """Return a potential of the scene, or None, in axes D (3, 3); what has no axis does nothing."""
+    axes = principal_axes(scene)
+    if potential is None or potential.axis_W is None:
+        return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
+    return READERS[type(potential)](axes, R_WD, potential)
+
+
+def _axes_beside(third: Array, normal: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is `third` (3,) and whose first is at right angles to `normal` (3,) too."""
+    first = np.cross(normal, third)
+    size = np.linalg.norm(first)
+    if size <= _ROUND_OFF:
+        return axes_about(third)
+    return np.stack([first / size, np.cross(third, first / size), third], axis=1)
 
 
 def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
@@ -103,8 +127,8 @@ def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], E
     return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
 
 
-def _read_uniform(axes: Axes, R_WD: Array, _: Potential) -> FieldInAxes:
-    return FieldInAxes(axes, R_WD, uniform, _turning(axes, axes.moment))
+def _read_uniform(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+    return FieldInAxes(axes, R_WD, uniform, _turning(axes, potential.moment_B @ axes.R_BF))
 
 
 def _read_spring(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
@@ -131,7 +155,7 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
 
 
 def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
-    inertia = potential.rate**2 * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
+    inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         A[i, [i, j, k]] = inertia[k, k] - inertia[j, j], -inertia[i, j], inertia[i, k]

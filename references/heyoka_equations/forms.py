@@ -88,38 +88,56 @@ def compile_double(form: Form, tol: float, fast_math: bool = False) -> Integrato
 class Turning:
     """Euler's equations in principal axes with those of the attitude, state (attitude, w).
 
-    Parameters are (J2 - J3)/J1 and its kin (3), then those of the field.
+    Parameters are (J2 - J3)/J1 and its kin (3), the rates at which the world axes of the attitude turn (3), in those axes, then
+    those of the field.
 
     Attributes
     ----------
     attitude
-        Takes rates to the attitude's equations and to the field's axis in the body.
+        Takes the body's rates and those of the world axes to the attitude's equations and to the field's axis in the body.
     acceleration
         Takes the field's parameters and that axis to what the field adds to w'.
     """
 
-    attitude: Callable[[Sequence[Expression]], tuple[Equations, Sequence[Expression]]]
+    attitude: Callable[[Sequence[Expression], Sequence[Expression]], tuple[Equations, Sequence[Expression]]]
     acceleration: Callable[[Sequence[Expression], Sequence[Expression]], Sequence[Expression]]
 
     def __call__(self, parameters: Sequence[Expression]) -> Equations:
         """Return the equations with these parameters."""
         w = heyoka().make_vars("w1", "w2", "w3")
-        equations, axis = self.attitude(w)
+        equations, axis = self.attitude(w, parameters[3:6])
         gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
-        return [*equations, *zip(w, _sums(gyroscopic, self.acceleration(parameters[3:], axis)), strict=True)]
+        return [*equations, *zip(w, _sums(gyroscopic, self.acceleration(parameters[6:], axis)), strict=True)]
 
 
-def quaternion(w: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
-    """Return the quaternion's equations, 12 products, and the axis in the body: 6 more where all of it is used."""
+def quaternion(w: Sequence[Expression], turn: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
+    """Return the quaternion's equations, 12 products, and the axis in the body: 6 more where all of it is used.
+
+    In axes that turn it loses turn q / 2.
+    """
     q = heyoka().make_vars("q0", "q1", "q2", "q3")
-    return list(zip(q, kinematics_in_body(q, w), strict=True)), vertical(q)
+    lost = quaternion_product([0.0, *(x if is_zero(x) else -0.5 * x for x in turn)], q)
+    return list(zip(q, _sums(kinematics_in_body(q, w), lost), strict=True)), vertical(q)
 
 
-def base_vectors(w: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
-    """Return the equations of the third and the first row of the rotation matrix, 12 products; the third is the axis itself."""
+def base_vectors(w: Sequence[Expression], turn: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
+    """Return the equations of the third and the first row of the rotation matrix, 12 products; the third is the axis itself.
+
+    In axes that turn, rows lose turn x columns: a term linear in the other row where the axes turn about the second of them.
+    """
     hy = heyoka()
     third, first = hy.make_vars("g1", "g2", "g3"), hy.make_vars("a1", "a2", "a3")
-    return [*zip(third, cross(third, w), strict=True), *zip(first, cross(first, w), strict=True)], third
+    rates = [cross(third, w), cross(first, w)]
+    if not (is_zero(turn[0]) and is_zero(turn[2])):
+        second = cross(third, first)
+        rates = [_add_multiple(rates[0], turn[0], second, -1.0), _add_multiple(rates[1], turn[2], second, 1.0)]
+    rates = [_add_multiple(rates[0], turn[1], first, 1.0), _add_multiple(rates[1], turn[1], third, -1.0)]
+    return [*zip(third, rates[0], strict=True), *zip(first, rates[1], strict=True)], third
+
+
+def _add_multiple(a: list[Expression], factor: Expression, b: Sequence[Expression], sign: float) -> list[Expression]:
+    """Return a + sign factor b."""
+    return a if is_zero(factor) else [x + sign * factor * y for x, y in zip(a, b, strict=True)]
 
 
 def non_spinning(parameters: Sequence[Expression]) -> Equations:
@@ -182,6 +200,17 @@ def kinematics_in_world(q: Sequence[Expression], u: Sequence[Expression]) -> lis
         0.5 * (q[0] * u[1] - q[3] * u[0] + q[1] * u[2]),
         0.5 * (q[0] * u[2] + q[2] * u[0] - q[1] * u[1]),
     ]
+
+
+def quaternion_product(p: Sequence[Expression], q: Sequence[Expression]) -> list[Expression]:
+    """Return p q, without the products with what is zero."""
+    pairs = (
+        ((0, 0, 1), (1, 1, -1), (2, 2, -1), (3, 3, -1)),
+        ((0, 1, 1), (1, 0, 1), (2, 3, 1), (3, 2, -1)),
+        ((0, 2, 1), (1, 3, -1), (2, 0, 1), (3, 1, 1)),
+        ((0, 3, 1), (1, 2, 1), (2, 1, -1), (3, 0, 1)),
+    )
+    return [sum((sign * p[i] * q[j] for i, j, sign in row if not is_zero(p[i])), 0.0) for row in pairs]
 
 
 def vertical(q: Sequence[Expression]) -> list[Expression]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.potentials.turning import Turning
 from conservative.scene import Scene
 
 from ..engine import Axes, principal_axes, symmetric_axes
@@ -71,10 +72,11 @@ def _turning(
     field = express_field(scene)
     axes, R_WD = field.axes, field.R_WD
     equations = forms.Turning(attitude, field.acceleration)
-    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.parameters])
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *field.parameters])
 
-    def readout(_: Array, states: Array) -> tuple[Array, Array]:
-        return R_WD @ read(states[:, :-3]), states[:, -3:]
+    def readout(t: Array, states: Array) -> tuple[Array, Array]:
+        R = R_WD @ read(states[:, :-3])
+        return scene.potential.orbit.R_WO(t) @ R if isinstance(scene.potential, Turning) else R, states[:, -3:]
 
     return Formulation(axes, form, parameters, np.concatenate([write(R_WD.T @ axes.R_WF0), axes.w0]), readout)
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from conservative.potentials.gravity_gradient import GravityGradient
 from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
 from conservative.potentials.potential import Potential
+from conservative.potentials.turning import Turning
 from conservative.potentials.uniform_gravity import UniformGravity
 
-from .forms import Expression, cross, heyoka, product, to_body
+from .forms import Expression, cross, heyoka, is_zero, product, quaternion_product, to_body
 
 Number = Any
 """A float, an `mpmath.mpf` or a text with as many digits as one likes."""
@@ -45,7 +47,7 @@ def attraction(q: Expressions, parameters: Expressions) -> list[Expression]:
 
 
 def gradient(q: Expressions, parameters: Expressions) -> list[Expression]:
-    """Return u x (rate^2 J u) for V = rate^2/2 u'J u, parameters rate^2 (1), J (9), direction (3)."""
+    """Return u x (3 rate^2 J u) for V = 3/2 rate^2 u'J u, parameters 3 rate^2 (1), J (9), direction (3)."""
     u = to_body(q, parameters[10:])
     return [parameters[0] * x for x in cross(u, product(parameters[1:10], u))]
 
@@ -67,6 +69,33 @@ FIELDS: dict[type[Potential], Field] = {
     UniformGravity: Field(lambda p: p.moment_B.tolist(), uniform),
     LinearSpring: Field(lambda p: [*_points(p), p.stiffness, p.rest_length], spring),
     PointAttraction: Field(lambda p: [*_points(p), p.strength], attraction),
-    GravityGradient: Field(lambda p: [p.rate**2, *p.inertia.ravel().tolist(), *p.direction_W.tolist()], gradient),
+    GravityGradient: Field(lambda p: [p.factor, *p.inertia.ravel().tolist(), *p.direction_W.tolist()], gradient),
 }
 """Potentials that multi-precision truth knows."""
+
+
+def find_field(potential: Any) -> Field | None:
+    """Return a potential as expressions, None where there are none for it, nor for what turns."""
+    if not isinstance(potential, Turning):
+        return FIELDS.get(type(potential))
+    found = FIELDS.get(type(potential.potential))
+    return None if found is None else _turn(found)
+
+
+@lru_cache
+def _turn(field: Field) -> Field:
+    """Return a field that turns: that of the body's attitude in the axes O, parameters rate (1), normal (3), its own.
+
+    One for each field, so that integrators compiled for it are found again.
+    """
+
+    def values(potential: Turning) -> list[Number]:
+        return [potential.orbit.rate, *potential.orbit.normal_W.tolist(), *field.values(potential.potential)]
+
+    def torque(q: Expressions, parameters: Expressions) -> list[Expression]:
+        half = 0.5 * parameters[0] * heyoka().time
+        sine = heyoka().sin(half)
+        back = [heyoka().cos(half), *(x if is_zero(x) else -sine * x for x in parameters[1:4])]
+        return field.torque(quaternion_product(back, q), parameters[4:])
+
+    return Field(values, torque)

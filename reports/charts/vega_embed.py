@@ -75,7 +75,7 @@ def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
 def embed(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
     """Return a picture's specification as the page embeds it; a picture of panels becomes a chart a panel."""
     whole: Spec = chart.to_dict()
-    panels: list[Spec] | None = whole.pop("vconcat", None)
+    panels: list[Spec] | None = whole.pop("vconcat", whole.pop("concat", None))
     if panels is None:
         panels = [whole]
         for unit in (whole, *whole.get("layer", ())):

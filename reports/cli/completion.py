@@ -37,6 +37,13 @@ def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> l
     return [CompletionItem(before + name) for name in names]
 
 
+def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the studies that the text may become."""
+    from conservative.benchmarks.studies.studies import MAKERS
+
+    return [CompletionItem(name) for name in MAKERS if name.startswith(incomplete)]
+
+
 def _last(incomplete: str) -> tuple[str, str]:
     before, comma, last = incomplete.rpartition(",")
     return before + comma, last

@@ -20,6 +20,7 @@ from .published import published
 from .recommend import recommend
 from .report import report
 from .run import run
+from .study import study
 from .track import track
 
 
@@ -94,5 +95,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, list_all, recommend, gate, new, engines, track, published):
+for command in (report, run, list_all, recommend, gate, new, engines, track, published, study):
     main.add_command(command)

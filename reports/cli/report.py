@@ -35,6 +35,13 @@ from .options import FilePath, epilog, split_list, split_names
     help="Engines to compare in a section of their own: NAME, NAME==VERSION, or all, which stands for all that are installed, "
     "in environments (see `conservative engines`) or beside us.",
 )
+@click.option(
+    "--bodies",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Random bodies in each of four fields.  [default: 3; 2 with --quick, 0 with --scenes]",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the random bodies.")
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option(
@@ -66,6 +73,8 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     with interruptible(signal.SIGTERM), progress() as step:
         view = document.write(plan, out, step, resume)
     click.echo((out / MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
+    for statement in view.random.statements if view.random else ():
+        click.echo(statement, err=True)
     if view.failed:
         raise click.ClickException("; ".join(view.failed))
 

@@ -1,6 +1,7 @@
 """The README's tables, from a report: `python -m conservative.reports.documentation.readme_table report` prints that of costs.
 
-With `--engines` it prints that of engines, from a report with this option.
+With `--engines` it prints that of engines, from a report with this option; with `--random` that of random bodies, whose rows
+are in a report or in what `conservative study random --out FOLDER` leaves.
 Each cell is the cheapest way of a group of methods to an attitude error, in µs per simulated second, with its setting. Exact
 steps are a group of their own: they exist for few scenes, and have no truncation error that a shorter step would lower.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -19,6 +20,8 @@ from conservative.method import Role
 
 from ..labels import with_names
 from ..tables.engine_rows import ONE_STEP, EngineRow, engine_rows, points_of
+from ..tables.random_contests import contests
+from ..tables.random_ratios import by_engine
 from ..tables.work_precision import cost, points
 
 ERRORS = (1e-3, 1e-6, 1e-9)
@@ -92,16 +95,30 @@ def _run(row: EngineRow) -> list[str]:
     return [row.label.partition("/")[2], f"{row.error:.2g}", f"{row.energy.size:.1g} {row.energy.direction}".strip()]
 
 
+def random_bodies(table: pd.DataFrame) -> Iterator[Sequence[str]]:
+    """Yield the header, and a row for each field and error: each engine's time over ours, mean (worst to best)."""
+    header, body = by_engine(contests(table))
+    yield header
+    yield from ([str(cell) for cell in row] for row in body)
+
+
 def main() -> None:
     """Print a table as Markdown."""
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.readme_table", description=__doc__)
     parser.add_argument("report", nargs="?", type=Path, default=Path("report"), help="a report's folder [default: report]")
     parser.add_argument("--engines", action="store_true", help="the table of engines")
+    parser.add_argument("--random", action="store_true", help="the table of random bodies")
     options = parser.parse_args()
-    found = with_names(read(options.report / "measurements.csv"))
-    header, *body = engines(found) if options.engines else rows(points(found))
+    found = with_names(read(_rows_in(options.report)))
+    header, *body = random_bodies(found) if options.random else engines(found) if options.engines else rows(points(found))
     for row in (header, ["---"] * len(header), *body):
         print("|", " | ".join(row), "|")
+
+
+def _rows_in(folder: Path) -> Path:
+    """Return the file of measurements in the folder of a report, or of a study."""
+    names = ("measurements.csv", "study.csv")
+    return next((folder / name for name in names if (folder / name).exists()), folder / names[0])
 
 
 if __name__ == "__main__":

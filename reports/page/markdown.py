@@ -11,9 +11,10 @@ from conservative.benchmarks.studies import long_runs
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
-from ..tables import engine_tables
+from ..tables import engine_tables, random_ratios
 from ..tables.cells import CONSERVED, SMALL, Table, markdown
 from ..view import PaperView, View
+from . import random_bodies
 from .scene_charts import SceneCharts
 
 Draw = Callable[[str, Any], str]
@@ -21,11 +22,13 @@ Draw = Callable[[str, Any], str]
 NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
 
 
-def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], draw: Draw) -> str:
+def render(
+    view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], draw: Draw, of_random: Any = None
+) -> str:
     """Return report.md.
 
-    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike; `draw(name, chart)` returns the
-    name of its file.
+    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike, `of_random` that of random bodies,
+    if there is one; `draw(name, chart)` returns the name of its file.
     """
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
@@ -33,6 +36,8 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     environment.filters["table"] = _table
     return environment.get_template("report.md.j2").render(
         view=view,
+        random_picture=draw(random_bodies.NAME, of_random) if of_random is not None else "",
+        random_terms=random_ratios.TERMS,
         pictures={name: _pictures(name, of_scene, draw) for name, of_scene in charts.items()},
         default_method=DEFAULT_METHOD,
         durations=f"{long_runs.DURATIONS:g}",

@@ -18,10 +18,10 @@ from conservative.benchmarks.studies import long_runs
 from ..charts import spheres
 from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
 from ..charts.vega_embed import PageFigure
-from ..tables import engine_tables, overview
+from ..tables import engine_tables, overview, random_ratios
 from ..tables.cells import CONSERVED, SMALL
 from ..view import View
-from . import engines
+from . import engines, random_bodies
 from .figures import scene_figures
 from .scene_charts import SceneCharts
 
@@ -29,12 +29,19 @@ DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", O
 """Colours that are too dark on a dark page, and what stands for them there."""
 
 
-def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any]) -> str:
-    """Return the page; `charts` are those of each scene by its name, `of_engines` the pictures of engines alike."""
+def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], of_random: Any = None) -> str:
+    """Return the page.
+
+    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike, `of_random` that of random bodies,
+    if there is one.
+    """
     figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
     engine_figures = engines.figures(view.engines, of_engines)
+    random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
     return _template().render(
         view=view,
+        random_figure=random_figure,
+        random_terms=random_ratios.TERMS,
         figures=figures,
         engine_figures=engine_figures,
         engine_terms=engine_tables.TERMS,
@@ -42,7 +49,11 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         conserved=f"{CONSERVED:.0e}",
         small=f"{SMALL:.0e}",
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(_charts([*chain.from_iterable(figures.values()), *engine_figures.values()])),
+        charts=_in_script(
+            _charts(
+                [*([random_figure] if random_figure else []), *chain.from_iterable(figures.values()), *engine_figures.values()]
+            )
+        ),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,

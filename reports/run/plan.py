@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
+from typing import TypedDict, Unpack
 
-from conservative.benchmarks.studies import engine_selection, selection, studies
+from conservative.benchmarks.studies import engine_selection, random, selection, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
@@ -28,12 +29,15 @@ SECONDS = {
     "sphere_curves": 0.3,
     "paper_figures": 0.1,
     "import_time": 0.1,
+    "random": 0.15,
 }
 """How long each study takes for one scene and one method, roughly: for the time left."""
 RENDERING = {"pictures": 6.0, "page": 3.0}
 """How long, s, what comes after the measurements takes, roughly."""
 QUICK = 0.3
 """How much of that a quick report takes."""
+BODIES, QUICK_BODIES = 3, 2
+"""Random bodies in each field of a report, and of a quick one, unless it is told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class Plan:
     hard: bool = False
     time_limit: float | None = None
     engines: tuple[Method, ...] = ()
+    bodies: int = 0
+    seed: int = 0
 
     def __post_init__(self) -> None:
         if self.time_limit is not None:
@@ -73,13 +79,23 @@ class Plan:
     def studies(self) -> tuple[Study, ...]:
         """What is measured, in this order: engines only where some are named, hard cases only where nobody asked for less.
 
+        Random bodies come first, as the report shows them first.
+
         Studies of the same scenes and methods share their truths.
         """
         crossed = studies.cross_studies(self.scenes, self.methods, self.quick, self.skip_missing, self.time_limit)
         hard = studies.list_hard_studies(self.methods, self.skip_missing, self.time_limit) if self.hard else ()
         limits = (self.quick, self.skip_missing, self.time_limit)
         engines = studies.list_engine_studies(self.scenes, self.engines, *limits) if self.engines else ()
-        return (*crossed, *engines, *hard)
+        return (*self._random, *crossed, *engines, *hard)
+
+    @cached_property
+    def _random(self) -> tuple[Study, ...]:
+        """The study of random bodies, where the report has some and a method for them."""
+        methods = random.select(self.methods)
+        if not (self.bodies and methods):
+            return ()
+        return (studies.random_study(methods, self.bodies, self.seed, self.quick, self.skip_missing),)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,23 +112,41 @@ class Plan:
 
     def _pairs(self, name: str) -> int:
         """Return how many pairs of a scene and a method a study is about as long as."""
+        if name == studies.RANDOM:
+            return sum(len(study.scenes) * len(study.methods) for study in self._random)
         return len(self.scenes) * len(self.engines if name in studies.ENGINES else self.methods)
 
 
-def plan_report(
-    scenes: list[str],
-    methods: list[str],
-    quick: bool = False,
-    skip_missing: bool = False,
-    png: bool = False,
-    time_limit: float | None = None,
-    engines: Iterable[str] = (),
-) -> Plan:
+class Extent(TypedDict, total=False):
+    """How much a report measures, by keyword: fields of `Plan`, with engines by name and the number of bodies left open."""
+
+    quick: bool
+    skip_missing: bool
+    png: bool
+    time_limit: float | None
+    engines: Iterable[str]
+    bodies: int | None
+    seed: int
+
+
+def plan_report(scenes: list[str], methods: list[str], **extent: Unpack[Extent]) -> Plan:
     """Return the plan for scenes, methods and engines by name.
 
-    No scene stands for the default ones, no method for every registered one, and no engine for none.
+    No scene stands for the default ones, no method for every registered one, and no engine for none. The number of random
+    bodies is by default `BODIES` or `QUICK_BODIES`, and 0 where scenes are named.
     """
-    values = selection.scenes(scenes) if scenes else selection.scenes()
-    chosen = selection.methods(methods or None, skip_missing)
-    competitors = engine_selection.select_engines(engines, skip_missing) if engines else ()
-    return Plan(values, chosen, quick, skip_missing, png, not (scenes or quick), time_limit, competitors)
+    quick, skip_missing = extent.get("quick", False), extent.get("skip_missing", False)
+    engines, bodies = extent.get("engines", ()), extent.get("bodies")
+    usual = 0 if scenes else QUICK_BODIES if quick else BODIES
+    return Plan(
+        scenes=selection.scenes(scenes) if scenes else selection.scenes(),
+        methods=selection.methods(methods or None, skip_missing),
+        quick=quick,
+        skip_missing=skip_missing,
+        png=extent.get("png", False),
+        hard=not (scenes or quick),
+        time_limit=extent.get("time_limit"),
+        engines=engine_selection.select_engines(engines, skip_missing) if engines else (),
+        bodies=usual if bodies is None else bodies,
+        seed=extent.get("seed", 0),
+    )

@@ -27,6 +27,8 @@ def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
         "--quick": plan.quick,
         "--skip-missing": plan.skip_missing,
         "--time-limit": plan.time_limit,
+        "--bodies": plan.bodies,
+        "--seed": plan.seed,
         "source": _source_hash(),
         "machine": {key: source.machine[key] for key in ("processor", "cores")},
         "versions": {"python": source.python, **source.compared},

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure, key
+from conservative.invariants import JACOBI_INTEGRAL
 from conservative.method import Role
 from conservative.outcome import Outcome
 
@@ -54,7 +55,7 @@ def _case(rows: pd.DataFrame) -> Cell:
     ends = [outcome for outcome in outcomes(rows) if not outcome.ok]
     if ends or rows.empty:
         return outcome_cell(ends[0]) if ends else _NOT_RUN
-    energy = of_measure(rows, Measure.DRIFT_MAX, "energy")["value"]
+    energy = pd.concat([of_measure(rows, Measure.DRIFT_MAX, name)["value"] for name in ("energy", JACOBI_INTEGRAL)])
     if energy.empty:
         return Cell(f"✓ {_first(rows)}", Grade.GOOD)
     drift = grade_drift(float(energy.max()))

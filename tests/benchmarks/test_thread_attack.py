@@ -77,7 +77,7 @@ def test_what_runs_raise_is_found_and_told():
 
 
 def test_our_compiled_methods_and_potentials_of_functions_share_nothing():
-    ours = (cv.Reduced(), cv.Gauss(2), cv.Lame(), cv.MoserVeselov(), cv.Projected())
+    ours = (cv.Reduced(), cv.Gauss(2), cv.Lame(), cv.MoserVeselov(), cv.Projected(), cv.Taylor())
     found = threads.find(600, 1, ours)
     assert found.bad == 0
     assert found.runs.total() == 600

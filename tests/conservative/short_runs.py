@@ -23,7 +23,7 @@ from conservative.method import Grid, Method
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in ("signals", "simd", "simd_llvm")))
+OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in ("signals", "simd", "simd_llvm", "series_llvm")))
 """Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
 BASES = ("finite_torque", "energy", "body_torque", "finite_derivative", "slope", "implements")
 """Functions that fields implement, and what registers them."""
@@ -62,6 +62,9 @@ METHODS: tuple[Method, ...] = (
     cv.MoserVeselov(),
     cv.MoserVeselov(6),
     cv.Projected(),
+    cv.Taylor(),
+    cv.Taylor(5),
+    cv.Taylor(12, 1e-12),
 )
 
 

@@ -36,7 +36,9 @@ def test_attitudes_from_quaternions_are_orthonormal_and_others_as_good_as_the_re
     assert loose.orthonormality == loose.drift > 1e-7
 
 
-@pytest.mark.parametrize("method", [cv.Gauss(), cv.Lame(), cv.MoserVeselov(), cv.Projected()], ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "method", [cv.Gauss(), cv.Lame(), cv.MoserVeselov(), cv.Projected(), cv.Taylor()], ids=lambda each: each.name
+)
 def test_without_a_tolerance_bounds_are_those_of_rounding(method):
     assert method.bounds(scene(), Grid(0.1, 90)) == bounds_of(scene(), Grid(0.1, 90))
 

@@ -11,9 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative.declarations import Candidacy, Cost
-from conservative.errors import AccuracyNotReached, MissingEngine
-from conservative.methods import automatic
+from conservative.declarations import Cost
+from conservative.errors import AccuracyNotReached
+from conservative.methods import automatic, search, trials
+from conservative.methods.between import Samples
 from conservative.trajectory import Counters
 
 BODY = cv.RigidBody((1.0, 1.0, 1.0))
@@ -54,6 +55,7 @@ class Known(cv.Method):
 @pytest.fixture(autouse=True)
 def fresh():
     Known.taken.clear()
+    trials.recall.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -71,7 +73,7 @@ def fresh():
     ],
 )
 def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected):
-    grid = automatic._even_grid(dt, t_end, spacing, every)
+    grid = automatic.grid_of(dt, t_end, Samples(spacing, every))
     assert (grid.dt, grid.n_steps, grid.every) == pytest.approx(expected)
 
 
@@ -87,11 +89,11 @@ def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected)
     ],
 )
 def test_the_next_step_follows_from_the_order(estimate, power, expected):
-    assert automatic._step_factor(estimate, 1e-6, Known(power=power)) == pytest.approx(expected)
+    assert search.step_factor(estimate, 1e-6, Known(power=power)) == pytest.approx(expected)
 
 
 def test_factors_by_which_a_finer_run_is_better():
-    assert [automatic._convergence_factor(Known(power=power)) for power in (0, 2, 4, 6)] == [1.0, 3.0, 15.0, 30.0]
+    assert [trials.convergence_factor(Known(power=power)) for power in (0, 2, 4, 6)] == [1.0, 3.0, 15.0, 30.0]
 
 
 @pytest.mark.parametrize(
@@ -106,25 +108,25 @@ def test_factors_by_which_a_finer_run_is_better():
     ],
 )
 def test_errors_that_stop_falling(errors, stalls):
-    assert automatic.stops_falling(errors) is stalls
+    assert search.stops_falling(errors) is stalls
     attempts = [(0.1, error) for error in errors]
-    assert automatic._stalls([(0.2, math.inf), *attempts]) is stalls
+    assert search.stalls(((0.2, math.inf), *attempts)) is stalls
 
 
 def test_bounds_and_counts():
     faster = cv.Scene("spin", BODY, np.eye(3), (0, 0, 3.0), 8.0)
     for scene in (SCENE, faster):
-        assert automatic.bound_rate(scene) == pytest.approx(math.sqrt(2 * scene.energy_scale))
+        assert search.bound_rate(scene) == pytest.approx(math.sqrt(2 * scene.energy_scale))
     trajectory = Known().prepare(SCENE, cv.Grid(0.5, 4, 1))()
-    assert automatic._count_work(Known(step=7.0), trajectory) == 3.0 * 8 + 7.0 * 4
+    assert trials.count_work(Known(step=7.0), trajectory) == 3.0 * 8 + 7.0 * 4
     explicit = dataclasses.replace(trajectory, counters=Counters(4, 4, None))
-    assert automatic._count_work(Known(step=7.0), explicit) == 7.0 * 4
-    assert automatic._rounding_error(trajectory) == pytest.approx(2.0**-53 * 2.0 * 2.0, rel=1e-9, abs=0)
+    assert trials.count_work(Known(step=7.0), explicit) == 7.0 * 4
+    assert trials.rounding_error(trajectory) == pytest.approx(2.0**-53 * 2.0 * 2.0, rel=1e-9, abs=0)
 
 
 @pytest.mark.parametrize(("every", "n"), [(1, 8), (2, 8), (3, 8), (1, 6), (3, 10), (4, 10)])
 def test_two_runs_are_compared_at_the_times_that_both_have(every, n):
-    estimate, fine = automatic._run_twice(Known(size=0.01), SCENE, cv.Grid(0.5, n, every))
+    estimate, fine = trials.run_twice(Known(size=0.01), SCENE, cv.Grid(0.5, n, every))
     difference = 0.01 * (1.0 - 0.25) * 0.5 * n
     assert estimate == pytest.approx(difference / 3 + 2.0**-53 * 2 * 0.5 * n, rel=1e-9)
     assert (fine.t[-1], len(fine)) == (0.5 * n, len(cv.Grid(0.5, n, every).t))
@@ -132,24 +134,24 @@ def test_two_runs_are_compared_at_the_times_that_both_have(every, n):
 
 
 def test_errors_that_say_nothing_are_infinite():
-    assert automatic._run_twice(Known(size=0.2), SCENE, cv.Grid(0.5, 8, 1))[0] == math.inf  # 0.6 rad
-    assert automatic._run_twice(Known(fails_above=0.6), SCENE, cv.Grid(0.5, 8, 1))[0] == math.inf
+    assert trials.run_twice(Known(size=0.2), SCENE, cv.Grid(0.5, 8, 1))[0] == math.inf  # 0.6 rad
+    assert trials.run_twice(Known(fails_above=0.6), SCENE, cv.Grid(0.5, 8, 1))[0] == math.inf
     for difference, known in ((0.19, True), (0.21, False)):
-        estimate = automatic._run_twice(Known(size=difference / 3), SCENE, cv.Grid(0.5, 8, 1))[0]
+        estimate = trials.run_twice(Known(size=difference / 3), SCENE, cv.Grid(0.5, 8, 1))[0]
         assert math.isfinite(estimate) is known
 
 
 @pytest.fixture
 def choose(monkeypatch):
     def among(*methods):
-        monkeypatch.setattr(automatic, "candidates", lambda scene: methods)
+        monkeypatch.setattr(search, "candidates", lambda scene: methods)
 
     return among
 
 
 def test_the_step_is_cut_until_the_error_is_reached(choose):
     choose(Known(size=0.1))
-    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, None, 1)
+    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples())
     choice = found.choice
     assert choice.reached
     assert choice.estimate <= 1e-5
@@ -164,15 +166,15 @@ def test_the_step_is_cut_until_the_error_is_reached(choose):
 def test_the_cheapest_at_its_step_is_taken(choose):
     dear, cheap = Known(size=0.1, step=50.0), Known(size=0.1, step=1.0)
     choose(dear, cheap)
-    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, None, 1).choice.method == cheap
+    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples()).choice.method == cheap
     high = Known(size=0.1, power=4, step=50.0)
     choose(cheap, high)
-    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, None, 1).choice.method == high
+    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, Samples()).choice.method == high
 
 
 def test_spacing_is_kept(choose):
     choose(Known(size=0.1))
-    found = automatic.integrate_to_error(SCENE, 1e-4, 8.0, 0.5, 2)
+    found = automatic.integrate_to_error(SCENE, 1e-4, 8.0, Samples(0.5, 2))
     np.testing.assert_allclose(found.t, np.arange(9.0), atol=1e-12)
     assert (0.5 / found.choice.dt) % 2 == pytest.approx(0, abs=1e-9)
 
@@ -180,9 +182,11 @@ def test_spacing_is_kept(choose):
 def test_more_steps_than_anybody_waits_for_are_refused_before_they_are_taken(choose):
     choose(Known(size=0.1))
     with pytest.raises(cv.BadInput, match=r"error: got what takes .* steps; allowed: what 1e\+10 steps reach"):
-        automatic.integrate_to_error(SCENE, 1e-9, 1e9, None, 10**12)
-    assert max(grid.n_steps for grid in Known.taken) <= automatic.MOST_PROBED
-    assert automatic._probe(Known(size=1.0), SCENE, 1e-15, 8.0)[0] == math.inf
+        automatic.integrate_to_error(SCENE, 1e-9, 1e9, Samples(None, 10**12))
+    assert max(grid.n_steps for grid in Known.taken) <= search.MOST_PROBED
+    candidate = drive(Known(size=1.0), 1e-15, 8.0)
+    assert candidate.hopeless
+    assert candidate.expected_work(1.0) == math.inf
 
 
 def test_an_error_that_cannot_be_reached_is_a_warning(choose):
@@ -196,53 +200,24 @@ def test_an_error_that_cannot_be_reached_is_a_warning(choose):
     assert 3 <= len(found.choice.attempts) <= automatic.ATTEMPTS
 
 
+def drive(method, error, t_end):
+    """Return a candidate for the scene that is advanced until it is settled or given up."""
+    candidate = search.begin(method, SCENE, search.goal_for(SCENE, error, t_end))
+    while not (candidate.settled or candidate.hopeless):
+        candidate = candidate.advance(trials.Trials(SCENE, {}, lambda method, grid: None))
+    return candidate
+
+
 def test_a_probe_is_short_and_asks_for_its_share():
-    work, dt = automatic._probe(Known(size=0.1), SCENE, 1e-1, 1e3)
-    duration = automatic.PROBE_RADIANS / automatic.bound_rate(SCENE)
-    assert Known.taken[-1].n_steps * Known.taken[-1].dt == pytest.approx(duration)
+    candidate = drive(Known(size=0.1), 1e-1, 1e3)
+    duration = search.PROBE_RADIANS / search.bound_rate(SCENE)
+    assert Known.taken[-2].n_steps * Known.taken[-2].dt == pytest.approx(duration)
     share = 1e-1 * 4 * duration / 1e3
-    assert 0.1 * dt**2 * duration <= 0.5 * share * 1.01
-    assert 0.1 * dt**2 * duration > 0.1 * share
-    n = round(duration / dt)
-    assert work == pytest.approx((3.0 * 2 * n + n) / duration, rel=1e-9)
+    assert 0.1 * candidate.dt**2 * duration <= 0.5 * share * 1.01
+    assert 0.1 * candidate.dt**2 * duration > 0.1 * share
+    n = round(duration / candidate.dt)
+    assert candidate.work == pytest.approx(3.0 * 2 * n + n, rel=1e-9)
     assert Known.taken[0].dt == pytest.approx(duration / 2)
     Known.taken.clear()
-    whole = automatic._probe(Known(size=1e-9, power=0), SCENE, 1e-4, 8.0)
-    assert whole[1] == Known.taken[0].dt == 0.5
-
-
-def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
-    def family(name, candidacy, supported=True, missing=False):
-        def settings(cls):
-            if missing:
-                raise MissingEngine(name, "nothing")
-            return (cls(),)
-
-        return dataclass(frozen=True)(
-            type(
-                name,
-                (Known,),
-                {
-                    "family": name,
-                    "candidacy": candidacy,
-                    "candidate_settings": classmethod(settings),
-                    "unsupported": lambda self, scene: None if supported else "no",
-                },
-            )
-        )
-
-    first, second = family("first", Candidacy(2, "group")), family("second", Candidacy(3, "group"))
-    third, none = family("third", Candidacy(1)), family("none", None)
-    exact = family("exact", Candidacy(4, exact=True))
-    gone, other = family("gone", Candidacy(0), missing=True), family("other", Candidacy(0), supported=False)
-
-    def names(*families):
-        monkeypatch.setattr(automatic.registry, "list_families", lambda: {each.family: each for each in families})
-        return [method.family for method in automatic.candidates(SCENE)]
-
-    assert names(second, none, first, third, gone, other) == ["third", "first"]
-    assert names(second, first, exact) == ["exact"]
-    assert names(none) == []
-    foreign = family("foreign", Candidacy(0))
-    foreign.role = cv.Role.ENGINE
-    assert names(foreign, first) == ["first"]
+    whole = drive(Known(size=1e-9, power=0), 1e-4, 8.0)
+    assert whole.dt == Known.taken[0].dt == 0.5

@@ -154,40 +154,33 @@ def closed_rates(u):
     return np.concatenate([np.cross(u[:3], w) + np.cross(u[3:], C), np.cross(u[3:], w)])
 
 
-def test_gauss_rates_and_their_derivative():
-    padded = np.hstack([Z, Z[:, ::-1], Z[:, :2]])
-    F = np.empty(48)
-    gauss.rates(triple(1 / J), C, padded.ravel(), F)
-    for found, state in zip(F.reshape(6, 8).T, padded.T, strict=True):
-        np.testing.assert_allclose(found, closed_rates(state), atol=1e-15)
-    block = np.full((6, 6), np.nan)
-    gauss.tangent_block(triple(1 / J), C, padded[:, 1], block)
-    for k, e in enumerate(EPSILON * np.eye(6)):
-        quotient = (closed_rates(padded[:, 1] + e) - closed_rates(padded[:, 1] - e)) / (2 * EPSILON)
-        np.testing.assert_allclose(block[:, k], quotient, atol=1e-9)
+def test_gauss_rates():
+    F = np.full(48, np.nan)
+    for state in Z.T:
+        gauss.hold_rates(triple(1 / J), C, triple(state[:3]), triple(state[3:]), F, 8)
+        for found in F.reshape(6, 8).T:
+            np.testing.assert_allclose(found, closed_rates(state), atol=1e-15)
 
 
 @pytest.mark.parametrize("potential", [None, "gravity"])
-@pytest.mark.parametrize(("stages", "dt"), [(2, 1.3), (3, 2.0), (5, 3.0)])
+@pytest.mark.parametrize(("stages", "dt"), [(2, 0.4), (3, 0.5), (5, 0.6)])
 def test_gauss_over_long_steps_keeps_its_invariants(potential, stages, dt):
-    """Steps of some rad, which sweeps do not solve and Newton along the branch does."""
+    """Steps of a rad, and back."""
     scene = free((1, 1.4, 2), (0.3, 1.9, 0.3)) if potential is None else in_field(potential)
     run = cv.Gauss(stages).prepare(scene, cv.Grid(dt, 6, 1))()
-    assert run.counters.iterations > 6 * 10
-    if run.outcome.kind is cv.OutcomeKind.OK:
-        for invariant in scene.invariants:
-            assert abs(run.drift(invariant)).max() < 1e-13
-        back = cv.Scene("back", scene.body, run.R_WB[-1], -run.w_WB_B[-1], 1.0, scene.potential)
-        again = cv.Gauss(stages).prepare(back, cv.Grid(dt, 6, 1))()
-        np.testing.assert_allclose(again.R_WB[-1], run.R_WB[0], atol=1e-10)
+    assert run.ok
+    for invariant in scene.invariants:
+        assert abs(run.drift(invariant)).max() < 1e-13
+    back = cv.Scene("back", scene.body, run.R_WB[-1], -run.w_WB_B[-1], 1.0, scene.potential)
+    again = cv.Gauss(stages).prepare(back, cv.Grid(dt, 6, 1))()
+    np.testing.assert_allclose(again.R_WB[-1], run.R_WB[0], atol=1e-10)
 
 
-def test_gauss_ends_where_the_branch_ends():
+def test_gauss_ends_where_its_sweeps_do():
     run = cv.Gauss(2).prepare(free((1, 1.4, 2), (0.3, 1.9, 0.3)), cv.Grid(10.0, 3, 1))()
-    assert run.outcome.kind is cv.OutcomeKind.WRONG_BRANCH
+    assert run.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
     assert (run.counters.steps, run.counters.stages, run.outcome.step, len(run)) == (0, 0, 1, 1)
-    assert run.outcome.residual == pytest.approx(0.4435, abs=1e-3)  # of the whole step, where the branch ends
-    assert run.counters.iterations < 600  # measured 497
+    assert run.counters.iterations < 10  # measured 5
 
 
 @pytest.mark.parametrize("mc", [1.0, 0.9, 0.3, 1e-5, 0.0])

@@ -10,7 +10,7 @@ import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.declarations import Cost
 from conservative.method import Grid, Method, Role
-from conservative.methods import automatic
+from conservative.methods import search, trials
 from conservative.trajectory import Counters, Trajectory
 
 SCENE = cv.Scene("spun", cv.RigidBody((1, 2, 3)), np.eye(3), (0, 0, 4.0), 5.0)
@@ -43,18 +43,18 @@ class Spun(Method):
 
 
 def test_an_estimate_is_never_below_what_rounding_the_scene_turns_the_body_by():
-    estimate, _ = automatic._run_twice(Spun(), SCENE, GRID)
+    estimate, _ = trials.run_twice(Spun(), SCENE, GRID)
     assert estimate >= np.finfo(float).eps / 2 * 4.0 * 5.0
 
 
 def test_an_estimate_does_not_trust_noise_to_shrink_with_the_step():
-    estimate, _ = automatic._run_twice(Spun(1e-6), SCENE, Grid(5.0 / 52, 52))  # off by 1e-6 one way, with 26 steps the other
+    estimate, _ = trials.run_twice(Spun(1e-6), SCENE, Grid(5.0 / 52, 52))  # off by 1e-6 one way, with 26 steps the other
     assert estimate > 2e-6 / 100  # and not 2e-6 / 4095, as order 12 would have it
 
 
 @pytest.mark.parametrize("prices", [(1.0, 100.0), (100.0, 1.0)])
 def test_the_cheapest_candidate_is_chosen(prices, monkeypatch):
-    monkeypatch.setattr(automatic, "candidates", lambda scene: tuple(Spun(price=price) for price in prices))
+    monkeypatch.setattr(search, "candidates", lambda scene: tuple(Spun(price=price) for price in prices))
     assert cv.integrate(SCENE, error=1e-3).choice.method.price == 1.0
 
 
@@ -63,4 +63,4 @@ def test_the_cheapest_candidate_is_chosen(prices, monkeypatch):
     [([1.0, 0.9, 0.8], True), ([1.0, 0.9, 0.1], False), ([1.0, 0.1, 0.9], False), ([1.0, 2.0], False), ([9, 1, 1, 1], True)],
 )
 def test_only_two_steps_in_a_row_that_do_not_help_are_round_off(errors, stopped):
-    assert automatic.stops_falling(errors) is stopped
+    assert search.stops_falling(errors) is stopped

@@ -22,6 +22,14 @@ def quartic_gradient(R):
     return np.outer([0, 0, 1], 4 * (R[2] @ hook) ** 3 * hook)
 
 
+def shaken_energy(R, t):
+    return (1 + t) * quartic_energy(R)
+
+
+def shaken_gradient(R, t):
+    return (1 + t) * quartic_gradient(R)
+
+
 BODY = cv.RigidBody([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]])
 VALUES = {
     "moments": cv.RigidBody((1.0, 2.0, 2.5)),
@@ -32,6 +40,9 @@ VALUES = {
     "spring": cv.LinearSpring(2.0, (0.1, 0, 0), (0, 0, 1), 0.3),
     "attraction": cv.PointAttraction(2, (0.1, 0, 0), (0, 0, 1)),
     "functions": cv.FunctionPotential(quartic_energy, quartic_gradient, axis_W=(0, 0, 1)),
+    "functions of time": cv.FunctionPotential(shaken_energy, shaken_gradient, time_dependent=True),
+    "orbit": cv.Orbit(0.3, DIRECTION),
+    "satellite": cv.Orbit(0.3, (0, 0, 1)).gravity_gradient((1.0, 2.0, 2.5), (3, 4, 0)),
     "scene": cv.Scene("own", BODY, np.eye(3), (0, 1, 2), 3, cv.UniformGravity(1, (0, 0, 1)), source="here"),
     "trajectory": cv.Trajectory(cv.scenes.brick_flip(), np.zeros(1), np.eye(3)[None], np.zeros((1, 3)), "nobody"),
     "grid": cv.Grid(0.01, 10),

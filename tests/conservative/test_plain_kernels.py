@@ -48,9 +48,9 @@ def test_a_projected_step_is_on_its_invariants():
 @pytest.mark.parametrize(("defect", "done"), [(1e-16, 3), (1e-7, 3), (1e-5, 0), (1e-2, 0), (1.0, 0), (np.nan, 0)])
 def test_a_step_that_is_left_off_its_invariants_is_a_failure(defect, done, monkeypatch):
     """The loop in Python, with a made-up projection: a real one ends on the invariants or far from them."""
-    monkeypatch.setattr(projected, "take_step", lambda h, J_inverse, field, weights, columns, starts, q, L, slopes: (q, L))
-    monkeypatch.setattr(projected, "project", lambda J_inverse, field, axis, kept, scales, q, L: (q, L, 8, defect))
-    coefficients = projected.Coefficients(*DORMAND_PRINCE_8.packed, 0.1)
+    monkeypatch.setattr(projected, "take_step", lambda *given: given[-3:-1])
+    monkeypatch.setattr(projected, "project", lambda *given: (*given[-2:], 8, defect))
+    coefficients = projected.Coefficients(*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c), 0.1)
     march = getattr(projected.march, "py_func", projected.march)
     found = march(convert(HEAVY, cv.Projected())[2], coefficients, (3, 1, 0, np.empty((4, 4)), np.empty((4, 3))))
     assert found.done == done

@@ -19,6 +19,8 @@ RUNS = [
     (cv.MoserVeselov(4), FREE, 10, None),
     (cv.Lame(), top(), 10, None),
     (cv.Projected(), GRAVITY, 120, 120),
+    (cv.Taylor(9), GRAVITY, 90, 90),
+    (cv.Taylor(), FREE, 140, 140),
 ]
 
 

@@ -48,3 +48,24 @@ def test_a_step_without_a_solution_is_named_with_the_time_of_the_last_good_state
     assert type(found.failure) is kind
     assert (found.outcome.step, found.outcome.time, found.outcome.residual) == (3, 2 * GRID.dt, 0.25)
     assert len(found) == 3
+
+
+def test_what_is_built_whole_is_what_the_constructor_builds():
+    found = run()
+    built = cv.Trajectory(SCENE, found.t, found.R_WB, found.w_WB_B, found.label, cv.Counters(6, 6, 0, None))
+    assert vars(found).keys() == vars(built).keys()
+    assert vars(found.counters) == vars(built.counters)
+    assert (found.failure, found.choice, found.label) == (None, None, "planted")
+
+
+def test_runs_of_one_preparation_share_no_samples():
+    again = prepare_run(SCENE, GRID, "planted", principal_start(SCENE), SimpleNamespace(enter=stand, PAUSE=7), (), ())
+    one, other = again(), again()
+    for name in ("t", "R_WB", "w_WB_B"):
+        assert not np.shares_memory(getattr(one, name), getattr(other, name))
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def stand(n_steps, every, pause, q, L):
+    q[:], L[:] = (1.0, 0.0, 0.0, 0.0), (0.3, 0.4, 2.5)
+    return n_steps, n_steps, 0, None, 0.0, False

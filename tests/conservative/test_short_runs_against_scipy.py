@@ -53,6 +53,14 @@ def test_projected(scene):
 
 
 @pytest.mark.parametrize("scene", [*IN_FIELDS, *FREE, *SYMMETRIC, REST, *TOPS[:3]], ids=lambda scene: scene.name)
+def test_taylor(scene):
+    if cv.Taylor().unsupported(scene) is None:
+        assert distance(scene, cv.Taylor(), 0.1, 3) < 3e-11
+        coarse, fine = distance(scene, cv.Taylor(6), 0.2, 3), distance(scene, cv.Taylor(6), 0.1, 6)
+        assert fine < max(coarse / 25, 1e-12)  # 2^6 = 64
+
+
+@pytest.mark.parametrize("scene", [*IN_FIELDS, *FREE, *SYMMETRIC, REST, *TOPS[:3]], ids=lambda scene: scene.name)
 def test_reduced_takes_the_steps_of_the_papers_equations(scene):
     """The two share no line of code: three unknowns here, eighteen there."""
     runs = [method.prepare(scene, cv.Grid(0.1, 9, 1))() for method in (cv.Reduced(), cv.Convected(1e-13))]
@@ -80,6 +88,7 @@ METHODS = [
     cv.MoserVeselov(),
     cv.MoserVeselov(6),
     cv.Projected(),
+    cv.Taylor(),
 ]
 
 
@@ -108,6 +117,7 @@ def test_samples_are_every_third_state_and_the_last(method, scene):
         (cv.Reduced(6), FREE[0], 180, 540, None),
         (cv.Gauss(5), FREE[0], 100, 80, None),
         (cv.Projected(), IN_FIELDS[0], 240, 3, 240),
+        (cv.Taylor(12), IN_FIELDS[0], 240, 20, 240),
         (cv.MoserVeselov(), FREE[0], 20, 0, None),
         (cv.Lame(), TOPS[1], 20, 0, None),
     ],

@@ -44,6 +44,7 @@ LONG_RUNS = (
     ("lagrange_top", "lame"),
     ("brick_flip", "moser_veselov"),
     ("sprung_body", "projected"),
+    ("sprung_body", "taylor"),
     ("lagrange_top", "substepped"),
     ("brick_flip", "convected"),
 )

@@ -7,6 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative.declarations import Candidacy
+from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
@@ -27,7 +28,11 @@ AXIS = "momentum along the field's axis"
         (cv.MoserVeselov(4), "moser_veselov:order=4", 4, {"energy", "momentum", "axial momentum"}),
         (cv.MoserVeselov(), "moser_veselov", None, {"energy", "momentum", "axial momentum"}),
         (cv.Lame(), "lame", None, {"energy", "vertical momentum", "axial momentum"}),
-        (cv.Projected(), "projected", 8, {"energy", "vertical momentum", AXIS}),
+        (cv.Projected(), "projected", 8, {"energy", JACOBI_INTEGRAL, "vertical momentum", AXIS}),
+        (
+            *(cv.Taylor(9), "taylor:order=9", 9),
+            {"energy", JACOBI_INTEGRAL, "momentum", "vertical momentum", AXIS, "axial momentum"},
+        ),
         (
             cv.Substepped("reduced:order=4"),
             "substepped:method=reduced:order=4",
@@ -44,9 +49,10 @@ def test_order_and_invariants(method, name, order, conserves):
 def test_candidates_and_their_cost():
     assert (cv.Lame.candidacy, cv.Reduced.candidacy) == (Candidacy(1, exact=True), Candidacy(4, "implicit"))
     assert (cv.MoserVeselov.candidacy.rank, cv.MoserVeselov.candidacy.exact) == (0, True)
-    assert (cv.Projected.candidacy.rank, cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (2, 3, "implicit")
+    assert (cv.Taylor.candidacy, cv.Projected.candidacy) == (Candidacy(1, "explicit"), Candidacy(2, "explicit"))
+    assert (cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (3, "implicit")
     costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
-    assert costs == [(10, 50), (50, 60), (340, 80)]
+    assert costs == [(10, 50), (90, 32.5), (340, 80)]
     assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
     assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
 
@@ -84,6 +90,10 @@ def test_settings_that_are_shown():
         (lambda: cv.MoserVeselov(3), "order"),
         (lambda: cv.MoserVeselov(True), "order"),
         (lambda: cv.MoserVeselov(12), "order"),
+        (lambda: cv.Taylor(3), "order"),
+        (lambda: cv.Taylor(19), "order"),
+        (lambda: cv.Taylor(True), "order"),
+        (lambda: cv.Taylor(8.0), "order"),
         (lambda: cv.Substepped(most=0), "most"),
         (lambda: cv.Substepped("substepped"), "method"),
         (lambda: cv.Substepped("lame"), "method"),
@@ -113,6 +123,7 @@ def test_rows_of_a_tableau_that_are_refused_are_counted():
 
 def test_what_is_at_the_edge_of_what_is_allowed():
     assert [cv.Gauss(stages).stages for stages in (1, 10)] == [1, 10]
+    assert [cv.Taylor(order).order for order in (4, 18)] == [4, 18]
     assert cv.Substepped(most=1).most == 1
     heun = explicit.ExplicitTableau("", 3, ((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4))
     assert heun.c == pytest.approx((0, 1 / 3, 2 / 3))
@@ -137,6 +148,9 @@ def test_what_methods_do_not_support():
         (cv.MoserVeselov(), FREE),
         (cv.Projected(), SPRUNG),
         (cv.Reduced(), FREE),
+        (cv.Taylor(), FREE),
+        (cv.Taylor(), TOP),
+        (cv.Taylor(), SPRUNG),
     ):
         assert method.unsupported(scene) is None
 

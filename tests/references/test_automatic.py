@@ -8,7 +8,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion
 from conservative.errors import AccuracyNotReached
-from conservative.methods import automatic
+from conservative.methods import trials
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 
@@ -61,7 +61,7 @@ def test_true_errors_are_within_ten_times_what_was_asked_for():
 def test_a_choice_that_trusts_too_much_is_caught(monkeypatch):
     """The negative control of the test above: estimates that are far too small."""
 
-    monkeypatch.setattr(automatic, "_convergence_factor", lambda method: 1e9)
+    monkeypatch.setattr(trials, "convergence_factor", lambda method: 1e9)
     rng = np.random.default_rng(3)
     errors = [true_error(cv.integrate(random_scene(rng, "heavy body"), error=1e-8)) for _ in range(3)]
     assert max(errors) > 1e-7  # measured 2e-4
@@ -94,4 +94,4 @@ def test_other_fields_get_the_explicit_method():
         warnings.simplefilter("error")
         scene = cv.scenes.brick_flip()
         held = cv.Scene("held", scene.body, scene.R_WB0, scene.w_WB_B0, 0.5, cv.LinearSpring(50.0, (0.3, 0.1, 0), (1, 1, 0)))
-        assert cv.integrate(held, error=1e-6).choice.method.family == "projected"
+        assert cv.integrate(held, error=1e-6).choice.method.family == "taylor"

@@ -195,7 +195,7 @@ def test_failure_of_ours_is_told(monkeypatch):
     ]
     failed = runs.failures_of_ours(frame(found))
     assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
-    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed))
+    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed, random=None))
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr

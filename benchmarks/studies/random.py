@@ -1,0 +1,250 @@
+"""The study of random bodies: errors and times of our methods and of engines on bodies that nobody chose.
+
+The bodies are those of `conservative.scenes.random_body`, whose docstring is the distribution. On each of them a method is
+taken at up to 17 settings, the same steps for every method with a step, the same tolerances for every one without.
+
+* The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, spread over the motion
+  of the scene: 12 rad at the rate of the start, 11 to 49 rad turned in fact (nine in ten of 120 bodies). Asymmetric bodies in a
+  field amplify errors: a relative one of the start 15 times at the median, 300 times and more on one body in ten. Over a longer
+  time, on many bodies no method in double precision would reach 1e-12.
+* The time of a setting is that of a whole call of a prepared run, over a motion `DURATIONS` times as long in the same steps, of
+  which only the end is kept: what a call costs before its first step is then a few per cent, and decides nothing. A run that
+  takes longer than `LONG` already is timed over the motion itself. All runs of a body are timed in interleaved rounds.
+* Not timed, as that would cost more than all else, is what cannot decide anything: see `worth_timing`.
+
+Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies). No second
+truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an error, they confirm it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from conservative.attitude import angle_between
+from conservative.check import positive_integer
+from conservative.errors import BadInput, IntegrationFailed
+from conservative.method import Grid, Method, Role, Run
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.client import time_limit
+from conservative.references.precise import Precise
+from conservative.references.truth import Truth
+from conservative.scene import Scene
+from conservative.scenes.random_body import FIELDS, name_of, random_body
+from conservative.trajectory import Trajectory
+
+from ..measures.cost_at_error import cost, credit, first_within
+from ..measures.measure import Measure, Value
+from ..measures.measurement import Measurement
+from ..measures.timing import time_interleaved, wall_time
+from .case import Case, Failure, Success
+from .selection import Missing, at_tolerance, series, tolerance_setting
+from .speed import keep_end
+from .study import Progress, Study
+from .time_limit import attempt_here
+
+DECADES = tuple(10.0**-k for k in range(2, 13))
+"""Attitude errors, rad, at which methods are compared."""
+SAMPLES = 12
+"""Instants at which errors are read; the longest step is the time between two of them."""
+STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50, 60))
+"""Steps of the motion, long to short."""
+TOLERANCES = (0.5, *(10.0**-k for k in range(1, 17)))
+"""Tolerances of adaptive methods; heyoka has its lowest order, 2, at the first."""
+FEW = slice(None, None, 2)
+"""What a quick study takes of them."""
+ORDER = 4
+"""Least order: a method of a lower one takes thousands of steps where these take a dozen."""
+FLOOR = DECADES[-1] / 10
+"""A method that is below this error twice gets no shorter steps: there is no decade left."""
+DURATIONS = 50
+"""How many times longer the motion is that is timed."""
+LONG = 0.002
+"""Time, s, of a run over the motion itself that is timed as it is."""
+CALL = 1e-4
+"""Least duration of a timed sample, s: mostly one call, since a short sample is seldom interrupted."""
+MARGIN = 3.0
+"""How many times dearer than the cheapest of its side a setting may look before it is timed."""
+BITS = 96
+SLOW, EVERY = 0.01, 3
+"""Time, s, of a run from which on a line gets one setting of so many."""
+ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
+"""Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get fewer."""
+TIME = Value(Measure.TIME, math.nan)
+UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
+
+
+def bodies(number: int, seed: int) -> tuple[Scene, ...]:
+    """Return that many random bodies in each field; the first ones are the same whatever the number.
+
+    Raises
+    ------
+    BadInput
+        number is not an integer of 1 or more, or seed not one of 0 or more.
+    """
+    positive_integer("bodies", number)
+    places = ((field, index) for field in FIELDS for index in range(number))
+    return tuple(random_body(field, seed, index).rename(name_of(field, seed, index)) for field, index in places)
+
+
+def settings(method: Method) -> tuple[Method, ...]:
+    """Return the settings that a family's name stands for, of order `ORDER` at least.
+
+    Of ours they are those that the automatic choice probes, of engines all.
+    """
+    approximate = method.candidacy is not None and not method.candidacy.exact
+    ours = method.candidate_settings() if approximate else ()
+    found = ours if method.role == Role.OURS else method.variants()
+    return tuple(each for each in found if (each.order or ORDER) >= ORDER)
+
+
+def select(methods: Iterable[Method]) -> tuple[Method, ...]:
+    """Return those of some methods that the study takes where nobody has named them; see `settings`."""
+    return tuple(method for method in methods if isinstance(method, Missing) or method in settings(method))
+
+
+def precise(scene: Scene, grid: Grid) -> Truth:
+    """Return the motion in `BITS` bits, rounded to double."""
+    method = Precise(BITS)
+    return Truth(method.solve(scene, grid), 0.0, (method.label, ""), float(grid.t[-1]))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A setting that reaches its end: its error, rad, and about what a run costs, s per simulated second."""
+
+    case: Case
+    done: Success
+    error: float
+    spent: float
+
+    @property
+    def side(self) -> str:
+        """What it stands for: ours, or an engine in all of its forms."""
+        return Role.OURS if self.case.method.role == Role.OURS else self.case.method.family
+
+
+Line = list[Point]
+"""The points of one line, coarse to fine."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield the error of every setting on every body, and the time of those that are worth timing."""
+    methods = list({series(method): method for method in study.competitors}.values())
+    pieces = len(methods) + 2
+    for i, scene in enumerate(study.scenes):
+        progress(i * pieces, len(study.scenes) * pieces, f"{scene.name}: truth")
+        truth = study.truth(scene, Grid(scene.t_end / SAMPLES, SAMPLES)).trajectory
+        found: list[Line] = []
+        for j, method in enumerate(methods, start=1):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+            found.append((yield from measure_line(study, cases(study, scene, method), truth)))
+        chosen = worth_timing(found)
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(chosen)} settings")
+        yield from time_rows(study, chosen)
+        yield from (point.case.row(TIME, UNTIMED) for line in found for point in line if point not in chosen)
+
+
+def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
+    """Return the settings of a line, coarse to fine; the one whose row says so of a method that cannot do the scene."""
+    setting, few = tolerance_setting(method), FEW if study.quick else slice(None)
+    grid = Grid(scene.t_end / SAMPLES, SAMPLES)
+    if method.unsupported(scene) or (method.order is None and setting is None):
+        return [Case(study.name, scene, method, grid)]
+    if setting is None:
+        return [Case(study.name, scene, method, Grid(scene.t_end / n, n, n // SAMPLES)) for n in STEPS[few]]
+    return [Case(study.name, scene, each, grid) for each in at_tolerances(method, setting, TOLERANCES[few])]
+
+
+def at_tolerances(method: Method, setting: str, tolerances: Iterable[float]) -> Iterator[Method]:
+    """Yield the method at those of the tolerances that it takes."""
+    for tolerance in tolerances:
+        with suppress(BadInput):
+            yield at_tolerance(method, setting, tolerance)
+
+
+def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, Line]:
+    """Yield the errors of a line, coarse to fine, until there is no decade left; return its points."""
+    line: Line = []
+    for i, case in enumerate(settings):
+        slow = bool(line) and line[-1].spent * case.scene.t_end > SLOW
+        if (slow and i % EVERY) or [point.error < FLOOR for point in line[-2:]] == [True, True]:
+            continue
+        outcome = attempt_here(study.hang_limit, case, study.skip_missing)
+        if isinstance(outcome, Failure):
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)
+            continue
+        error = float(angle_between(truth.R_WB, outcome.trajectory.R_WB).max())
+        line.append(Point(case, outcome, error, estimate(outcome) / case.scene.t_end))
+        yield case.row(Value(Measure.ATTITUDE_MAX, error))
+    return line
+
+
+def estimate(done: Success) -> float:
+    """Return about what a run costs, s: the least of a few calls, of two where it is slow; the very first may have compiled."""
+    spent = min(wall_time(done.run) for _ in range(2))
+    return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
+
+
+def worth_timing(lines: Iterable[Line]) -> list[Point]:
+    """Return the points that may decide what the cheapest way to a decade is, of ours or of an engine.
+
+    Those are, of each line that looks at most `MARGIN` times as dear as the cheapest of its side, the coarsest point that is
+    credited with the decade (see `cost_at_error`), and the one before it.
+    """
+    sides: dict[str, list[Line]] = {}
+    for line in filter(None, lines):
+        sides.setdefault(line[0].side, []).append(line)
+    return list({id(point): point for side in sides.values() for error in DECADES for point in _deciding(side, error)}.values())
+
+
+def _deciding(lines: list[Line], error: float) -> Iterator[Point]:
+    costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in lines]
+    least = min((each for each in costs if not math.isnan(each)), default=math.nan)
+    for line, each in zip(lines, costs, strict=True):
+        first = first_within(credit([p.error for p in line]), error)
+        if first is not None and each <= MARGIN * least:
+            yield from line[max(first - 1, 0) : first + 1]
+
+
+def time_rows(study: Study, points: list[Point]) -> Iterator[Measurement]:
+    """Yield the times of the points of a body, s per simulated second, in interleaved rounds."""
+    runs: dict[str, Run] = {}
+    timed = {str(i): (point, longer(point)) for i, point in enumerate(points)}
+    with time_limit(study.hang_limit):
+        for key, (point, case) in timed.items():
+            run = prepare_unchecked(case)
+            if isinstance(run, Outcome):
+                yield point.case.row(TIME, run)
+            else:
+                runs[key] = run
+        timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=BUDGET)
+    for key, timing in timings.items():
+        (point, case), detail = timed[key], str(timing) if timing.outcome.ok else ""
+        simulated = case.grid.dt * case.grid.n_steps
+        yield point.case.row(Value(Measure.TIME, timing.minimum / simulated), timing.outcome, detail)
+
+
+def prepare_unchecked(case: Case) -> Run | Outcome:
+    """Return the run, or how it ends before its time; it may drift, since its errors are those of the motion itself.
+
+    Were it to be conserved as well, loose tolerances would be lost to engines that reach a loose error with them.
+    """
+    try:
+        run = case.method.prepare(case.scene, case.grid)
+        outcome = run().outcome
+    except IntegrationFailed as failure:
+        return failure.outcome
+    except Exception as error:  # an engine may raise anything
+        if case.method.role != Role.ENGINE:
+            raise
+        return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+    return run if outcome.ok else outcome
+
+
+def longer(point: Point) -> Case:
+    """Return the case whose run is timed: the motion, `DURATIONS` times as long where that is quick, sampled at its end."""
+    quick = point.spent * point.case.scene.t_end < LONG
+    return replace(point.case, grid=keep_end(point.case.grid, DURATIONS if quick else 1))

@@ -1,0 +1,75 @@
+"""Samples between steps: a state and a time after it, which short steps of order 8 bridge to round-off.
+
+Each gap is crossed twice, the second time in twice as many steps, until both agree so far that the difference, which halving
+the steps makes 256 times smaller, leaves nothing but round-off. Nothing is projected: such steps lose nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import entry, kernel
+from .projected import near_unit, take_step
+from .signals import call_handlers
+from .simd import LANES
+
+AGREED = 2.0**-44
+"""Largest difference of two crossings, relative: of the finer one a 256th is left."""
+MOST = 2**20
+"""Steps of a crossing at most."""
+BLOCK = 2**8
+"""Samples between two calls of handlers of signals."""
+
+
+@kernel
+def cross_gap(n, gap, t, J_inverse, field, table, q, L, room):
+    """Return the state (q, L) that follows on one at t, s, after a gap, s, in n steps."""
+    (weights, columns, starts, nodes), (scaled, slopes) = table, room
+    h = gap / n
+    for i in range(len(weights)):
+        scaled[i] = h * weights[i] if i < starts[-2] else weights[i]
+    for step in range(n):
+        q, L = take_step(h, t + step * h, J_inverse, field, scaled, columns, starts, nodes, q, L, slopes)
+        q = near_unit(q)
+    return q, L
+
+
+@kernel
+def difference(q0, L0, q1, L1, size):
+    """The largest difference of two states, momenta relative to `size`; not a number where one is none."""
+    found = 0.0
+    for i in range(4):
+        found += abs(q1[i] - q0[i])
+    for i in range(3):
+        found += abs(L1[i] - L0[i]) / size
+    return found
+
+
+@entry
+def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, gaps, q, L):
+    """Move the states q (n, 4), of length one, and L (n, 3), kg m^2/s, principal axes, at t (n,), s, on by gaps (n,), s.
+
+    First steps are at most `longest`, s; momenta are relative to `size`, kg m^2/s. Returns how many states were moved: all, or
+    those before the first for which the crossings do not agree.
+    """
+    table, room = (weights, columns, starts, nodes), (np.empty(len(weights)), np.empty(2 * LANES * (len(starts) - 2)))
+    for i in range(len(t)):
+        if i % BLOCK == BLOCK - 1:
+            call_handlers()
+        if gaps[i] == 0.0:
+            continue
+        n = max(1, int(min(math.ceil(gaps[i] / longest), 1.0 * MOST)))
+        q0, L0 = (q[i, 0], q[i, 1], q[i, 2], q[i, 3]), (L[i, 0], L[i, 1], L[i, 2])
+        coarse, off = cross_gap(n, gaps[i], t[i], J_inverse, field, table, q0, L0, room), math.inf
+        while not off <= AGREED:
+            n *= 2
+            if n > MOST:
+                return i
+            fine = cross_gap(n, gaps[i], t[i], J_inverse, field, table, q0, L0, room)
+            off = difference(coarse[0], coarse[1], fine[0], fine[1], size)
+            coarse = fine
+        q[i, 0], q[i, 1], q[i, 2], q[i, 3] = coarse[0]
+        L[i, 0], L[i, 1], L[i, 2] = coarse[1]
+    return len(t)

@@ -1,0 +1,165 @@
+"""Samples at any times: from the step before each of them, on by short steps of high order, to round-off.
+
+So a sample is as good as the steps that lead to it: no polynomial is put through steps, and no invariant is lost. Source: the
+coefficients are Dormand and Prince's, as in `conservative.methods.coefficients.explicit`; the rest is our own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array, to_quaternion
+from ..check import SAMPLE_BYTES, describe, most_samples, real_array
+from ..deferred_imports import kernels
+from ..errors import BadInput, Diverged
+from ..method import Grid, Method
+from ..scene import Scene
+from ..trajectory import Trajectory, accept_samples
+from .coefficients.explicit import DORMAND_PRINCE_8
+from .principal_axes import PrincipalStart, invariant_scales, principal_start
+from .units import bound_rate, convert_scene, find_units
+
+SAME = 1e-9
+"""Part of a step by which a sample may be off a step to be taken from it as it is."""
+RADIANS = 0.5
+"""Longest step that a gap is crossed in at first, rad turned at most."""
+LONGEST = 6.0
+"""Longest step, rad turned at most, where accuracy does not depend on it: shorter ones cost less than longer gaps."""
+MOST_KEPT = 10**6
+"""Steps of a run that are kept to start from; of more, as many, evenly spaced."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Which samples of a run are kept.
+
+    Attributes
+    ----------
+    spacing
+        Where steps have to divide it: the distance of samples, s. Else None.
+    every
+        So many of these distances, or of the steps, are from one sample to the next.
+    at
+        Times of the samples (n,), s, in increasing order, instead of both. Else None.
+    """
+
+    spacing: float | None = None
+    every: int = 1
+    at: Array | None = None
+
+
+def read_times(value: object, t_end: float) -> Array:
+    """Return times of samples (n,), s, as given or, where `value` is a number, so many evenly spaced ones from 0 to t_end, s.
+
+    Raises
+    ------
+    BadInput
+        They are no numbers, not finite, not in increasing order, not within 0 to t_end, none, or do not fit in memory.
+    """
+    allowed = f"times (n,), s, in increasing order from 0 to t_end = {t_end:g}, or their number, 2 or more"
+    if not isinstance(value, bool) and isinstance(value, Integral):
+        _require_count(int(value), 2, allowed)
+        return np.linspace(0.0, t_end, int(value))
+    t = real_array(value)
+    if t is None or t.ndim != 1:
+        raise BadInput("t_eval", describe(value), allowed)
+    _require_count(len(t), 1, allowed)
+    if not np.isfinite(t).all():
+        raise BadInput("t_eval", f"{describe(t[~np.isfinite(t)][0].item())} at index {np.argmin(np.isfinite(t))}", allowed)
+    if (np.diff(t) <= 0).any():
+        i = int(np.argmax(np.diff(t) <= 0))
+        raise BadInput("t_eval", f"{t[i + 1]:.17g} after {t[i]:.17g}, at index {i + 1}", allowed)
+    if t[0] < 0 or t[-1] > t_end * (1 + 1e-9):
+        raise BadInput("t_eval", f"times from {t[0]:.17g} to {t[-1]:.17g}", allowed)
+    return t
+
+
+def _require_count(n: int, least: int, allowed: str) -> None:
+    """Raise `BadInput` unless the number n of samples is at least so large, and they fit in memory."""
+    if n < least:
+        raise BadInput("t_eval", "none" if n == 0 else f"{n}", allowed)
+    if n > most_samples():
+        raise BadInput(
+            "t_eval", f"{n} samples", f"{allowed}: up to {most_samples():.3g} fit in memory, {SAMPLE_BYTES} bytes each"
+        )
+
+
+def grid_before(scene: Scene, method: Method, dt: float, t: Array) -> Grid:
+    """Return the grid of steps dt, s, from which samples at times t (n,), s, are reached."""
+    dt = divide_step(scene, method, dt)
+    n_steps = max(1, int(t[-1] / dt * (1 + SAME)))
+    return Grid(dt, n_steps, spread(n_steps))
+
+
+def divide_step(scene: Scene, method: Method, dt: float) -> float:
+    """Return the step dt, s; an equal part of it where accuracy does not depend on the step, and gaps would be long."""
+    return dt if method.order is not None else dt / max(1, math.ceil(dt * bound_rate(scene) / LONGEST))
+
+
+def spread(n_steps: int) -> int:
+    """Return after how many steps each one is kept, of a number of steps."""
+    return max(1, n_steps // MOST_KEPT)
+
+
+def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> Trajectory:
+    """Return the samples at times t (n,), s, in increasing order, of the run of a method on a grid.
+
+    Of a run that failed, those up to its last good step.
+    """
+    if not len(found):
+        return found
+    row = np.searchsorted(found.t, t + SAME * grid.dt, side="right") - 1
+    gaps = t - found.t[row]
+    gaps[np.abs(gaps) <= SAME * grid.dt] = 0.0
+    n = len(t) if found.ok else int(np.count_nonzero((row < len(found) - 1) | (gaps == 0.0)))
+    row, gaps = row[:n], gaps[:n]
+    R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
+    failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
+    samples = replace(found, t=t[:done].copy(), R_WB=R_WB[:done], w_WB_B=w_WB_B[:done], failure=failure)
+    return accept_samples(samples, method.conserves, method.bounds(found.scene, grid))
+
+
+def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
+    """Return what follows after gaps (n,), s, on states at times t (n,), s, and how many were moved.
+
+    These are all before the first that cannot be. States are attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. Those
+    whose gap is 0 stay as they are, bit for bit.
+    """
+    far = np.flatnonzero(gaps)
+    R, w = R_WB.copy(), w_WB_B.copy()
+    moved = 0
+    if len(far):
+        units = find_units(scene, scene.dt)
+        of_order_one = scene.derive(convert_scene, units)
+        R[far], w[far], moved = _move(of_order_one, t[far] / units.time, gaps[far] / units.time, R[far], w[far] * units.time)
+        w[far] /= units.time
+    return R, w, len(t) if moved == len(far) else int(far[moved])
+
+
+def _move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:
+    """Do the same with a scene of order one and gaps that are not 0."""
+    start, tableau = scene.derive(principal_start), DORMAND_PRINCE_8
+    q, L = into_principal_axes(scene, start, R_WB, w_WB_B)
+    longest, size = RADIANS / bound_rate(scene), invariant_scales(scene)[1]
+    table = (*tableau.packed, np.array(tableau.c))
+    moved = kernels("between").move(start.J_inverse, field_of(start), *table, size, longest, t, gaps, q, L)
+    R, w = np.empty((moved, 3, 3)), np.empty((moved, 3))
+    kernels("samples").to_body_axes(t, q, L, start.J_inverse, None, start.R_BP, R, w)
+    R_WB[:moved], w_WB_B[:moved] = R, w
+    return R_WB, w_WB_B, moved
+
+
+def into_principal_axes(scene: Scene, start: PrincipalStart, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array]:
+    """Return quaternions (n, 4) and momenta (n, 3), kg m^2/s, principal axes: of attitudes (n, 3, 3), rates (n, 3), rad/s."""
+    R_BP = scene.body.R_BP
+    return np.ascontiguousarray(to_quaternion(R_WB @ R_BP)), np.ascontiguousarray((w_WB_B @ R_BP) * scene.body.moments)
+
+
+def field_of(start: PrincipalStart) -> Any:
+    """Return the field of a start; of a free body one of no weight, for which there is code anyway."""
+    return kernels("fields").Uniform(0.0, 0.0, 0.0) if start.field is None else start.field

@@ -1,0 +1,149 @@
+"""Fields that turn at a constant rate, as gravity does about a satellite in a circular orbit.
+
+Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3; the integral is C. G. J. Jacobi's (1836).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..attitude import Array, from_quaternion, triple
+from ..check import build_unchecked, describe, positive_number
+from ..errors import BadInput
+from .direction import unit_vector
+from .gravity_gradient import GravityGradient
+from .potential import Potential, depends_on_time
+
+_ACROSS = 1e-9
+"""Cosine of the angle to the normal at which a direction still lies in the plane of the orbit."""
+
+
+@dataclass(frozen=True, eq=False)
+class _OrbitFields:
+    rate: float
+    normal_W: Array
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Orbit(_OrbitFields):
+    """Axes O that turn at a constant rate, rad/s, about a normal fixed in the world, as in a circular orbit; O = W at t = 0.
+
+    Parameters
+    ----------
+    rate
+        rad/s, above 0.
+    normal_W
+        Axis (3,) that they turn about, right-handed, world axes; its length does not matter, but must not be 0.
+
+    Raises
+    ------
+    BadInput
+        rate is not a finite number above 0, or normal_W is not finite, of another shape, or 0.
+    """
+
+    def __init__(self, rate: float, normal_W: ArrayLike) -> None:
+        super().__init__(positive_number("rate", rate, "a finite rate above 0, rad/s"), unit_vector("normal_W", normal_W))
+
+    def R_WO(self, t: ArrayLike) -> Array:
+        """Return the attitudes of the axes O in the world, (..., 3, 3), at times (...), s."""
+        half = np.asarray(self.rate / 2 * np.asarray(t, dtype=float))[..., None]
+        return from_quaternion(np.concatenate([np.cos(half), np.sin(half) * self.normal_W], axis=-1))
+
+    def gravity_gradient(self, inertia: ArrayLike, direction_W: ArrayLike) -> Turning:
+        """Return the gradient of a planet's gravity on a satellite in this orbit.
+
+        Parameters
+        ----------
+        inertia
+            That of the satellite: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
+        direction_W
+            Direction (3,) of the planet, or away from it, at t = 0, world axes: in the plane of the orbit, at right angles to
+            `normal_W`. What it has along that, up to 1e-9, is taken off.
+
+        Raises
+        ------
+        BadInput
+            It is not; or a parameter is not finite, of another shape, not above 0, or not an inertia.
+        """
+        found = GravityGradient(self.rate, inertia, direction_W)
+        nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
+        if abs(found.direction_W @ self.normal_W) > _ACROSS:
+            hint = f", such as {nearest.tolist()}" if np.linalg.norm(nearest) > _ACROSS else ""
+            allowed = f"a direction in the plane of the orbit, at right angles to {self.normal_W.tolist()}{hint}"
+            raise BadInput("direction_W", describe(found.direction_W.tolist()), allowed)
+        return Turning(GravityGradient(self.rate, inertia, nearest), self)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    potential: Potential
+    orbit: Orbit
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Turning(_Fields):
+    """A field that is fixed in axes O which turn: V(R_WB, t) = V_0(R_OB), R_OB = R_WO(t)' R_WB.
+
+    Energy is not conserved, but the Jacobi integral is: E - rate n.l, with the normal n and the world momentum l.
+
+    Parameters
+    ----------
+    potential
+        V_0, a potential that does not depend on the time. At t = 0 the field is this one, world axes.
+    orbit
+        The axes O.
+
+    Raises
+    ------
+    BadInput
+        potential is no potential or depends on the time, or orbit is not an `Orbit`.
+    """
+
+    time_dependent: ClassVar[bool] = True
+    axis_W: ClassVar[None] = None
+
+    def __init__(self, potential: Potential, orbit: Orbit) -> None:
+        if isinstance(potential, type) or depends_on_time(potential) or not isinstance(potential, Potential):
+            allowed = "a potential that does not depend on the time, such as GravityGradient"
+            raise BadInput("potential", describe(potential), allowed)
+        if not isinstance(orbit, Orbit):
+            raise BadInput("orbit", describe(orbit), "an Orbit")
+        super().__init__(potential, orbit)
+
+    def in_orbit(self, R_WB: Array, t: Array) -> Array:
+        """Return R_OB, (..., 3, 3), of attitudes (..., 3, 3) at times (...), s."""
+        return np.swapaxes(self.orbit.R_WO(t), -1, -2) @ R_WB
+
+    def energy_at(self, R_WB: Array, t: Array) -> Array:
+        """Return V, (...), in J at attitudes (..., 3, 3) and times (...), s."""
+        return self.potential.energy(self.in_orbit(R_WB, t))
+
+    def gradient_at(self, R_WB: Array, t: Array) -> Array:
+        """Return dV/dR, (..., 3, 3), in J at matrices (..., 3, 3) and times (...), s."""
+        return self.orbit.R_WO(t) @ self.potential.gradient(self.in_orbit(R_WB, t))
+
+    def scale(self) -> float:
+        """Return the size of the field that turns, J."""
+        return self.potential.scale()
+
+    def in_units(self, energy: float, time: float) -> Turning:
+        """Return the field with energies in units of `energy`, J, and times in units of `time`, s, powers of two."""
+        convert = getattr(self.potential, "in_units", None)
+        assert convert is not None  # `conservative.methods.units.find_units` has looked
+        orbit = build_unchecked(Orbit, rate=self.orbit.rate * time, normal_W=self.orbit.normal_W)
+        return build_unchecked(Turning, potential=convert(energy), orbit=orbit)
+
+    def kernel_field(self, R_BP: Array) -> Any:
+        """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and O."""
+        from ..kernels.field_in_time import start_turning
+
+        return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))
+
+
+def static_part(potential: Any) -> Any:
+    """Return the potential that turns, of a `Turning`, else the potential, or None, as it is."""
+    return potential.potential if isinstance(potential, Turning) else potential

@@ -1,0 +1,111 @@
+"""`conservative study`."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import click
+
+from conservative.errors import require_extra
+
+from ..terminal.interrupts import interruptible
+from . import completion
+from .options import FilePath, epilog, split_list, split_names
+
+if TYPE_CHECKING:
+    from ..tables.study_rows import StudyRows
+
+FILES = ("study.md", "study.csv", "study.json")
+"""The files of `--out`."""
+COLUMNS = 7
+"""Columns that a terminal has room for: of ratios all but the winners, which the files have."""
+
+
+@click.command(
+    short_help="Make one study: random bodies, work against precision, ...",
+    epilog=epilog(
+        "conservative study random --bodies 40 --seed 7",
+        "conservative study random --bodies 5 --methods projected,gauss,heyoka --csv rows.csv",
+        "conservative study convergence --scenes lagrange_top --methods reduced,gauss --json",
+        "conservative study engines_at_one_step --engines all --out one_step",
+    ),
+)
+@click.argument("name", shell_complete=completion.studies)
+@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the study's own]")
+@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
+@click.option(
+    "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="Engines in environments, too."
+)
+@click.option("--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each of four fields.  [default: 10]")
+@click.option("--seed", type=click.IntRange(0), metavar="S", help="Of the random bodies.  [default: 0]")
+@click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
+@click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option("--time-limit", type=float, metavar="S", help="Longest run to plan for, s.  [default: 0.6, with --quick 0.15]")
+@click.option("--json", "as_json", is_flag=True, help="Rows and samples as JSON on stdout.")
+@click.option("--csv", type=FilePath(), help="Write the rows as CSV.")
+@click.option("--markdown", type=FilePath(), help="Write the tables as Markdown.")
+@click.option("--out", type=FilePath(), help=f"Folder for {', '.join(FILES)}.")
+def study(name: str, as_json: bool, **options: Any) -> None:
+    """Make the study NAME and show what it finds: of random bodies the ratios of times, of any other study its rows.
+
+    The names are those of the studies that a report is made of; `random` draws bodies that nobody chose.
+    """
+    require_extra("conservative study", "report")
+    with ExitStack() as files:
+        streams = _open(files, options)
+        found = _measure(name, options)
+        contents = {"study.md": found.markdown_text, "study.csv": found.csv_text, "study.json": found.json_text}
+        for stream, content in streams:
+            stream.write(contents[content]())
+    if as_json:
+        click.echo(found.json_text())
+    else:
+        _show(found)
+
+
+def _open(files: ExitStack, options: dict[str, Any]) -> list[tuple[IO[str], str]]:
+    """Return the files to write, each with what it gets: a place that cannot be written is an error before any work."""
+    from conservative.files import make_folder, text_file
+
+    out: Path | None = options.pop("out")
+    wanted = [("csv", options.pop("csv"), "study.csv"), ("markdown", options.pop("markdown"), "study.md")]
+    if out is not None:
+        make_folder(out, "out")
+        wanted += [("out", out / content, content) for content in FILES]
+    return [(files.enter_context(text_file(path, name)), content) for name, path, content in wanted if path is not None]
+
+
+def _measure(name: str, options: dict[str, Any]) -> StudyRows:
+    """Return what the study finds.
+
+    Raises
+    ------
+    BadInput
+        A name, a setting or a number cannot be used, or is not for this study; found before any work.
+    MissingEngine
+        An engine is not installed, and nobody said to skip it.
+    """
+    from ..run.provenance import provenance
+    from ..run.single_study import Extent, measure_study, plan_study
+    from ..tables.study_rows import StudyRows
+    from ..terminal.progress import progress
+
+    scenes, methods = (tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods"))
+    engines = tuple(split_list("engines", options.pop("engines")))
+    planned, source = plan_study(name, Extent(scenes, methods, engines, **options)), provenance()
+    made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
+    with interruptible(signal.SIGTERM), progress() as step:
+        found = measure_study(planned, lambda done, total, what: step(done / total, what))
+    return StudyRows(name, found.table, found.samples, made)
+
+
+def _show(found: StudyRows) -> None:
+    from ..terminal.tables import TerminalTable, print_tables, print_text
+
+    print_tables(
+        TerminalTable(caption, header, [list(map(str, row)) for row in rows]) for caption, (header, rows) in found.tables
+    )
+    print_text("\n".join(found.statements))

@@ -1,0 +1,135 @@
+"""The study of random bodies: which settings are measured, at which instants, and which of them are timed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import random, selection, studies
+from conservative.benchmarks.studies.case import Case
+from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, Point
+from conservative.benchmarks.studies.study import Study
+from conservative.method import Grid, Role
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.registry import method
+from conservative.scenes.random_body import FIELDS, random_body
+
+from .generic_study import SCENE, Broken
+
+BODY = random_body()
+METHODS = (cv.Projected(), method("heyoka"))
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Rows of one body in uniform gravity, of a quick study."""
+    study = replace(studies.random_study(METHODS, 1, 3, quick=True), scenes=random.bodies(1, 3)[:1])
+    return list(studies.findings(study))
+
+
+def made_up(name, error, spent):
+    """A point of a line, with no run behind it."""
+    return Point(Case("random", SCENE, method(name), Grid(0.1, 12)), None, error, spent)
+
+
+def test_bodies_are_the_first_ones_whatever_their_number():
+    few, many = random.bodies(2, 3), random.bodies(5, 3)
+    assert len(many) == 5 * len(FIELDS)
+    by_name = {scene.name: scene for scene in many}
+    assert all(np.array_equal(scene.w_WB_B0, by_name[scene.name].w_WB_B0) for scene in few)
+    assert {scene.name for scene in few} < set(by_name)
+
+
+@pytest.mark.parametrize(("bodies", "seed", "argument"), [(0, 0, "bodies"), (1.5, 0, "bodies"), (1, -1, "seed")])
+def test_bad_numbers(bodies, seed, argument):
+    with pytest.raises(cv.BadInput) as caught:
+        random.bodies(bodies, seed)
+    assert caught.value.argument == argument
+
+
+def test_every_point_has_an_error_and_a_time_or_a_reason(rows):
+    errors = {(row.method, row.dt): row for row in rows if row.measure is Measure.ATTITUDE_MAX}
+    times = {(row.method, row.dt): row for row in rows if row.measure is Measure.TIME}
+    assert set(times) == {key for key, row in errors.items() if row.outcome.ok}
+    assert all(row.value > 0 or row.outcome == random.UNTIMED for row in times.values())
+    assert {row.series for row in times.values() if row.outcome.ok} == {"projected", "heyoka"}
+
+
+def test_errors_fall_as_far_as_the_last_decade(rows):
+    for name in ("projected", "heyoka"):
+        errors = [row.value for row in rows if row.series == name and row.measure is Measure.ATTITUDE_MAX and row.outcome.ok]
+        assert min(errors) < DECADES[-1] * 10  # measured 2e-13 and 4e-14
+        assert errors[0] == max(errors)
+
+
+def test_all_settings_are_read_at_the_same_instants():
+    times = [case.grid.t for each in METHODS for case in random.cases(Study("random", (BODY,), METHODS), BODY, each)]
+    assert {len(t) for t in times} == {SAMPLES + 1}
+    assert all(np.allclose(t, times[0], rtol=1e-12, atol=0) for t in times)
+
+
+def test_both_sides_have_as_many_settings():
+    study = Study("random", (BODY,), METHODS)
+    assert [len(random.cases(study, BODY, each)) for each in METHODS] == [17, 17]
+    assert [len(random.cases(replace(study, quick=True), BODY, each)) for each in METHODS] == [9, 9]
+
+
+def test_a_tolerance_that_an_engine_does_not_take_is_left_out():
+    scipy = [case.method.rtol for case in random.cases(Study("random", (SCENE,), METHODS), SCENE, method("scipy"))]
+    assert min(scipy) == 1e-13
+
+
+def test_what_a_family_stands_for():
+    assert cv.Lame not in {type(each) for each in selection.methods(settings=random.settings)}  # exact, for symmetric bodies
+    chosen = random.select(selection.methods())
+    ours = {each.name for each in chosen if each.role == Role.OURS}
+    assert {"projected", "gauss", "reduced:order=6"} <= ours
+    assert "reduced" not in ours  # of order 2
+    assert {each.frame for each in chosen if each.family == "heyoka"} == {"body", "non_spinning", "lean"}
+    assert {each.name for each in chosen if each.family in ("mujoco", "pinocchio")} == {"mujoco", "pinocchio"}
+
+
+def test_only_what_may_decide_is_timed():
+    cheap = [made_up("projected", error, time) for error, time in ((1e-1, 1.0), (1e-5, 2.0), (1e-13, 4.0))]
+    dear = [made_up("gauss", error, random.MARGIN * 8 * time) for error, time in ((1e-1, 1.0), (1e-5, 2.0), (1e-13, 4.0))]
+    other = [made_up("heyoka", 1e-13, 1e3)]  # another side, however dear
+    assert random.worth_timing([cheap, dear, other]) == [*cheap, *other]
+    near = [replace(point, spent=point.spent / 24) for point in dear]
+    assert set(map(id, random.worth_timing([cheap, near, other]))) == set(map(id, [*cheap, *near, *other]))
+
+
+def test_a_lucky_point_is_timed_only_with_what_it_is_credited_with():
+    line = [made_up("projected", error, time) for error, time in ((1e-13, 1.0), (1e-1, 2.0), (1e-13, 4.0), (1e-14, 8.0))]
+    assert random.worth_timing([line]) == line[1:3]
+
+
+def test_the_run_that_is_timed_is_longer_in_the_same_steps():
+    quick, slow = made_up("projected", 1e-3, 1e-9), made_up("projected", 1e-3, 1.0)
+    assert random.longer(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
+    assert random.longer(slow).grid == Grid(0.1, 12, 12)
+
+
+@pytest.mark.parametrize(
+    ("how", "kind"), [("raises", OutcomeKind.CRASHED), ("diverges", OutcomeKind.DIVERGED), ("is skewed", None)]
+)
+def test_a_run_that_is_timed_has_to_end_and_may_drift(how, kind):
+    found = random.prepare_unchecked(Case("random", SCENE, Broken(how), Grid(0.1, 12, 12)))
+    assert (found.kind if isinstance(found, Outcome) else None) == kind
+
+
+def test_a_bug_of_ours_is_no_outcome():
+    class Ours(Broken):
+        role = Role.OURS
+
+    with pytest.raises(RuntimeError, match="planted"):
+        random.prepare_unchecked(Case("random", SCENE, Ours("raises"), Grid(0.1, 12, 12)))
+
+
+def test_truth_agrees_with_another_one():
+    scene = random_body("attraction", 3, 0)
+    grid = Grid(scene.t_end / SAMPLES, SAMPLES)
+    found, other = random.precise(scene, grid).trajectory, method("scipy:rtol=1e-12").solve(scene, grid)
+    assert angle_between(found.R_WB, other.R_WB).max() < 1e-9  # measured 4e-12

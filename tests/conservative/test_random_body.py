@@ -1,0 +1,162 @@
+"""Random bodies are drawn from the distribution that is written down, the same from the same seed, each on its own."""
+
+import re
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import from_quaternion
+from conservative.scenes.random_body import CONDITION, ENERGY, FIELDS, GAP, OFF_AXIS, RATE, TURN, random_body
+
+SEED = 17
+MANY = [random_body(field, SEED, index) for field in FIELDS for index in range(200)]
+FIRST_MOMENTS = (0.009248821741824682, 0.17314876975505483, 0.17990238227296484)
+FIRST_RATES = (-0.4065315479706221, 1.0251765484488842, -0.5043918861337104)
+POINTS = {"gravity": "com_B", "spring": "point_B", "attraction": "point_B"}
+
+
+def field_of(scene):
+    return re.search(r"field=(\w+)", scene.name)[1]
+
+
+def moments(scene):
+    return np.sort(scene.body.moments)
+
+
+def half_range(scene, draws=4000):
+    """Half of the range of the field's energy over random attitudes: from below, as the extremes lie between them."""
+    q = np.random.default_rng(0).normal(size=(draws, 4))
+    R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
+    return float(np.ptp(scene.potential.energy(R))) / 2
+
+
+def strength(scene, draws=4000):
+    return half_range(scene, draws) / scene.kinetic_energy0
+
+
+def fault(scenes):
+    """What breaks the distribution among scenes, in words; None if nothing does."""
+    for scene in scenes:
+        J = moments(scene)
+        if J[2] > J[0] + J[1]:
+            return "no mass has these moments"
+        if not CONDITION[0] * (1 - 1e-12) <= J[2] / J[0] <= CONDITION[1] * (1 + 1e-12):
+            return "condition"
+        if scene.body.symmetry_axis() is not None:
+            return "symmetric"
+        if np.count_nonzero(np.abs(scene.body.inertia) > 1e-9 * J[2]) < 9:
+            return "inertia is diagonal"
+        if np.abs(scene.w_WB_B0 @ scene.body.R_BP).min() < OFF_AXIS * np.linalg.norm(scene.w_WB_B0) * (1 - 1e-12):
+            return "rates along an axis"
+    return None
+
+
+def test_every_body_is_in_the_distribution():
+    assert fault(MANY) is None
+
+
+@pytest.mark.parametrize(
+    ("inertia", "w", "expected"),
+    [
+        (np.diag((1.0, 1.0, 2.5)), (1, 1, 1), "no mass"),
+        (np.diag((1.0, 150.0, 150.5)), (1, 1, 1), "condition"),
+        (np.diag((1.0, 2.0, 2.0)), (1, 1, 1), "symmetric"),
+        (np.diag((1.0, 2.0, 2.5)), (1, 1, 1), "diagonal"),
+        (MANY[0].body.inertia, MANY[0].body.R_BP[:, 0], "along an axis"),
+    ],
+)
+def test_a_body_outside_of_it_is_found(inertia, w, expected):
+    assert expected in fault([MANY[0].rename("bad", body=cv.RigidBody(inertia), w_WB_B0=np.array(w, dtype=float))])
+
+
+def test_conditions_are_log_uniform():
+    shares = [np.log(J[2] / J[0] / CONDITION[0]) / np.log(CONDITION[1] / CONDITION[0]) for J in map(moments, MANY)]
+    counts, _ = np.histogram(shares, 4, (0, 1))
+    assert counts.sum() == len(MANY)
+    assert np.abs(counts - 200).max() < 60  # measured 9; five standard deviations are 61
+
+
+def test_points_lie_off_all_axes():
+    for scene in MANY:
+        if field_of(scene) in POINTS:
+            point = getattr(scene.potential, POINTS[field_of(scene)])
+            share = np.abs(point @ scene.body.R_BP) / np.linalg.norm(point)
+            assert share.min() >= OFF_AXIS * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("scene", MANY[::25], ids=lambda scene: scene.name)
+def test_the_field_is_about_as_strong_as_the_motion(scene):
+    assert ENERGY[0] * 0.9 <= strength(scene) <= ENERGY[1] * (1 + 1e-9)  # a tenth below, as the extremes lie between samples
+
+
+def test_a_field_that_is_too_strong_is_found(monkeypatch):
+    monkeypatch.setattr(sys.modules[random_body.__module__], "ENERGY", (30.0, 300.0))
+    assert all(strength(random_body(field, SEED, 1)) > 1.05 * ENERGY[1] for field in FIELDS)
+
+
+@pytest.mark.parametrize("kind", [cv.LinearSpring, cv.PointAttraction])
+def test_points_never_meet(kind):
+    fields = [scene.potential for scene in MANY if isinstance(scene.potential, kind)]
+    gaps = [np.linalg.norm(field.anchor_W) / np.linalg.norm(field.point_B) - 1 for field in fields]
+    assert len(gaps) == 200
+    assert GAP[0] * (1 - 1e-12) <= min(gaps) < 0.25  # close passages happen: measured 0.2022 and 0.2026
+    assert 2.5 < max(gaps) <= GAP[1] * (1 + 1e-12)
+
+
+def test_the_motion_lasts_as_long_as_it_says():
+    for scene in MANY:
+        rate = float(np.linalg.norm(scene.w_WB_B0))
+        assert RATE[0] * (1 - 1e-12) <= rate <= RATE[1] * (1 + 1e-12)
+        assert np.isclose(scene.t_end * rate, TURN, rtol=1e-12)
+
+
+def test_start_attitudes_have_no_direction():
+    mean = np.mean([scene.R_WB0 for scene in MANY], axis=0)
+    assert np.abs(mean).max() < 5 / np.sqrt(3 * len(MANY))  # five standard deviations: 0.102; measured 0.048
+
+
+def numbers(scene):
+    return np.concatenate(
+        [np.ravel(part) for part in (scene.body.inertia, scene.R_WB0, scene.w_WB_B0, [scene.potential.scale()])]
+    )
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_body_is_the_same_whatever_else_is_drawn(field):
+    first = numbers(random_body(field, SEED, 3))
+    random_body(field, SEED, 4)
+    assert np.array_equal(first, numbers(random_body(field, SEED, 3)))
+    others = [random_body(field, SEED, 2), random_body(field, SEED + 1, 3)]
+    assert all(np.abs(first - numbers(other)).max() > 1e-3 for other in others)
+
+
+def test_fields_have_bodies_of_their_own():
+    counts = Counter(tuple(np.round(random_body(field, SEED, 0).body.moments, 9)) for field in FIELDS)
+    assert set(counts.values()) == {1}
+
+
+def test_the_first_body_is_the_one_it_has_always_been():
+    """Every figure that was ever printed rests on it: a change of the draws needs new figures."""
+    scene = random_body()
+    assert np.allclose(scene.body.moments, FIRST_MOMENTS, rtol=1e-12, atol=0)
+    assert np.allclose(scene.w_WB_B0, FIRST_RATES, rtol=1e-12, atol=0)
+
+
+def test_the_name_builds_the_body_again():
+    scene = random_body("spring", 5, 7)
+    assert scene.name == "random_body:field=spring,seed=5,index=7"
+    assert np.array_equal(numbers(registry.scene(scene.name)), numbers(scene))
+    assert random_body().name == "random_body"
+
+
+@pytest.mark.parametrize(
+    ("text", "argument"), [("field=magnet", "field"), ("seed=-1", "seed"), ("seed=0.5", "seed"), ("index=1.5", "index")]
+)
+def test_bad_parameters(text, argument):
+    with pytest.raises(cv.BadInput) as caught:
+        registry.scene(f"random_body:{text}")
+    assert caught.value.argument == argument

@@ -1,0 +1,205 @@
+"""Series steps projected onto the invariants, against 256 bits, in every field that has a recurrence."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative.attitude import angle_between, orthonormality, rotation_about
+from conservative.references.precise import Precise
+
+TURN = rotation_about((1, -2, 0.5), 1.1)
+BODY = cv.RigidBody(TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T)
+SYMMETRIC = cv.RigidBody(TURN @ np.diag((0.9, 0.9, 1.2)) @ TURN.T)
+OTHER = rotation_about((1, 0.4, -0.5), 0.8)
+COM, ANCHOR = np.array((0.3, -0.2, 0.4)), np.array((1.0, 0.5, -0.8))
+FIELDS = {
+    "gravity": cv.UniformGravity(4.0, COM),
+    "gravity upwards": cv.UniformGravity(-4.0, COM),
+    "spring": cv.LinearSpring(3.0, COM, ANCHOR, 0.4),
+    "spring without length": cv.LinearSpring(3.0, COM, ANCHOR),
+    "attraction": cv.PointAttraction(2.0, COM, ANCHOR),
+    "repulsion": cv.PointAttraction(-2.0, COM, ANCHOR),
+    "attraction of the pivot": cv.PointAttraction(2.0, (0, 0, 0), ANCHOR),
+    "attraction to the pivot": cv.PointAttraction(2.0, COM, (0, 0, 0)),
+    "gravity gradient": cv.GravityGradient(1.3, BODY.inertia, (0.3, -0.5, 0.8)),
+    "gravity gradient in other axes": cv.GravityGradient(1.3, OTHER @ np.diag((1.0, 2.0, 1.5)) @ OTHER.T, (0.3, -0.5, 0.8)),
+    "free": None,
+}
+ORDERS = {4: 0.8, 7: 1.5, 10: 2.5, 15: 3.5}
+"""Orders, and by how many powers of two the error of a run may shrink less or more than they say."""
+
+
+@cache
+def scene(field: str, t_end: float = 2.0) -> cv.Scene:
+    return cv.Scene("generic", BODY, rotation_about((0.3, -0.5, 0.8), 0.7), (1.2, -2.0, 0.7), t_end, FIELDS[field])
+
+
+@cache
+def truth(field: str, t: float) -> np.ndarray:
+    """The attitude at a time; a field that does nothing has that of none."""
+    held = scene("free" if field.endswith(" pivot") else field)
+    return Precise(256).prepare(held, cv.Grid(t, 1))().R_WB[-1]
+
+
+def error(field: str, order: int, steps: int, t: float = 2.0) -> float:
+    found = cv.Taylor(order).prepare(scene(field), cv.Grid(t / steps, steps, steps))()
+    return float(angle_between(truth(field, t), found.R_WB[-1]))
+
+
+def drift(trajectory: cv.Trajectory) -> float:
+    """The largest drift of any invariant of the scene, relative to its scale."""
+    return max(float(np.abs(trajectory.drift(invariant)).max()) for invariant in trajectory.scene.invariants)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_agrees_with_the_truth(field: str) -> None:
+    assert error(field, 18, 40) < 5e-15  # measured up to 1.7e-15
+    assert error(field, 14, 60) < 5e-15
+    assert error(field, 14, 16) > 1e-16  # of the same motion, and not of none
+
+
+@pytest.mark.parametrize("field", ["gravity", "spring", "attraction", "gravity gradient in other axes", "free"])
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_step_has_the_error_of_its_order(field: str, order: int) -> None:
+    """One step, as projection reaches across several: h^(p+1), or better where projection takes the leading term."""
+    t = {4: 0.05, 7: 0.1, 10: 0.15, 15: 0.2}[order]
+    coarse, fine = error(field, order, 1, t), error(field, order, 1, t / 2)
+    assert fine < coarse * 2.0 ** -(order + 1 - ORDERS[order]) + 1e-15
+
+
+@pytest.mark.parametrize("field", ["gravity", "attraction", "gravity gradient"])
+def test_a_run_has_the_order_of_its_series(field: str) -> None:
+    coarse, fine = error(field, 6, 16), error(field, 6, 32)
+    assert np.log2(coarse / fine) == pytest.approx(6, abs=0.7)  # measured 5.8 to 6.3
+    assert error(field, 7, 16) < coarse < error(field, 5, 16)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize(("order", "dt"), [(6, 0.05), (14, 0.05), (18, 0.1)])
+def test_keeps_every_invariant_of_the_field(field: str, order: int, dt: float) -> None:
+    trajectory = cv.integrate(scene(field), dt, cv.Taylor(order), t_end=500.0, sample_every=7)
+    assert drift(trajectory) < 5e-15  # measured up to 2e-15
+    assert orthonormality(trajectory.R_WB).max() < 1e-14  # measured 2e-15
+
+
+def test_rounding_does_not_add_up() -> None:
+    trajectory = cv.integrate(scene("gravity"), 0.05, cv.Taylor(12), t_end=5e4, sample_every=1000)
+    energy, _ = (np.abs(trajectory.drift(each)) for each in trajectory.scene.invariants)
+    assert drift(trajectory) < 1e-14
+    assert energy[500:].mean() < 3 * energy[:500].mean() + 1e-16
+
+
+@pytest.mark.parametrize("potential", [cv.UniformGravity(4.0, 0.3 * TURN[:, 2]), None])
+def test_keeps_the_momentum_about_an_axis_of_symmetry(potential: cv.Potential | None) -> None:
+    held = cv.Scene("top", SYMMETRIC, rotation_about((0.3, -0.5, 0.8), 0.7), (1.2, -2.0, 0.7), 2.0, potential)
+    for order, dt in ((5, 0.05), (14, 0.1)):
+        trajectory = cv.integrate(held, dt, cv.Taylor(order), t_end=500.0)
+        assert "axial momentum" in [each.name for each in held.invariants]
+        assert drift(trajectory) < 2e-14  # measured 6e-15
+
+
+def test_a_ball_with_its_weight_anywhere_is_symmetric() -> None:
+    ball = cv.Scene("ball", cv.RigidBody((1, 1, 1)), rotation_about((1, 2, 3), 1.0), (1, -1, 2), 2.0, cv.UniformGravity(3, COM))
+    assert drift(cv.integrate(ball, 0.1, cv.Taylor(), t_end=100.0)) < 1e-14
+
+
+@pytest.mark.parametrize("field", ["gravity", "free"])
+def test_bodies_at_rest_stay(field: str) -> None:
+    hanging = cv.UniformGravity(4.0, (0, 0, -0.3)) if field == "gravity" else None
+    still = cv.Scene("still", cv.RigidBody((1, 1.4, 2)), np.eye(3), (0, 0, 0), 10.0, hanging)
+    found = cv.integrate(still, 0.1, cv.Taylor())
+    assert angle_between(found.R_WB[0], found.R_WB[-1]) < 1e-15
+    assert np.abs(found.w_WB_B).max() == 0
+
+
+def test_slow_swings_are_not_lost_in_projection() -> None:
+    """Gradients of energy are 1e-5 of what they are elsewhere: steps that followed its round-off would be off by 1e-11."""
+    slow = cv.Scene("slow", BODY, np.eye(3), (1e-5, 2e-5, 0), 3.0, cv.UniformGravity(4.0, (0, 0, -0.3)))
+    exact = Precise(256).prepare(slow, cv.Grid(3.0, 1))()
+    found = cv.integrate(slow, 0.05, cv.Taylor())
+    assert angle_between(exact.R_WB[-1], found.R_WB[-1]) < 3e-15  # measured 3.3e-16
+    assert np.abs(exact.w_WB_B[-1] - found.w_WB_B[-1]).max() < 3e-15
+
+
+@pytest.mark.parametrize("field", ["gravity", "spring", "attraction", "gravity gradient", "free"])
+def test_a_step_that_cannot_be_projected_says_so(field: str) -> None:
+    found = cv.integrate(scene(field), 2.0, cv.Taylor(5), on_failure="return")
+    assert str(found.outcome).startswith("not converged in step 1")
+    assert "too far from the invariants" in str(found.outcome)
+    assert (len(found), found.counters.steps, found.counters.stages, found.counters.evaluations) == (1, 0, 0, 5)
+
+
+def test_a_step_that_overflows_is_a_failure() -> None:
+    found = cv.integrate(scene("gravity", 1e40), 1e40, cv.Taylor(18), on_failure="return")
+    assert found.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
+    assert not found.outcome.residual < 1e-6  # not a number, too
+    assert len(found) == 1
+
+
+def test_samples_do_not_change_the_motion() -> None:
+    for method in (cv.Taylor(), cv.Taylor(10, 1e-10)):
+        every, few = (cv.integrate(scene("gravity"), 0.05, method, sample_every=n) for n in (1, 7))
+        assert np.array_equal(every.R_WB[[0, 7, 14, 21, 28, 35, 40]], few.R_WB)
+
+
+def test_functions_have_no_recurrence() -> None:
+    cubic = cv.FunctionPotential(lambda R: (R[2] @ COM) ** 3, lambda R: 3 * (R[2] @ COM) ** 2 * np.outer((0, 0, 1), COM))
+    held = cv.Scene("function", BODY, np.eye(3), (1, 2, 3), 1.0, cubic)
+    with pytest.raises(cv.Unsupported, match="recurrence"):
+        cv.integrate(held, 0.01, cv.Taylor())
+
+
+PASSING = cv.Scene(
+    "close passage",
+    BODY,
+    rotation_about((0.3, -0.5, 0.8), 0.7),
+    (0.3, -0.2, 0.1),
+    4.0,
+    cv.PointAttraction(2.0, COM, 1.02 * np.linalg.norm(COM) / np.linalg.norm(ANCHOR) * ANCHOR),
+)
+"""Two points that come as near to each other as a fortieth of their largest distance."""
+
+
+def test_a_tolerance_finds_the_parts_that_a_close_passage_asks_for() -> None:
+    exact = Precise(256).prepare(PASSING, cv.Grid(4.0, 1))().R_WB[-1]
+    assert not cv.Taylor().run(PASSING, 0.005).ok
+    for order, tolerance, allowed in ((10, 1e-9, 3e-9), (14, 1e-9, 3e-9), (14, 1e-12, 3e-12), (18, 1e-14, 1e-13)):
+        found = cv.Taylor(order, tolerance).run(PASSING, 4.0)
+        assert found.ok
+        assert angle_between(exact, found.R_WB[-1]) < allowed
+        assert drift(found) < 2e-14  # measured 5e-15
+        parts, computed = found.counters.stages // order, found.counters.evaluations // order
+        assert found.counters.steps == 1 < 50 < parts <= computed < 400  # steps of 0.001, 4,000 of them, leave 1e-8
+
+
+def test_a_tolerance_samples_at_the_times_of_the_grid() -> None:
+    grid = cv.Grid(0.25, 16, 1)
+    fine, free = cv.Taylor(14, 1e-13).solve(PASSING, grid), cv.Taylor(14, 1e-13).solve(PASSING, cv.Grid(4.0, 1))
+    exact = Precise(256).prepare(PASSING, grid)()
+    np.testing.assert_array_equal(fine.t, grid.t)
+    assert angle_between(exact.R_WB, fine.R_WB).max() < 1e-12
+    assert 0 < angle_between(free.R_WB[-1], fine.R_WB[-1]) < 1e-12
+    assert fine.counters.steps == 16
+
+
+def test_a_loose_tolerance_leaves_steps_whole() -> None:
+    whole, loose = (cv.integrate(scene("gravity"), 0.01, method) for method in (cv.Taylor(), cv.Taylor(tolerance=1.0)))
+    np.testing.assert_array_equal(whole.R_WB, loose.R_WB)
+    assert whole.counters == loose.counters
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, np.nan, np.inf, "fine", True])
+def test_a_tolerance_is_a_number_above_0(tolerance: object) -> None:
+    with pytest.raises(cv.BadInput) as raised:
+        cv.Taylor(14, tolerance)
+    assert raised.value.argument == "tolerance"
+
+
+def test_the_name_says_the_tolerance() -> None:
+    from conservative import registry
+
+    method = cv.Taylor(12, 1e-10)
+    assert method.name == "taylor:order=12,tolerance=1e-10"
+    assert registry.method(method.name) == method

@@ -1,0 +1,209 @@
+"""Fields that turn: against the textbook's equations in the inertial frame, with the direction as a function of time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import conservative as cv
+from conservative.attitude import angle_between, hat, orthonormality, rotation_about
+from conservative.invariants import JACOBI_INTEGRAL
+
+TURN = rotation_about((1, -2, 0.5), 1.1)
+INERTIA = TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T
+R_WB0 = rotation_about((0.3, -0.5, 0.8), 0.7)
+RATES = np.array((1.2, -2.0, 0.7))
+ORBIT = cv.Orbit(1.3, (0.2, 0.5, 0.9))
+ACROSS = np.cross(ORBIT.normal_W, (1, 0.3, 0))
+POINT, ANCHOR = np.array((0.3, -0.2, 0.4)), np.array((1.0, 0.5, -0.8))
+T_END = 4.0
+COM = 2.5 * POINT
+
+
+def _at(t, vector):
+    """A vector that turns with the orbit, by Rodrigues' formula."""
+    n, angle = ORBIT.normal_W, ORBIT.rate * t
+    return np.cos(angle) * vector + np.sin(angle) * np.cross(n, vector) + (1 - np.cos(angle)) * (n @ vector) * n
+
+
+def _gradient_torque(t, R):
+    e = ACROSS / np.linalg.norm(ACROSS)
+    u = R.T @ _at(t, e)
+    return 3 * ORBIT.rate**2 * np.cross(u, INERTIA @ u)
+
+
+def _spring_torque(t, R):
+    arm = _at(t, ANCHOR) - R @ POINT
+    return np.cross(POINT, R.T @ (3 * (1 - 0.4 / np.linalg.norm(arm)) * arm))
+
+
+def _gravity_torque(t, R):
+    return np.cross(R.T @ _at(t, np.array((0, 0, 1.0))), 4 * COM)
+
+
+FIELDS = {
+    "satellite": (ORBIT.gravity_gradient(INERTIA, ACROSS), _gradient_torque),
+    "spring": (cv.Turning(cv.LinearSpring(3.0, POINT, ANCHOR, 0.4), ORBIT), _spring_torque),
+    "gravity": (cv.Turning(cv.UniformGravity(4.0, COM), ORBIT), _gravity_torque),
+    "two functions": (
+        cv.Turning(cv.FunctionPotential(lambda R: 4 * R[2] @ COM, lambda R: 4 * np.outer((0, 0, 1), COM)), ORBIT),
+        _gravity_torque,
+    ),
+}
+
+
+def scene(field="satellite", t_end=T_END):
+    return cv.Scene("turning", cv.RigidBody(INERTIA), R_WB0, RATES, t_end, FIELDS[field][0])
+
+
+def textbook(torque, t, start=(R_WB0, RATES), inertia=INERTIA):
+    """Attitudes (n, 3, 3) and rates (n, 3) of R' = R hat(w), J w' = J w x w + torque."""
+
+    def derivative(t, y):
+        R, w = y[:9].reshape(3, 3), y[9:]
+        return np.concatenate([(R @ hat(w)).ravel(), np.linalg.solve(inertia, np.cross(inertia @ w, w) + torque(t, R))])
+
+    y0 = np.concatenate([np.ravel(start[0]), start[1]])
+    found = solve_ivp(derivative, (0, t[-1]), y0, "DOP853", t, rtol=1e-13, atol=1e-14).y.T
+    return found[:, :9].reshape(-1, 3, 3), found[:, 9:]
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_projected_follows_the_textbook(field):
+    end = 0.4 if field == "two functions" else T_END
+    found = cv.integrate(scene(field, end), 0.02, cv.Projected(), sample_every=5)
+    R, w = textbook(FIELDS[field][1], found.t)
+    assert angle_between(R, found.R_WB).max() < 3e-12  # measured up to 3.1e-13
+    assert np.abs(w - found.w_WB_B).max() < 3e-12
+    still = cv.integrate(found.scene.rename("still", potential=found.scene.potential.potential), 0.02, cv.Projected())
+    assert angle_between(R[-1], still.R_WB[-1]) > 0.005  # a field that stays is another motion: measured 0.01 to 0.9
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_the_jacobi_integral_is_kept_and_energy_is_not(field):
+    end = 0.6 if field == "two functions" else 300.0
+    found = cv.integrate(scene(field, end), 0.02, cv.Projected())
+    (invariant,) = found.scene.invariants
+    assert invariant.name == JACOBI_INTEGRAL
+    assert np.abs(found.drift(invariant)).max() < 4e-15  # measured up to 1.2e-15
+    assert orthonormality(found.R_WB).max() < 1e-14
+    assert np.ptp(found.energy) > 0.01 * found.scene.energy_scale
+    kinetic = np.sum((found.w_WB_B @ INERTIA) * found.w_WB_B, axis=1) / 2
+    normal_momentum = found.momentum_W @ ORBIT.normal_W
+    by_hand = kinetic + found.scene.potential.energy_at(found.R_WB, found.t) - ORBIT.rate * normal_momentum
+    assert np.ptp(by_hand) < 1e-13 * invariant.scale
+
+
+def test_taylor_keeps_the_jacobi_integral_and_follows_projected():
+    found = cv.integrate(scene(t_end=300.0), 0.05, cv.Taylor())
+    assert np.abs(found.drift(found.scene.invariants[0])).max() < 4e-15  # measured 1.1e-15
+    assert np.ptp(found.energy) > 0.01 * found.scene.energy_scale
+    short = cv.integrate(scene(), 0.05, cv.Taylor()), cv.integrate(scene(), 0.0125, cv.Projected(), sample_every=4)
+    assert angle_between(short[0].R_WB, short[1].R_WB).max() < 3e-13
+
+
+def test_taylor_refuses_other_fields_that_turn():
+    assert "right angles" in cv.Taylor().unsupported(scene("spring"))
+    assert "recurrence" in cv.Taylor().unsupported(scene("two functions"))
+
+
+def test_order_eight_in_a_field_that_turns():
+    truth = cv.integrate(scene(), 0.005, cv.Projected()).R_WB[-1]
+    coarse, fine = (angle_between(truth, cv.integrate(scene(), T_END / n, cv.Projected()).R_WB[-1]) for n in (24, 48))
+    assert np.log2(coarse / fine) == pytest.approx(8, abs=0.8)
+
+
+def test_a_field_that_turns_about_its_own_axis_stays():
+    gravity = cv.UniformGravity(4.0, COM)
+    turned = cv.Scene("turned", cv.RigidBody(INERTIA), R_WB0, RATES, 3.0, cv.Turning(gravity, cv.Orbit(0.9, (0, 0, 2))))
+    pair = [cv.integrate(each, 0.02, cv.Projected()) for each in (turned, turned.rename("still", potential=gravity))]
+    assert angle_between(pair[0].R_WB, pair[1].R_WB).max() < 1e-13
+
+
+@pytest.mark.parametrize("time", [2.0**-40, 2.0**40])
+def test_motions_of_any_speed(time):
+    """A motion so many times as slow is the same one: units of our own include that of the orbit's rate."""
+    field = cv.Orbit(ORBIT.rate / time, ORBIT.normal_W).gravity_gradient(INERTIA, ACROSS)
+    slow = cv.Scene("slow", cv.RigidBody(INERTIA), R_WB0, RATES / time, T_END * time, field)
+    found = cv.integrate(slow, 0.02 * time, cv.Projected())
+    assert angle_between(found.R_WB, cv.integrate(scene(), 0.02, cv.Projected()).R_WB).max() < 1e-13
+
+
+def test_a_run_that_loses_the_integral_is_cut():
+    class Losing(cv.Method):
+        family, role, order, conserves = "losing", cv.Role.OURS, 8, frozenset({JACOBI_INTEGRAL})
+        time_dependent, label, kernel = True, "losing", ""
+
+        def prepare(self, scene, grid):
+            good = cv.Projected().prepare(scene, grid)()
+            w = good.w_WB_B * np.where(good.t < 2, 1, 1.01)[:, None]
+            return lambda: cv.Trajectory(scene, good.t, good.R_WB, w, self.label)
+
+    found = Losing().run(scene(), 0.1)
+    assert isinstance(found.failure, cv.NotConserved)
+    assert JACOBI_INTEGRAL in str(found.outcome)
+    assert found.t[-1] < 2
+
+
+@dataclass(frozen=True)
+class Unaware(cv.Method):
+    """A method of somebody who has never heard of fields that depend on the time."""
+
+    family, role, order, label = "unaware", cv.Role.OURS, 1, "unaware"
+
+    def unsupported(self, scene):
+        return None
+
+    def prepare(self, scene, grid):
+        raise AssertionError("it must not be asked")
+
+
+@dataclass(frozen=True)
+class Silent(cv.Method):
+    """One that says nothing about scenes at all."""
+
+    family, role, order, label, prepare = "silent", cv.Role.OURS, 1, "silent", Unaware.prepare
+
+
+def test_methods_that_do_not_know_of_time_refuse():
+    for method in (Unaware(), Silent(), cv.Reduced(), cv.Convected(), cv.Gauss(), cv.Lame(), cv.Substepped("reduced")):
+        assert "time" in method.unsupported(scene())
+        with pytest.raises(cv.Unsupported, match="do not depend on the time"):
+            cv.integrate(scene(), 0.1, method)
+    assert Unaware().unsupported(cv.scenes.brick_flip()) is None
+    assert cv.Substepped("projected").unsupported(scene()) is None
+
+
+def test_there_is_no_energy_of_the_attitude_alone():
+    field = scene().potential
+    assert not isinstance(field, cv.Potential)
+    for name in ("energy", "gradient", "finite_derivative"):
+        assert not hasattr(field, name)
+
+
+@pytest.mark.parametrize(
+    ("make", "argument", "hint"),
+    [
+        (lambda: cv.Orbit(0, (0, 0, 1)), "rate", "above 0"),
+        (lambda: cv.Orbit(1, (0, 0, 0)), "normal_W", "not all 0"),
+        (lambda: cv.Orbit(1, (0, 0, 1)).gravity_gradient(INERTIA, (1, 0, 1)), "direction_W", "at right angles"),
+        (lambda: cv.Orbit(1, (0, 0, 1)).gravity_gradient(INERTIA, (0, 0, 1)), "direction_W", "at right angles"),
+        (lambda: cv.Turning(FIELDS["satellite"][0], ORBIT), "potential", "does not depend on the time"),
+        (lambda: cv.Turning(cv.UniformGravity, ORBIT), "potential", "does not depend on the time"),
+        (lambda: cv.Turning(cv.UniformGravity(1, POINT), 1.0), "orbit", "an Orbit"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(make, argument, hint):
+    with pytest.raises(cv.BadInput) as caught:
+        make()
+    assert caught.value.argument == argument
+    assert hint in str(caught.value)
+
+
+def test_the_direction_that_an_error_names_is_accepted():
+    orbit = cv.Orbit(1.0, (0.3, -0.4, 1.2))
+    with pytest.raises(cv.BadInput) as caught:
+        orbit.gravity_gradient(INERTIA, (1, 0, 1))
+    named = str(caught.value).rpartition("such as ")[2]
+    orbit.gravity_gradient(INERTIA, [float(x) for x in named.strip("[]()").split(",")])

@@ -1,0 +1,151 @@
+"""Ratios on random bodies, on made-up measurements whose answer is known."""
+
+import math
+import re
+
+import pytest
+
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.random import DECADES
+from conservative.reports.charts.random_ratios import ratios
+from conservative.reports.tables import random_ratios
+from conservative.reports.tables.random_contests import ANY, contests
+from conservative.scenes.random_body import name_of
+
+from .rows import row
+
+FIELD = "spring"
+
+
+def line(index, method, role, points, field=FIELD, **fields):
+    """Rows of a line of settings on a body: pairs of an error and a time, coarse to fine."""
+    common = {"scene": name_of(field, 7, index), "role": role, **fields}
+    return [
+        row("random", method, measure, value, dt, **common)
+        for dt, point in enumerate(points)
+        for measure, value in zip((Measure.ATTITUDE_MAX, Measure.TIME), point, strict=True)
+    ]
+
+
+def flat(time, least=1e-13):
+    """A line that takes the same time for every error down to the least."""
+    return [(least, time)]
+
+
+def found(*lines):
+    return contests(measurement.frame([each for rows in lines for each in rows]))
+
+
+def against(contests_found, engine=ANY, error=1e-6):
+    (contest,) = [each for each in contests_found if each.engine == engine and each.error == error]
+    return contest
+
+
+TWICE = [line(0, "gauss", "ours", flat(1.0)), line(0, "heyoka", "engine", flat(2.0))]
+SLOWER = [line(1, "gauss", "ours", flat(4.0)), line(1, "heyoka", "engine", flat(2.0))]
+OURS_ALONE = [line(2, "gauss", "ours", flat(1.0)), line(2, "heyoka", "engine", flat(2.0, least=1e-4))]
+ENGINE_ALONE = [line(3, "gauss", "ours", flat(1.0, least=1e-4)), line(3, "heyoka", "engine", flat(2.0))]
+NEITHER = [line(4, "gauss", "ours", flat(1.0, least=1e-4)), line(4, "heyoka", "engine", flat(2.0, least=1e-4))]
+
+
+def test_the_mean_is_geometric_and_the_worst_body_is_named():
+    contest = against(found(*TWICE, *SLOWER))
+    assert (contest.mean, contest.worst, contest.best) == (pytest.approx(1.0), 0.5, 2.0)
+    assert contest.both[0].scene == name_of(FIELD, 7, 1)
+
+
+def test_a_body_that_a_side_misses_is_counted_and_not_dropped():
+    contest = against(found(*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE, *NEITHER))
+    assert (len(contest.pairs), len(contest.both), contest.only_ours, contest.only_engine) == (5, 2, 1, 1)
+    assert contest.mean == pytest.approx(1.0)
+    assert random_ratios.count_text(contest) == "2 of 5 (only ours 1, only engine 1, neither 1)"
+    assert random_ratios.count_text(against(found(*TWICE))) == "1 of 1"
+
+
+def test_a_decade_that_no_pair_reaches_has_no_ratio():
+    contest = against(found(*NEITHER))
+    assert all(math.isnan(value) for value in (contest.mean, contest.worst, contest.best))
+    assert "neither" in random_ratios.count_text(contest)
+
+
+def test_ours_is_the_cheapest_of_all_lines_and_so_is_the_engine():
+    lean = line(0, "heyoka:frame=lean", "engine", flat(1.5))
+    contest = against(found(*TWICE, line(0, "projected", "ours", flat(0.5)), lean, line(0, "scipy", "engine", flat(9.0))))
+    assert contest.mean == pytest.approx(3.0)
+    assert (contest.pairs[0].ours.line, contest.pairs[0].engine.line) == ("projected", "heyoka:frame=lean")
+    assert against(found(*TWICE, line(0, "scipy", "engine", flat(9.0))), "scipy").mean == pytest.approx(9.0)
+
+
+def test_a_lucky_setting_of_ours_does_not_decide():
+    lucky = line(0, "gauss", "ours", [(1e-9, 0.1), (1e-5, 0.9), (1e-13, 1.0)])
+    contest = against(found(lucky, line(0, "heyoka", "engine", flat(2.0))), error=1e-6)
+    between = 0.9 * (1.0 / 0.9) ** (1 / 8)
+    assert contest.mean == pytest.approx(2.0 / between)  # and not 20
+
+
+def test_a_setting_that_was_not_timed_or_failed_is_no_way_there():
+    untimed = line(0, "gauss", "ours", [(1e-13, math.nan)])
+    failed = line(0, "projected", "ours", [(math.nan, math.nan)])
+    assert against(found(untimed, failed, TWICE[1])).only_engine == 1
+
+
+def test_every_decade_and_every_field_has_its_row():
+    other = [line(0, name, role, flat(1.0), field="gravity") for name, role in (("gauss", "ours"), ("heyoka", "engine"))]
+    every = found(*TWICE, *other)
+    _, rows = random_ratios.as_table(every)
+    assert [each[:2] for each in rows] == [[field, f"{e:.0e}"] for field in (FIELD, "gravity") for e in DECADES]
+
+
+def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
+    missing = row(
+        "random", "mujoco", Measure.ATTITUDE_MAX, math.nan, scene=name_of(FIELD, 7, 0), role="engine", outcome="unsupported"
+    )
+    assert {each.engine for each in found(*TWICE, [missing])} == {ANY, "heyoka"}
+
+
+def test_without_an_engine_there_is_nothing_to_say():
+    assert found(TWICE[0]) == ()
+    assert random_ratios.statements(found(TWICE[0])) == ()
+
+
+def test_the_table_grades_a_ratio_below_one():
+    _, (first, *_) = random_ratios.as_table(found(*SLOWER))
+    assert str(first[3]) == "✗ 0.50"
+    assert str(random_ratios.as_table(found(*TWICE))[1][0][3]) == "✓ 2.00"
+    assert list(map(str, first[6:])) == ["1", "gauss", "heyoka"]
+
+
+def test_the_words_have_the_worst_body_and_what_only_an_engine_reaches():
+    (text,) = random_ratios.statements(found(*TWICE, *SLOWER, *ENGINE_ALONE))
+    assert "over 3 bodies" in text
+    assert f"0.50 times (at 1e-02 rad, {name_of(FIELD, 7, 1)})" in text
+    assert re.search(r"Only an engine reaches the error in 8 of 33 cases", text)
+    (fine,) = random_ratios.statements(found(*TWICE))
+    assert "Only an engine" not in fine
+
+
+def test_each_engine_has_a_column():
+    header, rows = random_ratios.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
+    assert header == ["field", "error, rad", "heyoka", "scipy"]
+    assert rows[0] == [FIELD, "1e-03", "1.00 (0.50 to 2.00)", "30 (30 to 30; 1 of 2)"]
+    assert rows[2] == [FIELD, "1e-09", "1.00 (0.50 to 2.00)", "– (0 of 2)"]
+
+
+def test_large_ratios_have_three_digits():
+    assert [random_ratios.ratio_text(value) for value in (0.126, 9.994, 12.34, 1234.5)] == ["0.13", "9.99", "12.3", "1,230"]
+
+
+def test_numbers_of_json_are_those_of_the_table():
+    record = random_ratios.records(found(*TWICE, *SLOWER))[0]
+    assert (record["mean"], record["worst_scene"], record["both"]) == (pytest.approx(1.0), name_of(FIELD, 7, 1), 2)
+    assert random_ratios.records(found(*ENGINE_ALONE))[-1]["mean"] is None
+
+
+def test_the_picture_draws_mean_and_band():
+    points = random_ratios.chart_points(found(*TWICE, *SLOWER, *ENGINE_ALONE))
+    assert len(points) == len(DECADES)
+    assert points[["mean", "worst", "best"]].iloc[-1].tolist() == pytest.approx([1.0, 0.5, 2.0])
+    (panel,) = ratios(points, 3, 7).to_dict()["concat"]
+    drawn = {(part["mark"]["type"], part["encoding"]["y"]["field"]) for part in panel["layer"]}
+    assert drawn == {("area", "worst"), ("rule", "even"), ("line", "mean")}
