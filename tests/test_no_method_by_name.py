@@ -27,6 +27,7 @@ ALLOWED = {
     "benchmarks/recommendation/motion.py": ("exact", "the closed form, where a motion has one"),
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/studies/random.py": ("precise", "the truth of a body in any field"),
+    "benchmarks/verification/comparison_alarms.py": ("moser_veselov reduced", "the rows that are slowed"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (
         "convected exact gauss moser_veselov reduced substepped",

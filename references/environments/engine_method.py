@@ -9,7 +9,7 @@ from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter_ns
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -151,10 +151,20 @@ def rate_limit_reason(scene: Scene, limit: float) -> str | None:
     return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 
+class Reader(Protocol):
+    """Makes trajectories of what a worker finds, and of a failure to find anything."""
+
+    def trajectory(self, found: Mapping[str, Any]) -> Trajectory:
+        """Return the trajectory of what was found."""
+
+    def failure(self, failure: IntegrationFailed) -> Trajectory:
+        """Return a trajectory without samples."""
+
+
 class WorkerRun:
     """A run in a worker. Calling it gives the trajectory; `wall_time` times calls without the way to the worker."""
 
-    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Samples) -> None:
+    def __init__(self, worker: Worker, given: Mapping[str, Any], samples: Reader) -> None:
         self._worker, self._given, self._samples = worker, given, samples
         self._number, self._start = 0, 0
         self._found: Mapping[str, Any] = {}
