@@ -123,12 +123,16 @@ def dash_scale(families: Families) -> alt.Scale:
     return alt.Scale(domain=list(families), range=dashes)
 
 
+_POWER = "datum.value >= 0.01 && datum.value < 1e6 ? format(datum.value, ',~r') : format(datum.value, '~e')"
+"""How Vega writes a number of an axis: as people do."""
+
+
 def power_axis(title: str, low: float, high: float) -> alt.Axis:
     """Return a logarithmic axis with a label at each whole power of ten, or at every second or third where they are many."""
     first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
-    return alt.Axis(title=title, format="~e", values=powers if len(powers) > 1 else alt.Undefined)
+    return alt.Axis(title=title, labelExpr=_POWER, values=powers if len(powers) > 1 else alt.Undefined)
 
 
 def apply_style(chart: Any) -> Any:

@@ -15,18 +15,14 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from conservative.benchmarks.studies import long_runs
 
-from ..charts import spheres
-from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
+from ..charts import contrast, spheres
 from ..charts.vega_embed import PageFigure
-from ..tables import engine_tables, overview, random_ratios
-from ..tables.cells import CONSERVED, SMALL
+from ..tables import engine_tables, hard_cases, random_ratios, summary
+from ..tables.cells import CONSERVED, SMALL, tolerance
 from ..view import View
-from . import engines, random_bodies
-from .figures import scene_figures
+from . import engines, paper, random_bodies
+from .figures import first, scene_figures
 from .scene_charts import SceneCharts
-
-DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", OLIVE: "#C2C25A", VERMILION: "#FF7F32"}
-"""Colours that are too dark on a dark page, and what stands for them there."""
 
 
 def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], of_random: Any = None) -> str:
@@ -38,22 +34,24 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
     engine_figures = engines.figures(view.engines, of_engines)
     random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
+    first_figure, paper_figures = first(view.first, "first", view.about), paper.figures(view.paper)
+    drawn = [first_figure, *chain.from_iterable(figures.values()), *engine_figures.values(), *paper_figures]
     return _template().render(
         view=view,
+        first_figure=first_figure,
+        paper=paper_figures,
+        caveat=summary.CAVEAT,
+        class_terms=summary.TERMS,
+        hard_terms=hard_cases.TERMS,
         random_figure=random_figure,
         random_terms=random_ratios.TERMS,
         figures=figures,
         engine_figures=engine_figures,
         engine_terms=engine_tables.TERMS,
-        errors=", ".join(f"{error:.0e}" for error in overview.ERRORS),
-        conserved=f"{CONSERVED:.0e}",
-        small=f"{SMALL:.0e}",
+        conserved=tolerance(CONSERVED),
+        small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(
-            _charts(
-                [*([random_figure] if random_figure else []), *chain.from_iterable(figures.values()), *engine_figures.values()]
-            )
-        ),
+        charts=_in_script(_charts(drawn if random_figure is None else [*drawn, random_figure])),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,
@@ -80,5 +78,8 @@ def _in_script(content: Any) -> str:
 
 
 def _charts(figures: Iterable[PageFigure]) -> dict[str, Any]:
-    """Return what the page's script draws, and the colours of a dark page."""
-    return {"figures": {figure.name: figure.charts for figure in figures}, "dark": DARK}
+    """Return what the page's script draws, and what stands for colours that cannot be seen well on a light or a dark page."""
+    charts = {figure.name: figure.charts for figure in figures}
+    found = contrast.colours_in(json.dumps(charts))
+    papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
+    return {"figures": charts, "colours": {name: contrast.stand_ins(found, paper) for name, paper in papers.items()}}

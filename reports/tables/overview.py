@@ -9,7 +9,7 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import OutcomeKind
 
-from .cells import Row, Table, grade_drift, number, outcome_cell
+from .cells import Row, Table, grade_drift, number, outcome_cell, tolerance
 from .rows import of_study, outcomes, with_outcome, without_outcome
 from .work_precision import CheapestLine, Contest, contests
 
@@ -31,7 +31,7 @@ def _verdict(contest: Contest, points: pd.DataFrame, drifts: pd.DataFrame, troub
     methods = set(points[(points["scene"] == contest.scene) & (points["name"] == best.name)]["method"])
     return [
         contest.scene,
-        f"{contest.error:.0e}",
+        tolerance(contest.error),
         best.name,
         number(best.time * 1e6, 3),
         _cost(contest.ours),
@@ -66,10 +66,10 @@ _NO_TROUBLE = (OutcomeKind.OK, OutcomeKind.NO_ORDER, OutcomeKind.SKIPPED, Outcom
 
 
 def scenes_in_trouble(table: pd.DataFrame) -> pd.DataFrame:
-    """Return where runs failed, and the scenes that a method has no run of: columns scene, method, outcome."""
+    """Return where runs failed, and the scenes that a method has no run of: columns scene, method, family, outcome."""
     rows = table[table["study"] != "stability"]
     runs = set(with_outcome(rows, OutcomeKind.OK)[["scene", "method"]].itertuples(index=False, name=None))
-    bad = without_outcome(rows, *_NO_TROUBLE)[["scene", "method", "outcome"]].drop_duplicates()
+    bad = without_outcome(rows, *_NO_TROUBLE)[["scene", "method", "family", "outcome"]].drop_duplicates()
     real = [row.outcome != OutcomeKind.UNSUPPORTED or (row.scene, row.method) not in runs for row in bad.itertuples()]
     return bad[pd.Series(real, index=bad.index, dtype=bool)]
 
