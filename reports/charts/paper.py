@@ -29,9 +29,9 @@ class Panel(NamedTuple):
 def panels_1(rates: pd.DataFrame, errors: pd.DataFrame) -> tuple[Panel, ...]:
     """Return the panels of figure 1."""
     found = [Panel("(a) body rates, rad/s", _rates(rates), "component", ("rate", "Q", "rad/s"), _looks(_RATES))]
-    for column, title in ((ENERGY, "(b) relative error of energy"), (MOMENTUM, "(c) relative error of |L|")):
+    for letter, column, title in (("b", ENERGY, "relative error of energy"), ("c", MOMENTUM, "relative error of |L|")):
         chart = _errors(errors, column, title)
-        found.append(Panel(title, chart, "method", (column, "Q", "relative error"), _looks(_MAPS)))
+        found.append(Panel(f"({letter}) {title}", chart, "method", (column, "Q", "relative error"), _looks(_MAPS)))
     return tuple(found)
 
 

@@ -128,11 +128,12 @@ _POWER = "datum.value >= 0.01 && datum.value < 1e6 ? format(datum.value, ',~r') 
 
 
 def power_axis(title: str, low: float, high: float) -> alt.Axis:
-    """Return a logarithmic axis with a label at each whole power of ten, or at every second or third where they are many."""
+    """Return a logarithmic axis with labels at powers of ten: not at all of many, and between few."""
     first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
-    return alt.Axis(title=title, labelExpr=_POWER, values=powers if len(powers) > 1 else alt.Undefined)
+    between = [m * 10.0**k for k in range(first - 1, last + 1) for m in (1, 2, 5) if low <= m * 10.0**k <= high]
+    return alt.Axis(title=title, labelExpr=_POWER, values=powers if len(powers) > 2 else between)
 
 
 def apply_style(chart: Any) -> Any:

@@ -64,7 +64,7 @@ def first(summary: Summary, name: str, what: str) -> PageFigure:
     words = " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(lines, "error", "time")])
     hidden = [line for line, _ in lines if line not in summary.shown]
     shown = hover("setting", "error", "microseconds", *(["within"] if best["within"].any() else ["dt"]))
-    charts = tuple(vega_embed.embed(families.work_precision(points), shown, 400, hidden)) if len(points) else ()
+    charts = tuple(vega_embed.embed(families.work_precision(points), shown, 310, hidden)) if len(points) else ()
     legend = tuple(_entry(line, members, line in summary.shown) for line, members in lines)
     return PageFigure(name, title, words, charts, legend, "families")
 

@@ -6,12 +6,14 @@ It opens from disk without a network: style, scripts, the Vega libraries and all
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from itertools import chain
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 from conservative.benchmarks.studies import long_runs
 
@@ -61,7 +63,13 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
 def _template() -> Template:
     loader = PackageLoader("conservative.reports")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["whole"] = _whole
     return environment.get_template("page.html.j2")
+
+
+def _whole(text: str) -> Markup:
+    """Return a sentence in which no line ends within a number such as 1e-3, or between it and its unit."""
+    return Markup(re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text))))
 
 
 @lru_cache(maxsize=1)

@@ -57,8 +57,12 @@ def tolerance(value: float) -> str:
 
 
 def factor(ratio: float, digits: int = 2) -> str:
-    """Return how many times as much something is, as people write it: `2.1`, `220`, `1,200`; a dash for nan."""
-    return DASH if math.isnan(ratio) else f"{float(f'{ratio:.{digits}g}'):,g}"
+    """Return how many times as much something is, as people write it: `2.0`, `220`, `1,200`; a dash for nan."""
+    if math.isnan(ratio):
+        return DASH
+    rounded = float(f"{ratio:.{digits}g}")
+    decimals = digits - 1 - math.floor(math.log10(rounded)) if rounded > 0 else 0
+    return f"{rounded:,.{max(decimals, 0)}f}"
 
 
 def _power(text: str) -> str:

@@ -1,6 +1,6 @@
 """Work against precision for someone who chooses: the best of each family, and its single settings.
 
-A picture has these columns: `name` (of the family), `class` (see `classes`), `single` (whether the line is that of one setting),
+A picture has these columns: `name` (of the family), `class` (see `classes`), `single` (whether a line is that of one setting),
 `line` (what to call that line), `setting` (of a point), `error` (rad), `time` (s per simulated second), `dt` (s), and `within`,
 on how many bodies the error is reached where there are several.
 """

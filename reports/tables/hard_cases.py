@@ -16,7 +16,7 @@ from .rows import of_measure, of_study, outcomes, without_outcome
 
 RIGHT, USABLE = 1e-3, 0.1
 """Attitude errors, rad, up to which a motion is called right, and usable."""
-TERMS = f"✓ up to {tolerance(RIGHT)} rad, ≈ up to {USABLE:g} rad, ✗ more;"
+TERMS = f"✓ up to {tolerance(RIGHT)} rad, ≈ up to {USABLE:g} rad, ✗ more"
 """How a motion is judged, in words."""
 _NOT_RUN = Cell(f"{DASH} not run", Grade.NONE)
 _NOTHING = Cell(DASH, Grade.NONE)

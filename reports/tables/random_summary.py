@@ -31,7 +31,8 @@ def of_random_bodies(table: pd.DataFrame, contests: Sequence[Contest], drifts: p
     """
     found = _costs(table[table["study"] == RANDOM])
     bodies = found["scene"].nunique()
-    points = joined([_means(_cheapest(found, "name"), "name", bodies), _means(found, "line", bodies)])
+    best = _cheapest(found, "name")
+    points = joined([_means(best.assign(line=best["name"]), "name", bodies), _means(found, "line", bodies)])
     rows = [_row(kind, found, drifts, bodies) for kind in MethodClass]
     return Summary(sentence(contests), points, first_names(points), (HEADER, rows))
 
@@ -42,29 +43,27 @@ def sentence(found: Iterable[Contest]) -> str:
     both = [pair for pair in pairs if pair.ours and pair.engine]
     if not both:
         return "Random bodies: on none do an engine and a method of ours get to the same error."
-    return f"{_opening(both)} {_losses(both, len(pairs))}"
-
-
-def _opening(both: list[Pair]) -> str:
     mean = math.exp(float(np.mean([math.log(pair.ratio) for pair in both])))
     sides = ("our cheapest general integrator", "the cheapest engine")
     one, other = sides if mean >= 1 else sides[::-1]
     bodies = "one random body" if len(both) == 1 else f"{len(both)} random bodies"
+    times = f"{factor(max(mean, 1 / mean))} times as fast as {other}"
     return (
-        f"On {bodies} in fields, whose motions have no known closed form, {one} gets to {tolerance(MIDDLE)} rad "
-        f"{factor(max(mean, 1 / mean))} times as fast as {other} (geometric mean)."
+        f"On {bodies} in fields, not integrable, {one} gets to {tolerance(MIDDLE)} rad {times} ({_spread(both, len(pairs))})."
     )
 
 
-def _losses(both: list[Pair], bodies: int) -> str:
-    """Return on how many bodies an engine is faster, and by how much at most."""
-    lost = [pair for pair in both if pair.ratio < 1]
-    missing = bodies - len(both)
-    missed = f" On {missing} more, not both get there." if missing else ""
-    if not lost:
-        return f"On single bodies that is {factor(min(p.ratio for p in both))} to {factor(max(p.ratio for p in both))}.{missed}"
-    worst = max(1 / pair.ratio for pair in lost)
-    return f"An engine is faster on {len(lost)} of them, by up to {factor(worst)} times.{missed}"
+def _spread(both: list[Pair], bodies: int) -> str:
+    """Return what the mean hides: the range over bodies, or how often an engine is faster, and how many bodies are left out."""
+    lost = [1 / pair.ratio for pair in both if pair.ratio < 1]
+    parts = ["geometric mean"]
+    if lost:
+        parts.append(f"on {len(lost)} of them an engine is faster, by up to {factor(max(lost))} times")
+    else:
+        parts.append(f"on single ones {factor(min(p.ratio for p in both))} to {factor(max(p.ratio for p in both))}")
+    if bodies > len(both):
+        parts.append(f"on {bodies - len(both)} more, not both get there")
+    return "; ".join(parts)
 
 
 def _costs(table: pd.DataFrame) -> pd.DataFrame:

@@ -135,9 +135,15 @@ def keeps(drifts: pd.DataFrame) -> str:
     if rows.empty:
         return "not measured"
     best = rows.groupby("quantity", sort=False)["value"].min()
+    best = best.groupby(best.index.map(_kind), sort=False).max()
     marks = [("✓", -1.0, CONSERVED), ("≈", CONSERVED, SMALL), ("✗", SMALL, math.inf)]
     parts = ((mark, [str(name) for name, value in best.items() if low < value <= high]) for mark, low, high in marks)
     return "; ".join(f"{mark} {', '.join(names)}" for mark, names in parts if names)
+
+
+def _kind(quantity: str) -> str:
+    """Return what an invariant is, in a word: momenta differ by scene."""
+    return "momenta" if "moment" in quantity else quantity
 
 
 def _error_at(points: pd.DataFrame, kind: MethodClass, budget: float) -> str:
