@@ -20,7 +20,6 @@ from .tables import (
     hard_cases,
     headline,
     lines,
-    overview,
     paper,
     random_contests,
     random_ratios,
@@ -77,7 +76,6 @@ class View:
     random: random_ratios.RandomView | None
     headline: tuple[headline.Statement, ...]
     failed: tuple[str, ...]
-    verdict: Table
     scenes: tuple[SceneView, ...]
     paper: PaperView
     hard_cases: hard_cases.HardCases | None
@@ -109,7 +107,6 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         random=random_ratios.view(contests, plan.bodies, plan.seed) if RANDOM in plan.names else None,
         headline=headline.first_lost([*headline.of_random_bodies(contests), *headline.of_points(builder.points)]),
         failed=tuple(runs.failures_of_ours(table)),
-        verdict=overview.verdict(table, builder.points),
         scenes=scenes,
         paper=_paper(table, samples),
         hard_cases=hard_cases.hard_cases(table),

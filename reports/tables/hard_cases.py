@@ -80,7 +80,7 @@ def judge(rows: pd.DataFrame) -> Judgement:
     if ends:
         return Judgement(outcome_cell(ends[0]), outcome_cell(ends[0]))
     drifts = rows[rows["measure"] == Measure.DRIFT_MAX.text].dropna(subset=["value"])
-    worst = drifts.loc[drifts["value"].idxmax()] if len(drifts) else None
+    worst = drifts.sort_values("value").iloc[-1] if len(drifts) else None
     error = of_measure(rows, Measure.ATTITUDE_MAX)["value"]
     return Judgement(
         _motion(float(error.max())) if len(error) else _NOTHING,

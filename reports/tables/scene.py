@@ -28,6 +28,12 @@ def _lines(values: pd.DataFrame) -> list[tuple[str, pd.Series[float]]]:
     return [(str(name), row) for name, row in values.iterrows()]
 
 
+def _ranked(values: pd.DataFrame, *columns: tuple[str, object]) -> list[tuple[str, pd.Series[float]]]:
+    """Return the lines by columns, the smallest first, those without it last: ours and the engines' among each other."""
+    there = [column for column in columns if column in values.columns]
+    return _lines(values.sort_values(there, kind="stable") if there else values)
+
+
 def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float:
     return float(row.get((measure.text, quantity), math.nan))
 
@@ -60,7 +66,7 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
     header = ["method", *(f"{measure}, {unit}, dt {step:g}" for measure, unit in _ERRORS for step in steps)]
     keys = [(measure.text, step) for measure, _ in _ERRORS for step in steps]
-    return header, [[name, *(number(row.get(key, math.nan)) for key in keys)] for name, row in _lines(wide)]
+    return header, [[name, *(number(row.get(key, math.nan)) for key in keys)] for name, row in _ranked(wide, *keys)]
 
 
 def order(attitude: pd.DataFrame, rates: pd.DataFrame) -> Table:
@@ -93,7 +99,7 @@ def time(table: pd.DataFrame, scene: str) -> Table:
     rows = of_measure(of_study(table, "speed", scene), Measure.TIME)
     details = rows.set_index("name")["detail"]
     header = ["method", f"steps of {DEFAULT_METHOD}", *(title for _, _, title in _TIMES), "timed"]
-    lines = _lines(values)
+    lines = _ranked(values, (Measure.TIME.text, ""))
     unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == DEFAULT_METHOD), math.nan)
     return header, [[name, *_times(row, unit), str(details.get(name, ""))] for name, row in lines]
 
@@ -139,5 +145,8 @@ _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))
 def costs_paid_once(table: pd.DataFrame, scene: str) -> Table:
     """Return what a method costs before its first step: conversion, with compiled code at hand, and the first call."""
     values = _wide(table, "speed", scene)
-    body = [[name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)] for name, row in _lines(values)]
+    body = [
+        [name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)]
+        for name, row in _ranked(values, (Measure.PREPARE.text, ""))
+    ]
     return ["method", "prepare, ms", "first call, ms", "simulated second, µs"], body
