@@ -33,7 +33,7 @@ def scenes_in_trouble(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def conservation(table: pd.DataFrame, scene: str) -> Table:
-    """Return the drift of every quantity with every method over the long runs on a scene, and how the run ended: the best first."""
+    """Return the drift of every quantity with every method over the long runs on a scene, the best first, and how it ended."""
     rows = long_run_drifts(table)
     rows = rows[rows["scene"] == scene]
     quantities = list(rows["quantity"].unique())

@@ -145,8 +145,6 @@ _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))
 def costs_paid_once(table: pd.DataFrame, scene: str) -> Table:
     """Return what a method costs before its first step: conversion, with compiled code at hand, and the first call."""
     values = _wide(table, "speed", scene)
-    body = [
-        [name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)]
-        for name, row in _ranked(values, (Measure.PREPARE.text, ""))
-    ]
+    lines = _ranked(values, (Measure.PREPARE.text, ""))
+    body = [[name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)] for name, row in lines]
     return ["method", "prepare, ms", "first call, ms", "simulated second, µs"], body

@@ -1,4 +1,4 @@
-"""What is told first of a scene and of random bodies: classes of methods, a sentence with its ratio, the picture of families."""
+"""What is told first of a scene and of random bodies: classes of methods, a sentence, the picture of families."""
 
 import math
 
