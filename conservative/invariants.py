@@ -59,7 +59,13 @@ def sizes(drift: Array) -> Array:
 
 
 def named(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
-    """Return an invariant, which may be given by its name among those that are known; raise `BadInput` for another name."""
+    """Return an invariant, which may be given by its name among those that are known.
+
+    Raises
+    ------
+    BadInput
+        None of them has this name.
+    """
     if not isinstance(invariant, str):
         return invariant
     by_name = {each.name: each for each in known}

@@ -81,7 +81,7 @@ class Trajectory:
         """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
 
         It is one of `scene.invariants`, by itself or by name, such as "energy"; `conservative.invariants.sizes` makes sizes of
-        what is returned, of a vector its length. Raises `BadInput` for a name that the scene has no invariant of.
+        what is returned, of a vector its length. Another name is a `BadInput`.
         """
         invariant = invariants.named(invariant, self.scene.invariants)
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
