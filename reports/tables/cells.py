@@ -47,8 +47,8 @@ def number(value: float, digits: int = 2) -> str:
     """Return a number to `digits` significant digits, a dash for nan."""
     if math.isnan(value):
         return DASH
-    plain = value == 0 or 0.01 <= abs(value) < 1e4
-    return f"{float(f'{value:.{digits}g}'):g}" if plain else _power(f"{value:.{digits - 1}e}")
+    plain = value == 0 or 0.01 <= abs(value) < 1e6
+    return f"{float(f'{value:.{digits}g}'):,g}" if plain else _power(f"{value:.{digits - 1}e}")
 
 
 def tolerance(value: float) -> str:

@@ -86,19 +86,19 @@ def _sentence(points: pd.DataFrame, integrable: bool) -> str:
     """Return which side gets to `MIDDLE` faster, without our solutions of integrable motions, and what those do."""
     ours, engine = cheapest(points, (MethodClass.GENERAL,), MIDDLE), cheapest(points, OF_ENGINES, MIDDLE)
     solution = cheapest(points, (MethodClass.SOLUTION,), MIDDLE)
-    kind = "An integrable motion" if integrable else "A motion without a known closed form"
-    return f"{kind}: {' '.join(filter(None, [_contest(ours, engine), _solution(solution, engine)]))}"
+    kind = "An integrable motion, with a closed form" if integrable else "Not integrable: no closed form is known"
+    return f"{kind}. {' '.join(filter(None, [_contest(ours, engine), _solution(solution, engine)]))}"
 
 
 def _contest(ours: Cheapest | None, engine: Cheapest | None) -> str:
     goal = f"{tolerance(MIDDLE)} rad"
     if ours is None or engine is None:
         there = ours or engine
-        return f"only {there.name} gets to {goal}." if there else f"nothing measured gets to {goal}."
+        return f"Only {there.name} gets to {goal}." if there else f"Nothing measured gets to {goal}."
     ratio = engine.time / ours.time
     first, second = (ours, engine) if ratio >= 1 else (engine, ours)
-    sides = "our cheapest general integrator", "the cheapest engine"
-    one, other = sides if ratio >= 1 else sides[::-1]
+    ours_first = "Our cheapest general integrator", "the cheapest engine"
+    one, other = ours_first if ratio >= 1 else ("The cheapest engine", "our cheapest general integrator")
     return f"{one}, {first.name}, gets to {goal} {factor(max(ratio, 1 / ratio))} times as fast as {other}, {second.name}."
 
 
@@ -154,7 +154,7 @@ def _error_at(points: pd.DataFrame, kind: MethodClass, budget: float) -> str:
         return found is None or not found.time <= budget * (1 + 1e-9)
 
     first = bisect_left(FINE, True, key=too_dear)
-    return number(FINE[first - 1], 1) if first else DASH
+    return number(FINE[first - 1], 1) if first else DASH if math.isnan(budget) else f"over {FINE[0]:g}"
 
 
 def _failures(troubles: pd.DataFrame) -> Iterator[str]:
