@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -77,10 +78,18 @@ def _entry(line: str, members: pd.DataFrame, shown: bool) -> Entry:
 
 def drift(scene: SceneView) -> PageFigure:
     """Return the drift over time, of fewer samples than the picture beside report.md has."""
-    summary = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
+    words = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
+    summary = " ".join([words, *_under_another(scene.thin_drifts)])
     charts = tuple(vega_embed.embed(figures.drift(scene.thin_drifts, scene.name), hover("t", "drift"), 220))
     legend = vega_embed.legend(families_of(scene.drifts), marks=False)
     return PageFigure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, legend)
+
+
+def _under_another(drifts: pd.DataFrame) -> Iterator[str]:
+    """Yield what lies exactly under another line in every panel, as do methods that keep everything to the last digit."""
+    data = drifts.assign(shown=drifts["drift"].clip(lower=figures.FLOOR), panel=drifts["quantity"])
+    lines = [(str(name), members.sort_values(["panel", "t"])) for name, members in data.groupby("name", sort=False)]
+    return under(lines, "t", "shown")
 
 
 def convergence(scene: SceneView, chart: Any) -> PageFigure:

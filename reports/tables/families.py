@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import combinations, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 import pandas as pd
@@ -64,7 +64,15 @@ def _rank(line: pd.DataFrame) -> tuple[int, float]:
 
 
 def under(lines: Iterable[tuple[str, pd.DataFrame]], x: str, y: str) -> Iterator[str]:
-    """Yield a sentence for each line that lies exactly under another one; lines have columns x and y, both above 0."""
-    for (one, first), (other, second) in combinations(lines, 2):
-        if len(first) == len(second) and all(np.allclose(first[c], second[c], rtol=SAME, atol=0) for c in (x, y)):
-            yield f"{one} lies exactly under {other}."
+    """Yield a sentence for each line under which others lie exactly; lines have columns x and y, numbers above 0."""
+    left = dict(lines)
+    while left:
+        name, line = left.popitem()
+        hidden = [other for other, points in left.items() if _same(points, line, x, y)]
+        if hidden:
+            yield f"Exactly under {name}: {', '.join(hidden)}."
+        left = {other: points for other, points in left.items() if other not in hidden}
+
+
+def _same(one: pd.DataFrame, other: pd.DataFrame, x: str, y: str) -> bool:
+    return len(one) == len(other) and all(np.allclose(one[c], other[c], rtol=SAME, atol=0) for c in (x, y))

@@ -96,7 +96,7 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert float(ours["error at equal cost"]) == 1e-7  # no smaller one was measured, at any cost
     assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
     assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.100 lame"
-    assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "–"
+    assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
 
 
@@ -130,7 +130,8 @@ def test_at_most_eight_families_are_shown_at_first_of_both_sides():
 
 def test_what_lies_exactly_under_another_line_is_said():
     one, other = (pd.DataFrame({"x": [1.0, 2.0], "y": [y, 4.0]}) for y in (1e-16, 1.1e-16))
-    assert list(families.under([("a", one), ("b", one), ("c", other)], "x", "y")) == ["a lies exactly under b."]
+    lines = [("a", one), ("b", one), ("c", other), ("d", one)]  # drawn in this order, the last on top
+    assert list(families.under(lines, "x", "y")) == ["Exactly under d: a, b."]
 
 
 def random(*lines, drifts=NOTHING):
