@@ -30,8 +30,12 @@ def _lines(values: pd.DataFrame) -> list[tuple[str, pd.Series[float]]]:
 
 def _ranked(values: pd.DataFrame, *columns: tuple[str, object]) -> list[tuple[str, pd.Series[float]]]:
     """Return the lines by columns, the smallest first, those without it last: ours and the engines' among each other."""
-    there = [column for column in columns if column in values.columns]
-    return _lines(values.sort_values(there, kind="stable") if there else values)
+
+    def rank(line: tuple[str, pd.Series[float]]) -> list[tuple[bool, float]]:
+        numbers = (float(line[1].get(column, math.nan)) for column in columns)
+        return [(math.isnan(number), number) for number in numbers]
+
+    return sorted(_lines(values), key=rank)
 
 
 def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float:

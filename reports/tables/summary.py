@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.drift_class import CONSERVED, SMALL
+from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Row, Table, factor, number, tolerance
 from .classes import OF_ENGINES, MethodClass, with_classes
 from .families import first_names, picture
+from .rows import without_outcome
 from .work_precision import cost
 
 ERRORS = (1e-3, 1e-6, 1e-9)
@@ -158,6 +160,6 @@ def _error_at(points: pd.DataFrame, kind: MethodClass, budget: float) -> str:
 
 
 def _failures(troubles: pd.DataFrame) -> Iterator[str]:
-    """Yield each kind of failure with the families that it happened to."""
-    for outcome, members in troubles.groupby("outcome", sort=False):
-        yield f"{outcome}: {', '.join(members['family'].unique())}"
+    """Yield each kind of failure with the families whose settings had it; a form that does not take the scene is none."""
+    for outcome, members in without_outcome(troubles, OutcomeKind.UNSUPPORTED).groupby("outcome", sort=False):
+        yield f"{outcome} at some settings: {', '.join(members['family'].unique())}"

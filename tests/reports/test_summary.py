@@ -100,6 +100,14 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
 
 
+def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_for_other_scenes():
+    outcomes = (("diverged", "gauss:stages=2"), ("diverged", "taylor"), ("unsupported", "gauss:stages=8"))
+    found = [row("convergence", name, "attitude error max", math.nan, outcome=outcome) for outcome, name in outcomes]
+    other = point("taylor", "ours", 1e-3, 1e-5)
+    ours = cells(told(OURS, other, troubles=frame(found)), MethodClass.GENERAL)
+    assert ours["where it fails"] == "diverged at some settings: gauss, taylor"
+
+
 def test_a_class_keeps_what_its_best_setting_keeps():
     found = [row("long_runs", f"gauss:{k}", "energy drift max", drift) for k, drift in enumerate((1e-3, 1e-15))]
     found += [
