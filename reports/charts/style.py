@@ -133,7 +133,8 @@ def power_axis(title: str, low: float, high: float) -> alt.Axis:
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
     between = [m * 10.0**k for k in range(first - 1, last + 1) for m in (1, 2, 5) if low <= m * 10.0**k <= high]
-    return alt.Axis(title=title, labelExpr=_POWER, values=powers if len(powers) > 2 else between or alt.Undefined)
+    values = powers if len(powers) > 2 else between
+    return alt.Axis(title=title, labelExpr=_POWER, values=values if len(values) > 1 else alt.Undefined)
 
 
 def apply_style(chart: Any) -> Any:
