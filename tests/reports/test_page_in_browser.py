@@ -94,8 +94,8 @@ def test_every_chart_has_marks(opened):
     marks = "svg .mark-symbol path, svg .mark-line path"
     script = "return [...document.querySelectorAll('.chart')].map(e => e.querySelectorAll(arguments[0]).length)"
     counts = opened.execute_script(script, marks)
-    assert len(counts) > 15  # measured 20
-    assert min(counts) >= 3
+    assert len(counts) > 15  # measured 20 and more
+    assert min(counts) >= 2  # the errors of two maps, in a figure of the paper
 
 
 def drawn_symbols(browser, colour):
