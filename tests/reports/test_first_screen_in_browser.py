@@ -37,6 +37,7 @@ def rows():
             yield from point(name, role, 10.0 ** (-2 * i - 2), (1 + k) * 1e-6 * 3**i, 0.1 / 2**i, scene="brick_flip")
         yield row("long_runs", name, "energy drift max", 10.0 ** (k - 15), role=role)
         yield row("speed", name, "prepare time", (1.5, 2345.0, 0.4)[k % 3], role=role)
+        yield from (row("stability", name, "largest |w| dt that works", 1.0, scene=case, role=role) for case in CASES[:14])
         for case in CASES:
             yield row("hard_cases", name, "attitude error max", 10.0 ** (-k), scene=case, role=role)
 
