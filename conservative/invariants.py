@@ -12,7 +12,7 @@ import numpy as np
 from .attitude import Array
 from .body import RigidBody
 from .check import describe, geometric_mean, length, printable_text, real_number
-from .errors import BadInput
+from .errors import BadInput, nearest
 from .potentials.potential import AnyPotential, depends_on_time, energy_at
 from .potentials.turning import Turning
 from .potentials.uniform_gravity import UniformGravity
@@ -56,6 +56,22 @@ class Invariant:
 def sizes(drift: Array) -> Array:
     """Return |x| of each of n relative values (n,), and of vectors (n, 3) their lengths (n,): no unit."""
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
+
+
+def named(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
+    """Return an invariant, which may be given by its name among those that are known.
+
+    Raises
+    ------
+    BadInput
+        None of them has this name.
+    """
+    if not isinstance(invariant, str):
+        return invariant
+    by_name = {each.name: each for each in known}
+    if invariant not in by_name:
+        raise BadInput("invariant", describe(invariant), nearest(invariant, by_name))
+    return by_name[invariant]
 
 
 def kinetic_energy(body: RigidBody, w_WB_B: Array) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from html import escape
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -126,8 +127,35 @@ def picture(trajectory: Sampled) -> altair.VConcatChart:
         _lines(trajectory, rates, "body rate, rad/s", "linear"),
         _lines(trajectory, drifts, "relative drift", "log"),
     ]
-    chart: altair.VConcatChart = alt.vconcat(*rows, title=title).resolve_scale(color="independent")
-    return chart
+    return _offline(alt.vconcat(*rows, title=title).resolve_scale(color="independent"))
+
+
+def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
+    """Return a chart that a notebook shows without a network.
+
+    A notebook that draws Vega-Lite by itself, as JupyterLab does, gets the specification, any other one an SVG. Altair's own
+    way is a page that asks a server for its scripts.
+    """
+    import altair as alt
+
+    class Offline(alt.VConcatChart):
+        def _repr_mimebundle_(self, *args: object, **kwds: object) -> dict[str, Any]:
+            return _mimebundle(self)
+
+    return Offline.from_dict(chart.to_dict(), validate=False)
+
+
+def _mimebundle(chart: altair.VConcatChart) -> dict[str, Any]:
+    """Return what a notebook may show of a chart: the specification, and an SVG where `vl-convert` is there to draw it."""
+    specification = chart.to_dict()
+    version = str(specification["$schema"]).rpartition("/")[2].partition(".")[0]
+    name = "chart of body rates and drifts"
+    shown: dict[str, Any] = {f"application/vnd.vegalite.{version}+json": specification, "text/plain": name}
+    with suppress(ImportError):
+        import vl_convert
+
+        shown["image/svg+xml"] = vl_convert.vegalite_to_svg(specification)
+    return shown
 
 
 def _lines(trajectory: Sampled, series: dict[str, Array], quantity: str, scale: Literal["linear", "log"]) -> altair.Chart:

@@ -113,6 +113,15 @@ class Scene(_Fields):
         """Whether nothing acts on the body."""
         return self.potential is None
 
+    @property
+    def integrable(self) -> bool:
+        """Whether as many quantities are known to be conserved as there are degrees of freedom, three: a closed form exists.
+
+        So it is of a free body, and of one with three invariants, those of `extra_invariants` counted. Source: Arnold,
+        Mathematical Methods of Classical Mechanics, section 49 (Liouville's theorem).
+        """
+        return self.free or len(self.invariants) >= 3
+
     @cached_property
     def kinetic_energy0(self) -> float:
         """Kinetic energy at the start, J."""
@@ -166,7 +175,8 @@ class Scene(_Fields):
         return replace(self, name=name, **changes)
 
     def __repr__(self) -> str:
-        return f"Scene({self.name!r}, {self.body!r}, potential={self.potential!r}, t_end={self.t_end:g})"
+        start = f"R_WB0={self.R_WB0.tolist()}, w_WB_B0={self.w_WB_B0.tolist()}"
+        return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r})"
 
 
 def _check_parts(name: object, body: object, potential: object) -> None:

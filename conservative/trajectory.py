@@ -77,11 +77,13 @@ class Trajectory:
         """Counts of work by their names, those that the method has."""
         return {name: count for name, count in vars(self.counters).items() if count is not None}
 
-    def drift(self, invariant: Invariant) -> Array:
+    def drift(self, invariant: Invariant | str) -> Array:
         """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
 
-        `conservative.invariants.sizes` makes sizes of it, of a vector its length.
+        It is one of `scene.invariants`, by itself or by name, such as "energy"; `conservative.invariants.sizes` makes sizes of
+        what is returned, of a vector its length. Another name is a `BadInput`.
         """
+        invariant = invariants.named(invariant, self.scene.invariants)
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
         R = self.scene.in_field_axes(self.R_WB, self.t)
         return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)

@@ -28,6 +28,7 @@ ALLOWED = {
     "benchmarks/studies/paper_figures.py": ("convected exact reduced", "the paper's figures show the paper's map"),
     "benchmarks/studies/random.py": ("precise", "the truth of a body in any field"),
     "benchmarks/studies/throughput.py": ("heyoka", "the truth of many bodies, at a tolerance below round-off"),
+    "benchmarks/verification/comparison_alarms.py": ("moser_veselov reduced", "the rows that are slowed"),
     "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (
         "convected exact gauss moser_veselov reduced substepped",

@@ -17,7 +17,7 @@ from conservative.files import make_folder, write_text
 from conservative.trajectory import Counters
 
 from ..measures.measure import Measure
-from .results import Results, Row, Status
+from .results import Results, Row, Status, find_runaway
 
 PATH = Path("benchmarks") / "baseline.json"
 """Where a project keeps its baseline, relative to its root."""
@@ -155,6 +155,8 @@ def _measure(name: str, rows: Sequence[Row]) -> Allowed:
     values = [row.values[name] for row in rows]
     if not all(math.isfinite(value) for value in values):
         raise BadInput("results", f"{name} = {values} of {rows[0].id}", "finite values: what is not a number is not accepted")
+    if runaway := find_runaway({name: max(values)}):
+        raise BadInput("results", f"{rows[0].id}, whose {runaway}", "runs that keep their energy: a failure is not accepted")
     spread = max(max(row.spreads.get(name, 0.0) for row in rows), max(values) - min(values))
     value = statistics.median(values)
     return Allowed(value, spread, len(values), limit(name, value, spread))

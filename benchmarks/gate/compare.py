@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .baseline import ORDER, Allowed, Baseline, BaselineRow
-from .results import TIME_RATIO, Results, Row, Status
+from .results import ENERGY_DRIFT, RUNAWAY, TIME_RATIO, Results, Row, Status, find_runaway
 
 Times = Literal["required", "known"]
 """required: the baseline has to know times on this machine. known: where it does not, time is not gated, and that is said."""
+ANYWHERE = "on any machine: conservative gate --against REF"
 ACCEPT = 'accept with: conservative gate --update "REASON"'
 
 
@@ -26,8 +27,13 @@ class Violation:
     now: str
     allowed: str
 
+    @property
+    def finding(self) -> str:
+        """What is not as it was, without what to do about it."""
+        return f"{self.measure}, {self.scene}, {self.method}: was {self.was}, is {self.now}, allowed {self.allowed}"
+
     def __str__(self) -> str:
-        return f"{self.measure}, {self.scene}, {self.method}: was {self.was}, is {self.now}, allowed {self.allowed}; {ACCEPT}"
+        return f"{self.finding}; {ACCEPT}"
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Verdict:
         return "\n".join([head, *map(str, self.violations), *(f"note: {note}" for note in self.notes)])
 
 
-def judge(baseline: Baseline, results: Results, times: Times = "required") -> Verdict:
+def judge(baseline: Baseline, results: Results, times: Times = "known") -> Verdict:
     """Return the verdict on results. A baseline without rows, which would let everything pass, is a violation."""
     violations = [] if baseline.rows else [Violation("rows", "all", "all", "none", "none", "one or more")]
     notes = [
@@ -59,9 +65,10 @@ def judge(baseline: Baseline, results: Results, times: Times = "required") -> Ve
     if foreign and times == "required":
         violations.append(_foreign(results.machine, known))
     elif foreign:
-        notes.append(f"unbaselined machine: no time is gated, as the baseline has none of {results.machine}")
+        notes.append(f"unbaselined machine: no time is gated, as the baseline has none of {results.machine}; {ANYWHERE}")
     for id, was in baseline.rows.items():
         violations += _row_violations(id, was, results, foreign)
+    violations += _runaways(baseline, results)
     notes += _improvements(baseline, results)
     return Verdict(tuple(violations), tuple(notes), len(baseline.rows))
 
@@ -95,6 +102,15 @@ def _row_violations(id: str, was: BaselineRow, results: Results, foreign: bool) 
         now = math.nan if row.time_ratio is None else row.time_ratio
         if ratio and not foreign and not passes(TIME_RATIO, now, ratio):
             yield violation(TIME_RATIO, f"{ratio.value:.4g}", _write_value(row.time_ratio), _bound(TIME_RATIO, ratio))
+
+
+def _runaways(baseline: Baseline, results: Results) -> Iterator[Violation]:
+    """Yield the rows whose run ran away, though it says of itself that it has passed, and whatever the baseline has of it."""
+    for id, row in results.rows.items():
+        if row.status is Status.PASSED and find_runaway(row.values):
+            was = baseline.rows[id].measures.get(ENERGY_DRIFT) if id in baseline.rows else None
+            before, now = _write_value(was.value if was else None), _write_value(row.values.get(ENERGY_DRIFT))
+            yield Violation(ENERGY_DRIFT, row.scene or id, row.method or id, before, now, f"at most {RUNAWAY:g}")
 
 
 def _find_renames(was: BaselineRow, results: Results) -> Iterator[str]:

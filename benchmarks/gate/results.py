@@ -12,10 +12,15 @@ from typing import Any
 from conservative.errors import BadInput
 from conservative.files import make_folder, write_text
 
+from ..measures.measure import Measure, key
+
 FOLDER = Path(".benchmarks") / "gate"
 """Where a gated run leaves its results, relative to the root of the project."""
 FILE = "results.json"
 TIME_RATIO = "time ratio"
+RUNAWAY = 1.0
+"""Energy drift, relative, above which a run has failed, whatever it says of itself: its energy is not that of its start."""
+ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
 
 
 class Status(StrEnum):
@@ -69,6 +74,12 @@ class Results:
     machine: str
     rows: Mapping[str, Row]
     commit: str = ""
+
+
+def find_runaway(values: Mapping[str, float]) -> str:
+    """Return what says that a run ran away, empty if nothing does."""
+    drift = values.get(ENERGY_DRIFT, 0.0)
+    return "" if drift <= RUNAWAY else f"{ENERGY_DRIFT} is {drift:.2g}, more than {RUNAWAY:g}: the run failed"
 
 
 def write(results: Results, path: Path) -> None:

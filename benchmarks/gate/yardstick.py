@@ -95,14 +95,14 @@ def definition() -> str:
 def time_ratio(method: Method, scene: Scene, dt: float) -> float:
     """Return the time of a step of the method, in steps of the yardstick."""
     loop = compile_reference()
-    steps, run = _lasting(lambda n: method.prepare(scene, Grid(dt, n, n)))
-    reference_steps, reference = _lasting(lambda n: lambda: loop(n, 1e-3))
+    steps, run = last_a_sample(lambda n: method.prepare(scene, Grid(dt, n, n)))
+    reference_steps, reference = last_a_sample(lambda n: lambda: loop(n, 1e-3))
     again = [method.prepare(scene, Grid(dt, steps, steps)) for _ in range(PREPARATIONS - 1)]
     theirs, *ours = measure_minimums(reference, run, *again)
     return (min(ours) / steps) / (theirs / reference_steps)
 
 
-def _lasting(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
+def last_a_sample(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
     """Return the number of steps that last a sample, to a few per cent, and the run that takes them."""
     n = 16
     while True:

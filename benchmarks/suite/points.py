@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -92,6 +92,11 @@ class Point:
 def define_scene(scene: Scene) -> str:
     """Return a hash of what a scene is: its motion, steps and invariants, whatever its file is called."""
     return _hash([[scene.name, *(invariant.name for invariant in scene.invariants)], motion_numbers(scene)])
+
+
+def define(words: list[str], values: Iterable[object]) -> str:
+    """Return a hash of words, and of numbers but for the last digits, in which two machines differ."""
+    return _hash([words, [_digits(each) for each in values]])
 
 
 def motion_numbers(scene: Scene) -> list[list[float]]:

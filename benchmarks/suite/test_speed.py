@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from conservative.benchmarks.gate.results import TIME_RATIO
+from conservative.benchmarks.gate.results import TIME_RATIO, find_runaway
 from conservative.benchmarks.gate.stash import REPEAT
 from conservative.benchmarks.gate.yardstick import time_ratio, time_ratio_elsewhere
 from conservative.benchmarks.measures.timing import prepare_and_run, time_interleaved
@@ -42,6 +42,10 @@ def test_speed(request: pytest.FixtureRequest, benchmark: Any, point: Point) -> 
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
     values = points.measure(point)
+    runaway = find_runaway({name: found.value for name, found in values.items()})
+    if method.role == Role.ENGINE and runaway:
+        pytest.xfail(f"{method.label}: {runaway}")
+    assert not runaway
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
     benchmark.extra_info.update({name: found.value for name, found in values.items()})
     benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}

@@ -38,7 +38,7 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
     if not source.allow_build:
         raise BadInput("against", f"{str(path)!r}, which has to be built", "a wheel, or --allow-build, which runs its code")
     with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
-        return _install_wheel(engine, _build(path, Path(folder), source), source)
+        return _install_wheel(engine, build_wheel(path, Path(folder), source), source)
 
 
 def _install_wheel(engine: str, wheel: Path, source: Source) -> Installation:
@@ -60,11 +60,17 @@ def _version_of(wheel: Path, package: str) -> str:
     return f"{version}{'.' if '+' in version else '+'}{BUILD}{digest}"
 
 
-def _build(path: Path, folder: Path, source: Source) -> Path:
-    """Return the wheel that a folder of sources builds. Raises `BadInput` where it does not build."""
+def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> Path:
+    """Return the wheel that a folder of sources builds, with variables beside ours; it is put into another folder.
+
+    Raises
+    ------
+    BadInput
+        It does not build.
+    """
     options = ("--quiet", "--wheel", "--out-dir", folder)
     try:
-        run_uv("build", *options, *source.options, path.resolve(), SOURCE_DATE_EPOCH=_EPOCH)
+        run_uv("build", *options, *source.options, path.resolve(), SOURCE_DATE_EPOCH=_EPOCH, **variables)
     except UvFailed as failure:
         raise BadInput("against", repr(str(path)), f"a folder that uv can build ({failure.summary})") from None
     return next(folder.glob("*.whl"))

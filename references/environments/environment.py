@@ -83,6 +83,11 @@ def folder_of_all() -> Path:
     return user_cache_path("conservative-rotation") / "engines"
 
 
+def folder_of_projects() -> Path:
+    """Return the folder of the environments of projects (`projects`); it need not be there. Raises `MissingExtra` as above."""
+    return folder_of_all().parent / "projects"
+
+
 def temporary_folder() -> Path:
     """Return the folder of what does not last; it is made where it is not there."""
     folder = folder_of_all() / "temporary"

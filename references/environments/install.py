@@ -18,6 +18,7 @@ from .environment import (
     LOCK,
     Environment,
     folder_of_all,
+    folder_of_projects,
     interpreter_of,
     list_environments,
     read_environment,
@@ -176,7 +177,7 @@ def clear_leftovers() -> list[str]:
 
 
 def _leftovers() -> Iterator[Path]:
-    for path in folder_of_all().glob("*/.*-*"):
+    for path in (*folder_of_all().glob("*/.*-*"), *folder_of_projects().glob("*/.*-*")):
         yield from leftovers(path.with_name(path.name[1:].rpartition("-")[0]))
     yield from (path for path in sorted(temporary_folder().iterdir()) if not _alive(path.name))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import altair as alt
 import pandas as pd
@@ -15,43 +16,89 @@ from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, apply_style
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
 
 
+class Panel(NamedTuple):
+    """A panel for itself: its chart, what its lines are told by, what hovering shows, and the colour and dash of each line."""
+
+    title: str
+    chart: Any
+    line: str
+    value: tuple[str, str, str]
+    lines: Mapping[str, tuple[str, str]]
+
+
+def panels_1(rates: pd.DataFrame, errors: pd.DataFrame) -> tuple[Panel, ...]:
+    """Return the panels of figure 1."""
+    found = [Panel("(a) body rates, rad/s", _rates(rates), "component", ("rate", "Q", "rad/s"), _looks(_RATES))]
+    for letter, column, title in (("b", ENERGY, "relative error of energy"), ("c", MOMENTUM, "relative error of |L|")):
+        chart = _errors(errors, column, title)
+        found.append(Panel(f"({letter}) {title}", chart, "method", (column, "Q", "relative error"), _looks(_MAPS)))
+    return tuple(found)
+
+
+def panels_2(positions: pd.DataFrame) -> tuple[Panel, ...]:
+    """Return the panels of figure 2."""
+    looks = {run: (colour, dash) for run, colour, dash in zip(_runs(positions), _COLOURS, _DASHES, strict=False)}
+    lines = {run: (colour, " ".join(map(str, dash))) for run, (colour, dash) in looks.items()}
+    return tuple(
+        Panel(f"({letter}) {x}, m", _positions(positions, x), "run", (x, "Q", f"{x}, m"), lines)
+        for letter, x in (("b", X1), ("c", X2))
+    )
+
+
+_RATES = dict(zip(RATES, (VERMILION, SKY, BLACK), strict=True))
+_MAPS = {PAPER_MAP: SKY, REDUCED_MAP: BLUE}
+_COLOURS, _DASHES = (SKY, BLUE, BLACK), ([1, 0], [8, 4], [2, 2])
+
+
+def _looks(colours: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    return {line: (colour, "1 0") for line, colour in colours.items()}
+
+
+def _runs(positions: pd.DataFrame) -> list[str]:
+    return [*(str(name) for name in positions["run"].unique() if name != ANALYTICAL), ANALYTICAL]
+
+
 def figure_1(rates: pd.DataFrame, errors: pd.DataFrame) -> Any:
     """Return figure 1: (a) body rates with the reversals, (b) error of energy, (c) of |L|; see `lines` for the columns."""
-    b = _error_panel(errors, ENERGY, "(b) Energy", "relative error of energy")
-    c = _error_panel(errors, MOMENTUM, "(c) Length of the angular momentum", "relative error of |L|")
+    b = _errors(errors, ENERGY, "relative error of energy", "(b) Energy, Δt = 0.01 s, ε = 1e-8")
+    c = _errors(errors, MOMENTUM, "relative error of |L|", "(c) Length of the angular momentum, Δt = 0.01 s, ε = 1e-8")
     return apply_style(alt.hconcat(_rates_panel(rates), alt.vconcat(b, c)).resolve_scale(color="independent"))
 
 
-def _rates_panel(rates: pd.DataFrame) -> Any:
-    names = list(RATES)
-    colour = alt.Color("component:N", scale=alt.Scale(domain=names, range=[VERMILION, SKY, BLACK]), legend=None)
+_COMPONENT = alt.Color("component:N", scale=alt.Scale(domain=list(_RATES), range=list(_RATES.values())), legend=None)
+
+
+def _rates(rates: pd.DataFrame) -> Any:
     base = alt.Chart(rates, width=WIDTH, height=2 * HEIGHT - 80, title="(a) Body rates of the brick, Δt = 0.01 s, ε = 1e-8")
-    lines = base.mark_line(strokeWidth=1.8).encode(x=_TIME, y=alt.Y("rate:Q", title="rate, rad/s, body axes"), color=colour)
+    y = alt.Y("rate:Q", title="rate, rad/s, body axes")
+    return base.mark_line(strokeWidth=1.8).encode(x=_TIME, y=y, color=_COMPONENT)
+
+
+def _rates_panel(rates: pd.DataFrame) -> Any:
     ends = rates.loc[rates.groupby("component")["t"].idxmax()]
     labels = alt.Chart(ends).mark_text(align="left", dx=5, fontSize=12, fontWeight="bold")
-    return lines + labels.encode(x="t:Q", y=alt.Y("rate:Q", stack=None), text="component:N", color=colour)
+    return _rates(rates) + labels.encode(x="t:Q", y=alt.Y("rate:Q", stack=None), text="component:N", color=_COMPONENT)
 
 
-def _error_panel(errors: pd.DataFrame, column: str, title: str, axis: str) -> Any:
-    names = [PAPER_MAP, REDUCED_MAP]
+def _errors(errors: pd.DataFrame, column: str, axis: str, title: str = "") -> Any:
     legend = alt.Legend(title=None, orient="bottom", symbolSize=300)
-    colour = alt.Color("method:N", scale=alt.Scale(domain=names, range=[SKY, BLUE]), legend=legend)
+    colour = alt.Color("method:N", scale=alt.Scale(domain=list(_MAPS), range=list(_MAPS.values())), legend=legend)
     y = alt.Y(f"{column}:Q", title=axis, axis=alt.Axis(format=".1e", tickCount=5, minExtent=55))
-    chart = alt.Chart(errors, width=WIDTH, height=HEIGHT - 80, title=f"{title}, Δt = 0.01 s, ε = 1e-8")
+    chart = alt.Chart(errors, width=WIDTH, height=HEIGHT - 80, title=title)
     return chart.mark_line(strokeWidth=1.2).encode(x=_TIME, y=y, color=colour)
 
 
 def figure_2(positions: pd.DataFrame) -> Any:
     """Return figure 2: (b), (c), the coordinates x1 and x2 of the top's centre of mass for two steps, and exact."""
-    panels = [_position_panel(positions, X1, "(b)"), _position_panel(positions, X2, "(c)")]
+    panels = [_positions(positions, x, f"({letter}) Centre of mass of the top, {x}") for letter, x in (("b", X1), ("c", X2))]
     return apply_style(alt.hconcat(*panels))
 
 
-def _position_panel(positions: pd.DataFrame, coordinate: str, letter: str) -> Any:
-    runs = [*(name for name in positions["run"].unique() if name != ANALYTICAL), ANALYTICAL]
+def _positions(positions: pd.DataFrame, coordinate: str, title: str = "") -> Any:
+    runs = _runs(positions)
     look = alt.Legend(title=None, orient="bottom", symbolSize=300)
-    colour = alt.Color("run:N", scale=alt.Scale(domain=runs, range=[SKY, BLUE, BLACK]), legend=look, sort=runs)
-    dash = alt.StrokeDash("run:N", scale=alt.Scale(domain=runs, range=[[1, 0], [8, 4], [2, 2]]), legend=look, sort=runs)
+    colour = alt.Color("run:N", scale=alt.Scale(domain=runs, range=list(_COLOURS)), legend=look, sort=runs)
+    dash = alt.StrokeDash("run:N", scale=alt.Scale(domain=runs, range=list(_DASHES)), legend=look, sort=runs)
     y = alt.Y(f"{coordinate}:Q", title=f"{coordinate}, m")
-    chart = alt.Chart(positions, width=WIDTH, height=HEIGHT, title=f"{letter} Centre of mass of the top, {coordinate}")
+    chart = alt.Chart(positions, width=WIDTH, height=HEIGHT, title=title)
     return chart.mark_line(strokeWidth=1.8).encode(x=_TIME, y=y, color=colour, strokeDash=dash)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import altair as alt
@@ -123,12 +123,24 @@ def dash_scale(families: Families) -> alt.Scale:
     return alt.Scale(domain=list(families), range=dashes)
 
 
+_POWER = "datum.value >= 0.01 && datum.value < 1e6 ? format(datum.value, ',~r') : format(datum.value, '~e')"
+"""How Vega writes a number of an axis: as people do."""
+
+
 def power_axis(title: str, low: float, high: float) -> alt.Axis:
-    """Return a logarithmic axis with a label at each whole power of ten, or at every second or third where they are many."""
+    """Return a logarithmic axis with labels at powers of ten: not at all of many, and between few."""
     first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
     every = 1 + (last - first) // 12
     powers = [10.0**k for k in range(first, last + 1) if k % every == 0]
-    return alt.Axis(title=title, format="~e", values=powers if len(powers) > 1 else alt.Undefined)
+    few, many = (_between(low, high, mantissas) for mantissas in ((1, 2, 5), range(1, 10)))
+    values = powers if len(powers) > 2 else few if len(few) > 1 else many
+    return alt.Axis(title=title, labelExpr=_POWER, values=values if len(values) > 1 else alt.Undefined)
+
+
+def _between(low: float, high: float, mantissas: Iterable[int]) -> list[float]:
+    """Return the numbers of these mantissas that are not below the one nor above the other, in their order."""
+    powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    return sorted(m * 10.0**k for k in powers for m in mantissas if low <= m * 10.0**k <= high)
 
 
 def apply_style(chart: Any) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -37,12 +38,13 @@ Tooltip = Sequence[tuple[str, str, str]]
 
 @dataclass(frozen=True)
 class Entry:
-    """A button of a legend: the line's key in the charts, its colour, its mark as an outline or its dash."""
+    """A button of a legend: the line's key in the charts, colour, mark as an outline or dash, whether it is drawn at first."""
 
     name: str
     colour: str
     path: str
     dash: str
+    shown: bool = True
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class PageFigure:
     charts: tuple[Spec, ...]
     legend: tuple[Entry, ...]
     view: str = ""
-    """ "sphere" where the charts have the parameters `turn` and `tilt`."""
+    """ "sphere" where the charts have the parameters `turn` and `tilt`, "families" where they have `single`."""
 
 
 def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
@@ -72,8 +74,11 @@ def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
     )
 
 
-def embed(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
-    """Return a picture's specification as the page embeds it; a picture of panels becomes a chart a panel."""
+def embed(chart: Any, tooltip: Tooltip, height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
+    """Return a picture's specification as the page embeds it, without the lines that are hidden at first.
+
+    A picture of panels becomes a chart a panel.
+    """
     whole: Spec = chart.to_dict()
     panels: list[Spec] | None = whole.pop("vconcat", whole.pop("concat", None))
     if panels is None:
@@ -81,7 +86,8 @@ def embed(chart: Any, tooltip: Tooltip, height: int = 420) -> list[Spec]:
         for unit in (whole, *whole.get("layer", ())):
             unit.pop("title", None)  # the caption of the figure says it
     shared = {"data": whole["data"]} if "data" in whole else {}  # Altair lifts what all panels have in common
-    return [_panel(shared | panel, whole, tooltip, height) for panel in panels]
+    parameters = [{"name": HIDDEN, "value": list(hidden)}, *whole.get("params", ())]
+    return [_panel(shared | panel, whole, tooltip, height) | {"params": parameters} for panel in panels]
 
 
 def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
@@ -96,7 +102,7 @@ def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
             unit["data"] = {"name": unit["data"]["name"], "format": tables[unit["data"]["name"]]["format"]}
     rest = {key: value for key, value in panel.items() if key not in ("config", "$schema")}
     values = {name: table["values"] for name, table in tables.items()}
-    return rest | {"datasets": values, "width": "container", "height": height, "params": [{"name": HIDDEN, "value": []}]}
+    return rest | {"datasets": values, "width": "container", "height": height}
 
 
 def _prepare(unit: Spec, tooltip: Tooltip) -> None:
@@ -105,8 +111,8 @@ def _prepare(unit: Spec, tooltip: Tooltip) -> None:
     for channel in ("color", "shape", "strokeDash"):
         if channel in encoding:
             encoding[channel] = encoding[channel] | {"legend": None}
-    if encoding.get("color", {}).get("field") == "name":
-        unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum.name) < 0"}, *unit.get("transform", ())]
+    if series := encoding.get("color", {}).get("field"):
+        unit["transform"] = [{"filter": f"indexof({HIDDEN}, datum[{json.dumps(series)}]) < 0"}, *unit.get("transform", ())]
         unit["mark"] = unit["mark"] | {"tooltip": True}
         encoding["tooltip"] = [_channel(*part) for part in tooltip]
 

@@ -105,10 +105,11 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
     """
     from conservative.benchmarks.tracking.track import track
 
+    from ..run.provenance import describe_origin
     from ..tables.track import Answer
     from ..terminal.progress import progress
 
-    made = _made()
+    made = describe_origin()
     with interruptible(signal.SIGTERM):
         plan = _plan(engine, versions, scenes, settings, options)
         with progress() as step:
@@ -132,14 +133,6 @@ def _plan(engine: str, versions: tuple[str, ...], scenes: list[str], settings: l
         _tell(f"installing {against}")
         environments += (install_build(engine, against, source).environment,)
     return make_plan(environments, settings, scenes)
-
-
-def _made() -> dict[str, str]:
-    """Return how and where this is measured; before any work, as files and the commit can change while that goes on."""
-    from ..run.provenance import provenance
-
-    source = provenance()
-    return {"command": source.command, "date": source.date, "commit": source.commit, **source.machine}
 
 
 def _tell(what: str) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import pandas as pd
+
 from conservative.benchmarks.studies import long_runs
 
-from ..charts import figures, spheres, vega_embed
-from ..charts.style import families_of
-from ..charts.vega_embed import PageFigure
+from ..charts import families, figures, spheres, vega_embed
+from ..charts.style import colours, families_of
+from ..charts.vega_embed import PATHS, Entry, PageFigure
+from ..tables.families import under
+from ..tables.summary import Summary
 from ..view import SceneView
 from .scene_charts import SceneCharts
 
@@ -21,6 +26,8 @@ NUMBERS = {
     "t": ("t", "Q", "t, s"),
     "drift": ("drift", "Q", "largest drift so far"),
     "name": ("name", "N", "method"),
+    "setting": ("setting", "N", "setting"),
+    "within": ("within", "N", "bodies"),
 }
 """What hovering can show: field, kind, title."""
 
@@ -37,7 +44,10 @@ class SceneFigures(NamedTuple):
 def scene_figures(scene: SceneView, charts: SceneCharts) -> SceneFigures:
     """Return the figures of a scene out of its charts."""
     return SceneFigures(
-        work_precision(scene, charts.work_precision), drift(scene), convergence(scene, charts.convergence), sphere(scene)
+        first(scene.summary, f"work_precision_{scene.name}", scene.name),
+        drift(scene),
+        convergence(scene, charts.convergence),
+        sphere(scene),
     )
 
 
@@ -46,22 +56,40 @@ def hover(*names: str) -> list[tuple[str, str, str]]:
     return [NUMBERS[name] for name in ("name", *names)]
 
 
-def work_precision(scene: SceneView, chart: Any) -> PageFigure:
-    """Return error against time, with the Pareto front in words."""
-    names = ", ".join(dict.fromkeys(scene.front["name"])) or "nobody"
-    summary = f"{len(scene.points)} measured points of {scene.line_count} lines. On the Pareto front, cheap to dear: {names}."
-    title = f"{scene.name}: wall time against attitude error, both logarithmic"
-    charts = tuple(vega_embed.embed(chart, hover("method", "error", "microseconds", "dt"), 520))
-    legend = vega_embed.legend(families_of(scene.points), marks=True)
-    return PageFigure(f"work_precision_{scene.name}", title, summary, charts, legend)
+def first(summary: Summary, name: str, what: str) -> PageFigure:
+    """Return work against precision, the best of each family; what a summary shows at first is drawn, the rest at a press."""
+    points = summary.points
+    best = points[~points["single"].astype(bool)]
+    lines = [(str(line), members) for line, members in best.groupby("name", sort=False)]
+    title = f"{what}: computing time against attitude error, the best of each family"
+    words = " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(lines, "error", "time")])
+    hidden = [line for line, _ in lines if line not in summary.shown]
+    shown = hover("setting", "error", "microseconds", *(["within"] if best["within"].any() else ["dt"]))
+    charts = tuple(vega_embed.embed(families.work_precision(points), shown, 310, hidden)) if len(points) else ()
+    legend = tuple(_entry(line, members, line in summary.shown) for line, members in lines)
+    return PageFigure(name, title, words, charts, legend, "families")
+
+
+def _entry(line: str, members: pd.DataFrame, shown: bool) -> Entry:
+    family, kind = members[["family", "class"]].iloc[0]
+    dash = " ".join(map(str, families.DASHES[kind]))
+    return Entry(line, colours({line: family})[line], PATHS[families.SHAPES[kind]], dash, shown)
 
 
 def drift(scene: SceneView) -> PageFigure:
     """Return the drift over time, of fewer samples than the picture beside report.md has."""
-    summary = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
+    words = "Each quantity has a panel: a level line stays, a rising one drifts. The table below says how far each goes."
+    summary = " ".join([words, *_under_another(scene.thin_drifts)])
     charts = tuple(vega_embed.embed(figures.drift(scene.thin_drifts, scene.name), hover("t", "drift"), 220))
     legend = vega_embed.legend(families_of(scene.drifts), marks=False)
     return PageFigure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, legend)
+
+
+def _under_another(drifts: pd.DataFrame) -> Iterator[str]:
+    """Yield what lies exactly under another line in every panel, as do methods that keep everything to the last digit."""
+    data = drifts.assign(shown=drifts["drift"].clip(lower=figures.FLOOR), panel=drifts["quantity"])
+    lines = [(str(name), members.sort_values(["panel", "t"])) for name, members in data.groupby("name", sort=False)]
+    return under(lines, "t", "shown")
 
 
 def convergence(scene: SceneView, chart: Any) -> PageFigure:

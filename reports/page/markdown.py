@@ -11,7 +11,7 @@ from conservative.benchmarks.studies import long_runs
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
-from ..tables import engine_tables, random_ratios, throughput
+from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, Table, markdown
 from ..view import PaperView, View
 from . import many_bodies, random_bodies
@@ -45,6 +45,9 @@ def render(
         durations=f"{long_runs.DURATIONS:g}",
         engine_pictures={name: draw(f"engines_{name}", chart) for name, chart in of_engines.items()},
         engine_terms=engine_tables.TERMS,
+        class_terms=summary.TERMS,
+        caveat=summary.CAVEAT,
+        hard_terms=hard_cases.TERMS,
         conserved=f"{CONSERVED:.0e}",
         small=f"{SMALL:.0e}",
         paper=list(_paper(view.paper, draw)),

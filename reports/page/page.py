@@ -6,27 +6,25 @@ It opens from disk without a network: style, scripts, the Vega libraries and all
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from itertools import chain
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 from conservative.benchmarks.studies import long_runs
 
-from ..charts import spheres
-from ..charts.style import BLACK, BLUE, INDIGO, OLIVE, VERMILION, WINE
+from ..charts import contrast, spheres
 from ..charts.vega_embed import PageFigure
-from ..tables import engine_tables, overview, random_ratios, throughput
-from ..tables.cells import CONSERVED, SMALL
+from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
+from ..tables.cells import CONSERVED, SMALL, tolerance
 from ..view import View
-from . import engines, many_bodies, random_bodies
-from .figures import scene_figures
+from . import engines, many_bodies, paper, random_bodies
+from .figures import first, scene_figures
 from .scene_charts import SceneCharts
-
-DARK = {BLACK: "#FFFFFF", BLUE: "#4CA6E8", INDIGO: "#9A8CFF", WINE: "#E07BA8", OLIVE: "#C2C25A", VERMILION: "#FF7F32"}
-"""Colours that are too dark on a dark page, and what stands for them there."""
 
 
 def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], of_random: Any = None) -> str:
@@ -40,9 +38,16 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
     many = many_bodies.chart(view.throughput)
     many_figure = None if many is None else many_bodies.figure(many)
+    first_figure, paper_figures = first(view.first, "first", view.about), paper.figures(view.paper)
+    drawn = [first_figure, *chain.from_iterable(figures.values()), *engine_figures.values(), *paper_figures]
     alone = [figure for figure in (random_figure, many_figure) if figure is not None]
     return _template().render(
         view=view,
+        first_figure=first_figure,
+        paper=paper_figures,
+        caveat=summary.CAVEAT,
+        class_terms=summary.TERMS,
+        hard_terms=hard_cases.TERMS,
         random_figure=random_figure,
         many_figure=many_figure,
         many_terms=throughput.TERMS,
@@ -50,11 +55,10 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         figures=figures,
         engine_figures=engine_figures,
         engine_terms=engine_tables.TERMS,
-        errors=", ".join(f"{error:.0e}" for error in overview.ERRORS),
-        conserved=f"{CONSERVED:.0e}",
-        small=f"{SMALL:.0e}",
+        conserved=tolerance(CONSERVED),
+        small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(_charts([*alone, *chain.from_iterable(figures.values()), *engine_figures.values()])),
+        charts=_in_script(_charts([*drawn, *alone])),
         vega=_vega(),
         turn=spheres.TURN,
         tilt=spheres.TILT,
@@ -64,7 +68,13 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
 def _template() -> Template:
     loader = PackageLoader("conservative.reports")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["whole"] = _whole
     return environment.get_template("page.html.j2")
+
+
+def _whole(text: str) -> Markup:
+    """Return a sentence in which no line ends within a number such as 1e-3, or between it and its unit."""
+    return Markup(re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text))))
 
 
 @lru_cache(maxsize=1)
@@ -81,5 +91,8 @@ def _in_script(content: Any) -> str:
 
 
 def _charts(figures: Iterable[PageFigure]) -> dict[str, Any]:
-    """Return what the page's script draws, and the colours of a dark page."""
-    return {"figures": {figure.name: figure.charts for figure in figures}, "dark": DARK}
+    """Return what the page's script draws, and what stands for colours that cannot be seen well on a light or a dark page."""
+    charts = {figure.name: figure.charts for figure in figures}
+    found = contrast.colours_in(json.dumps(charts))
+    papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
+    return {"figures": charts, "colours": {name: contrast.stand_ins(found, paper) for name, paper in papers.items()}}

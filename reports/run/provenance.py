@@ -59,6 +59,12 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
     )
 
 
+def describe_origin() -> dict[str, str]:
+    """Return how and where something is measured; to be asked before any work, as files and the commit can change meanwhile."""
+    source = provenance()
+    return {"command": source.command, "date": source.date, "commit": source.commit, **source.machine}
+
+
 def packages() -> dict[str, str]:
     """Return the version of every installed package, by name."""
     found = {found.metadata["Name"]: found.version for found in distributions()}

@@ -47,8 +47,28 @@ def number(value: float, digits: int = 2) -> str:
     """Return a number to `digits` significant digits, a dash for nan."""
     if math.isnan(value):
         return DASH
-    plain = value == 0 or 0.01 <= abs(value) < 1e4
-    return f"{value:.{digits}g}" if plain else f"{value:.{digits - 1}e}"
+    plain = value == 0 or 0.01 <= abs(value) < 1e6
+    return f"{float(f'{value:.{digits}g}'):,g}" if plain else _power(f"{value:.{digits - 1}e}")
+
+
+def tolerance(value: float) -> str:
+    """Return an error that something is compared at, such as a decade: `1e-3`."""
+    return _power(f"{value:.0e}")
+
+
+def factor(ratio: float, digits: int = 2) -> str:
+    """Return how many times as much something is, as people write it: `2.0`, `220`, `1,200`; a dash for nan."""
+    if math.isnan(ratio):
+        return DASH
+    rounded = float(f"{ratio:.{digits}g}")
+    decimals = digits - 1 - math.floor(math.log10(rounded)) if rounded > 0 else 0
+    return f"{rounded:,.{max(decimals, 0)}f}"
+
+
+def _power(text: str) -> str:
+    """Return a number with an exponent without what nobody writes: `1e-3` for `1e-03`."""
+    mantissa, _, exponent = text.partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else text
 
 
 def grade_drift(value: float) -> Cell:

@@ -1,43 +1,92 @@
-"""Where an engine beats us, in words."""
+"""Where an engine beats us, in words: first what is lost, by how much, and where; solutions of integrable motions apart."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 
-from .work_precision import Contest
+import pandas as pd
+
+from .cells import factor, tolerance
+from .classes import OF_ENGINES, MethodClass, with_classes
+from .random_contests import ANY
+from .random_contests import Contest as RandomContest
+from .work_precision import Contest, contests
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What is found on a scene, in words; the scene is empty where that is about the whole report."""
+    """What is found on a scene, in words; no scene where that is about the whole report; `lost` where we are beaten."""
 
     scene: str
     text: str
+    lost: bool = False
+
+
+def of_points(points: pd.DataFrame) -> list[Statement]:
+    """Return what is found in the points of all scenes: of general integrators, then of solutions of integrable motions."""
+    found = with_classes(points)
+    general = contests(found[found["class"] != MethodClass.SOLUTION])
+    solutions = contests(found[found["class"].isin([*OF_ENGINES, MethodClass.SOLUTION])])
+    return [*statements(general), *_solutions(solutions)]
+
+
+def of_random_bodies(found: Iterable[RandomContest]) -> list[Statement]:
+    """Return on how many random bodies of each field an engine is faster, or alone in getting there, and by how much."""
+    against = [contest for contest in found if contest.engine == ANY and contest.pairs]
+    fields = dict.fromkeys(contest.field for contest in against)
+    return [_random(field, [contest for contest in against if contest.field == field]) for field in fields]
+
+
+def _random(field: str, members: list[RandomContest]) -> Statement:
+    where = f"random bodies, {field}"
+    lost = [(1 / pair.ratio, contest.error) for contest in members for pair in contest.both if pair.ratio < 1]
+    alone = sum(contest.only_engine for contest in members)
+    if not (lost or alone):
+        return Statement(where, f"no engine is faster on any of {len(members[0].pairs)} bodies, at any decade.")
+    total = sum(len(contest.pairs) for contest in members)
+    most, error = max(lost, default=(1.0, 0.0))
+    slower = f"an engine is faster in {len(lost)} of {total} cases, by up to {factor(most)} times, at {tolerance(error)} rad"
+    parts = [*([slower] if lost else []), *([f"only an engine gets there in {alone} of {total} cases"] if alone else [])]
+    return Statement(where, f"{'; '.join(parts)}.", lost=True)
+
+
+def first_lost(found: Iterable[Statement]) -> tuple[Statement, ...]:
+    """Return statements with what is lost first."""
+    return tuple(sorted(found, key=lambda each: not each.lost))
 
 
 def statements(contests: Sequence[Contest]) -> list[Statement]:
-    """Return, for each scene, where an engine is faster than anything of ours, or alone, and where ours is."""
+    """Return, for each scene, where an engine is faster than our general integrators, or alone, and where they are."""
     by_scene = groupby(contests, key=lambda c: c.scene)
-    found = [Statement(scene, text) for scene, members in by_scene for text in _texts(list(members))]
-    return found or [Statement("", "No engine and no method of ours was measured on error against time.")]
+    found = [Statement(scene, text, lost) for scene, members in by_scene for text, lost in _texts(list(members))]
+    return found or [Statement("", "no engine and no method of ours was measured on error against time.")]
 
 
-def _texts(contests: list[Contest]) -> Iterator[str]:
+def _texts(contests: list[Contest]) -> Iterator[tuple[str, bool]]:
     lost = [c for c in contests if c.lost]
     if not any(c.theirs for c in contests):
-        yield "no engine was measured."
+        yield "no engine was measured.", False
     elif lost:
-        yield from (_lost(engine, members) for engine, members in _by_engine(lost))
+        yield from ((_lost(engine, members), True) for engine, members in _by_engine(lost))
     else:
-        yield "no engine beats us at any error that it reaches."
+        yield "no engine beats our general integrators at any error that it reaches.", False
     won = [c for c in contests if not c.lost and c.theirs]
     if won:
-        yield f"ours is faster at {_errors(won)}, by {_range([c.ratio for c in won])}."
+        yield f"our general integrators are faster by {_range([c.ratio for c in won])}, at {_errors(won)}.", False
     alone = [c for c in contests if c.theirs is None]
     if alone and any(c.theirs for c in contests):
-        yield f"only ours reaches {_errors(alone)}."
+        yield f"only ours reaches {_errors(alone)}.", False
+
+
+def _solutions(contests: Sequence[Contest]) -> Iterator[Statement]:
+    """Yield what our solutions of integrable motions do against the engines, where there are both."""
+    for scene, members in groupby((c for c in contests if c.ours and c.theirs), key=lambda c: c.scene):
+        both = list(members)
+        names = ", ".join(dict.fromkeys(c.ours.name for c in both if c.ours))
+        fast = f"is {_range([c.ratio for c in both])} as fast as the cheapest engine, at {_errors(both)}"
+        yield Statement(scene, f"{names}, which solves integrable motions only, {fast}.", any(c.lost for c in both))
 
 
 def _by_engine(lost: list[Contest]) -> Iterator[tuple[str, list[Contest]]]:
@@ -46,24 +95,23 @@ def _by_engine(lost: list[Contest]) -> Iterator[tuple[str, list[Contest]]]:
 
 
 def _lost(engine: str, members: list[Contest]) -> str:
+    slower, alone = ([c for c in members if bool(c.ours) is there] for there in (True, False))
     parts = []
-    slower = [c for c in members if c.ours]
     if slower:
-        parts.append(f"is faster than anything of ours at {_errors(slower)}, by {_range([1 / c.ratio for c in slower])}")
-    alone = [c for c in members if not c.ours]
+        parts.append(f"is {_range([1 / c.ratio for c in slower])} as fast as our general integrators, at {_errors(slower)}")
     if alone:
-        parts.append(f"reaches {_errors(alone)}, which nothing of ours was measured to reach")
-    return f"{engine} beats us: it {', and '.join(parts)}."
+        parts.append(f"reaches {_errors(alone)}, which none of them was measured to reach")
+    return f"{engine} {', and '.join(parts)}."
 
 
 def _errors(contests: list[Contest]) -> str:
     """Return the errors, every decade in between left out where they are neighbours."""
     errors = [c.error for c in contests]
-    neighbours = all(1 < a / b < 11 for a, b in pairwise(errors))
-    text = f"{errors[0]:.0e} to {errors[-1]:.0e}" if neighbours and len(errors) > 2 else ", ".join(f"{e:.0e}" for e in errors)
-    return f"{text} rad"
+    if len(errors) > 2 and all(1 < a / b < 11 for a, b in pairwise(errors)):
+        return f"{tolerance(errors[0])} to {tolerance(errors[-1])} rad"
+    return f"{', '.join(map(tolerance, errors))} rad"
 
 
 def _range(factors: list[float]) -> str:
-    low, high = f"{min(factors):.2g}", f"{max(factors):.2g}"
+    low, high = factor(min(factors)), factor(max(factors))
     return f"{low} times" if low == high else f"{low} to {high} times"

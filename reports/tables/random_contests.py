@@ -93,7 +93,7 @@ Costs = Mapping[tuple[str, str], Mapping[str, tuple[list[float], list[float]]]]
 
 def contests(table: pd.DataFrame) -> tuple[Contest, ...]:
     """Return all contests in the rows of the study: first against the cheapest engine, then against each one."""
-    lines = _lines(table)
+    lines = costs(table)
     scenes = list(dict.fromkeys(scene for scene, _ in lines))
     engines = list(dict.fromkeys(side for _, side in lines if side != Role.OURS))
     fields: dict[str, list[str]] = {}
@@ -114,12 +114,15 @@ def _field(scene: str) -> str:
     return found[1] if found else scene
 
 
-def _lines(table: pd.DataFrame) -> Costs:
-    """Return errors and times as `Costs`; a setting that was not timed has a time of nan."""
+def costs(table: pd.DataFrame, by_family: bool = False) -> Costs:
+    """Return errors and times as `Costs`; a setting that was not timed has a time of nan.
+
+    A side is ours or the family of an engine; of ours, too, it is a family where that is asked for.
+    """
     found: dict[tuple[str, str], dict[str, dict[tuple[str, float], dict[str, float]]]] = {}
     rows = table[(table["study"] == RANDOM) & (table["outcome"] != OutcomeKind.UNSUPPORTED)]
     for row in rows.to_dict("records"):
-        side = str(row["role"]) if row["role"] == Role.OURS else str(row["family"])
+        side = str(row["role"]) if row["role"] == Role.OURS and not by_family else str(row["family"])
         line = found.setdefault((row["scene"], side), {}).setdefault(row["series"], {})
         line.setdefault((row["method"], row["dt"]), {})[row["measure"]] = float(row["value"])
     return {key: {name: _columns(line.values()) for name, line in lines.items()} for key, lines in found.items()}

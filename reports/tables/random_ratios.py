@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
-from .cells import DASH, Cell, Grade, Table, finite_or_none
-from .random_contests import ANY, Cheapest, Contest, contests
+from .cells import DASH, Cell, Grade, Table, finite_or_none, tolerance
+from .random_contests import ANY, Cheapest, Contest
 
 MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Errors, rad, of the short table."""
@@ -43,9 +43,8 @@ class RandomView:
     points: pd.DataFrame
 
 
-def view(table: pd.DataFrame, bodies: int, seed: int) -> RandomView:
-    """Return the view of the rows of the study."""
-    found = contests(table)
+def view(found: Sequence[Contest], bodies: int, seed: int) -> RandomView:
+    """Return the view of the contests of the study."""
     return RandomView(bodies, seed, statements(found), as_table(found), by_engine(found), chart_points(found))
 
 
@@ -64,7 +63,7 @@ def _row(contest: Contest) -> list[str | Cell]:
     ratios = [_grade(value) for value in (contest.mean, contest.worst, contest.best)]
     winners = [_most_often(found) for found in ([p.ours for p in contest.both], [p.engine for p in contest.both])]
     worst = _index(contest.both[0].scene) if contest.both else DASH
-    return [contest.field, f"{contest.error:.0e}", count_text(contest), *ratios, worst, *winners]
+    return [contest.field, tolerance(contest.error), count_text(contest), *ratios, worst, *winners]
 
 
 def records(found: Iterable[Contest]) -> list[dict[str, Any]]:
@@ -91,7 +90,7 @@ def by_engine(found: Iterable[Contest]) -> Table:
     cells = {(contest.field, contest.engine, contest.error): _spread(contest) for contest in chosen}
     places = dict.fromkeys((contest.field, contest.engine) for contest in chosen if contest.pairs)
     rows = [[*place, *(cells.get((*place, error), DASH) for error in MILESTONES)] for place in places]
-    return ["field", "engine", *(f"{error:.0e}" for error in MILESTONES)], rows
+    return ["field", "engine", *(tolerance(error) for error in MILESTONES)], rows
 
 
 def _spread(contest: Contest) -> str:
@@ -155,8 +154,8 @@ def _sentences(members: list[Contest]) -> Iterator[str]:
     low, high = min(compared, key=lambda c: c.mean), max(compared, key=lambda c: c.mean)
     worst, total = min(compared, key=lambda c: c.worst), sum(len(contest.pairs) for contest in members)
     yield f"over {_bodies(len(members[0].pairs))} the cheapest engine takes, in the geometric mean, {low.mean:.2f}"
-    yield f"(at {low.error:.0e} rad) to {high.mean:.2f} (at {high.error:.0e} rad) times as long as ours; on the worst body"
-    yield f"{worst.worst:.2f} times (at {worst.error:.0e} rad, {worst.both[0].scene})."
+    yield f"(at {tolerance(low.error)} rad) to {high.mean:.2f} (at {tolerance(high.error)} rad) times as long as ours; on the"
+    yield f"worst body {worst.worst:.2f} times (at {tolerance(worst.error)} rad, {worst.both[0].scene})."
     missing = sum(contest.only_engine for contest in members)
     if missing:
         yield f"Only an engine reaches the error in {missing} of {total} cases."

@@ -10,7 +10,9 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.deferred_imports import DEFAULT_METHOD
 
-from .cells import Row, Table, number
+from . import work_precision
+from .cells import DASH, Row, Table, factor, number, tolerance
+from .classes import OF_ENGINES, MethodClass, with_classes
 from .rows import of_measure, of_study
 from .work_precision import CheapestLine, Contest
 
@@ -24,6 +26,16 @@ def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
 
 def _lines(values: pd.DataFrame) -> list[tuple[str, pd.Series[float]]]:
     return [(str(name), row) for name, row in values.iterrows()]
+
+
+def _ranked(values: pd.DataFrame, *columns: tuple[str, object]) -> list[tuple[str, pd.Series[float]]]:
+    """Return the lines by columns, the smallest first, those without it last: ours and the engines' among each other."""
+
+    def rank(line: tuple[str, pd.Series[float]]) -> list[tuple[bool, float]]:
+        numbers = (float(line[1].get(column, math.nan)) for column in columns)
+        return [(math.isnan(number), number) for number in numbers]
+
+    return sorted(_lines(values), key=rank)
 
 
 def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float:
@@ -58,7 +70,7 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
     header = ["method", *(f"{measure}, {unit}, dt {step:g}" for measure, unit in _ERRORS for step in steps)]
     keys = [(measure.text, step) for measure, _ in _ERRORS for step in steps]
-    return header, [[name, *(number(row.get(key, math.nan)) for key in keys)] for name, row in _lines(wide)]
+    return header, [[name, *(number(row.get(key, math.nan)) for key in keys)] for name, row in _ranked(wide, *keys)]
 
 
 def order(attitude: pd.DataFrame, rates: pd.DataFrame) -> Table:
@@ -91,7 +103,7 @@ def time(table: pd.DataFrame, scene: str) -> Table:
     rows = of_measure(of_study(table, "speed", scene), Measure.TIME)
     details = rows.set_index("name")["detail"]
     header = ["method", f"steps of {DEFAULT_METHOD}", *(title for _, _, title in _TIMES), "timed"]
-    lines = _lines(values)
+    lines = _ranked(values, (Measure.TIME.text, ""))
     unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in lines if name == DEFAULT_METHOD), math.nan)
     return header, [[name, *_times(row, unit), str(details.get(name, ""))] for name, row in lines]
 
@@ -101,14 +113,34 @@ def _times(row: pd.Series[float], unit: float) -> Row:
     return [steps, *(number(_value(row, measure) * scale, 3) for measure, scale, _ in _TIMES)]
 
 
-def contests(contests: Iterable[Contest]) -> Table:
-    """Return the cheapest of ours and of the engines at each decade of error, and how many times faster ours is."""
-    header = ["error, rad", "cheapest of ours", "µs per s", "cheapest engine", "µs per s", "ratio (above 1: ours is faster)"]
-    return header, [[f"{c.error:.0e}", *_cost(c.ours), *_cost(c.theirs), number(c.ratio, 3)] for c in contests]
+def contests(points: pd.DataFrame) -> Table:
+    """Return the cheapest of each class of ours and of the engines at each decade, and how many times as fast ours is.
+
+    `points` are those of one scene (see `work_precision.points`).
+    """
+    found = with_classes(points)
+    solution = found["class"] == MethodClass.SOLUTION
+    general = {contest.error: contest for contest in work_precision.contests(found[~solution])}
+    solutions = {c.error: c for c in work_precision.contests(found[solution | found["class"].isin(OF_ENGINES)]) if c.ours}
+    errors = sorted(general.keys() | solutions.keys(), reverse=True)
+    return _CONTESTS, [_contest(error, general.get(error), solutions.get(error)) for error in errors]
+
+
+_CONTESTS = (
+    *("error, rad", "cheapest general integrator of ours", "µs per s", "cheapest engine", "µs per s", "ours is faster, times"),
+    *("our solution of integrable motions", "µs per s", "it is faster, times"),
+)
+
+
+def _contest(error: float, general: Contest | None, solution: Contest | None) -> Row:
+    theirs = next((c.theirs for c in (general, solution) if c), None)
+    ours = _cost(general.ours if general else None)
+    ratios = [factor(c.ratio, 3) if c else DASH for c in (general, solution)]
+    return [tolerance(error), *ours, *_cost(theirs), ratios[0], *_cost(solution.ours if solution else None), ratios[1]]
 
 
 def _cost(cost: CheapestLine | None) -> tuple[str, str]:
-    return (cost.name, number(cost.time * 1e6, 3)) if cost else ("none gets there", "–")
+    return (cost.name, factor(cost.time * 1e6, 3)) if cost else ("none gets there", DASH)
 
 
 _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))
@@ -117,5 +149,6 @@ _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))
 def costs_paid_once(table: pd.DataFrame, scene: str) -> Table:
     """Return what a method costs before its first step: conversion, with compiled code at hand, and the first call."""
     values = _wide(table, "speed", scene)
-    body = [[name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)] for name, row in _lines(values)]
+    lines = _ranked(values, (Measure.PREPARE.text, ""))
+    body = [[name, *(number(_value(row, measure) * scale, 3) for measure, scale in _ONCE)] for name, row in lines]
     return ["method", "prepare, ms", "first call, ms", "simulated second, µs"], body

@@ -36,7 +36,10 @@ class CheapestLine:
 
 @dataclass(frozen=True)
 class Contest:
-    """An error, and the cheapest way there of either side; None where a side does not get there."""
+    """An error, and the cheapest way there of either side; None where a side does not get there.
+
+    Ours are whatever the points have of ours: general integrators, or solutions of integrable motions (see `classes`).
+    """
 
     scene: str
     error: float

@@ -6,23 +6,22 @@
   const views = new Map(figures.map((figure) => [figure, []]));
   const signals = new Map(figures.map((figure) => [figure, {}]));
 
-  // The colours of a chart on the page as it is now: dark ones have a lighter stand-in at night.
+  // The colours of a chart on the page as it is now: those too close to the paper have a stand-in.
   const look = (ink, grid) => ({
     background: null, font: "system-ui, sans-serif", padding: 4,
     axis: { labelColor: ink, titleColor: ink, gridColor: grid, domainColor: grid, tickColor: grid, labelFontSize: 12, titleFontSize: 12, titleFontWeight: "normal" },
     title: { color: ink, subtitleColor: ink, anchor: "start", fontSize: 13 }, view: { stroke: null },
   });
-  const dressed = (spec, dark) => {
-    const text = JSON.stringify(spec);
-    return JSON.parse(dark ? text.replace(/#[0-9A-Fa-f]{6}/g, (colour) => content.dark[colour.toUpperCase()] ?? colour) : text);
-  };
+  const shade = (colour, dark) => content.colours[dark ? "dark" : "light"][colour.toUpperCase()] ?? colour;
+  const dressed = (spec, dark) => JSON.parse(JSON.stringify(spec).replace(/#[0-9A-Fa-f]{6}/g, (colour) => shade(colour, dark)));
 
   async function draw(figure, dark) {
     const boxes = [...figure.querySelectorAll(".chart")];
     views.get(figure).splice(0).forEach((view) => view.finalize());
     for (const [k, spec] of content.figures[figure.dataset.figure].entries()) {
       const config = dark ? look("#e8eaed", "#383e45") : look("#1a1d21", "#e3e6ea");
-      const { view } = await vegaEmbed(boxes[k], dressed(spec, dark), { actions: false, renderer: "svg", config });
+      const height = Math.min(spec.height, Math.max(200, 0.65 * boxes[k].clientWidth));
+      const { view } = await vegaEmbed(boxes[k], { ...dressed(spec, dark), height }, { actions: false, renderer: "svg", config });
       views.get(figure).push(view);
       for (const [name, value] of Object.entries(signals.get(figure))) view.signal(name, value);
       await view.runAsync();
@@ -39,7 +38,7 @@
   let drawing = Promise.resolve();
   const drawAll = (dark) => {
     for (const path of document.querySelectorAll("path[data-colour]")) {
-      const colour = (dark && content.dark[path.dataset.colour]) || path.dataset.colour;
+      const colour = shade(path.dataset.colour, dark);
       path.setAttribute(path.hasAttribute("stroke") ? "stroke" : "fill", colour);
     }
     for (const figure of figures) {
@@ -59,12 +58,13 @@
     figure.querySelector(".all")?.addEventListener("click", () => press(entries, true));
     figure.querySelector(".none")?.addEventListener("click", () => press(entries, false));
     for (const input of figure.querySelectorAll("[data-signal]")) {
-      input.addEventListener("input", () => set(figure, input.dataset.signal, Number(input.value)));
+      const value = () => (input.type === "checkbox" ? input.checked : Number(input.value));
+      input.addEventListener("input", () => set(figure, input.dataset.signal, value()));
     }
   }
 
   // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol.
-  const number = (text) => parseFloat(text.replace(/^[✓≈✗]\s*/, ""));
+  const number = (text) => parseFloat(text.replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
   const key = (row, column) => row.cells[column].textContent.trim();
   function sort(table, column) {
     const head = table.tHead.rows[0].cells[column];
@@ -93,6 +93,19 @@
       part.querySelector("output").textContent = words.length ? `${rows.filter((row) => !row.hidden).length} of ${rows.length}` : "";
     };
     part.querySelector("input").addEventListener("input", keep);
+  }
+
+  // What a cell of the grid of hard cases says, told below it.
+  for (const grid of document.querySelectorAll(".grid")) {
+    const tell = (event) => {
+      const cell = event.target.closest("td");
+      if (!cell) return;
+      grid.querySelector(".told")?.classList.remove("told");
+      cell.classList.add("told");
+      grid.querySelector("output").textContent = cell.dataset.about;
+    };
+    grid.addEventListener("mouseover", tell);
+    grid.addEventListener("click", tell);
   }
 
   drawAll(night.matches);

@@ -203,11 +203,12 @@ def test_rows_that_cannot_be_compared():
 
 def test_a_foreign_machine():
     elsewhere = replace(RUN, machine="elsewhere")
-    (each,) = compare.judge(KEPT, elsewhere).violations
+    (each,) = compare.judge(KEPT, elsewhere, "required").violations
     assert (each.measure, each.was, each.now) == ("foreign machine", "here", "elsewhere")
     known = compare.judge(KEPT, elsewhere, "known")
     assert known.passed
-    assert known.notes == ("unbaselined machine: no time is gated, as the baseline has none of elsewhere",)
+    advice = "on any machine: conservative gate --against REF"
+    assert known.notes == (f"unbaselined machine: no time is gated, as the baseline has none of elsewhere; {advice}",)
     untimed = baseline.update_baseline(None, [changed(time_ratio=None)], "no times")
     assert compare.judge(untimed, elsewhere) == compare.Verdict((), (), 1)
     assert not compare.judge(baseline.Baseline({}, []), RUN).passed

@@ -64,14 +64,14 @@ def test_both_lasts_a_sample(clock):
         return lambda: calls.append(n) or n * 1e-6
 
     calls = []
-    steps, run = yardstick._lasting(prepare)
+    steps, run = yardstick.last_a_sample(prepare)
     assert prepared == [16, 128, 401]  # at most eight times as many at once
     assert calls == [16] * 6 + [128] * 6 + [401] * 6  # a first call and the fastest of five
     assert (steps, run()) == (401, 401e-6)
-    assert yardstick._lasting(lambda n: lambda: n * 2.4e-5)[0] == 16
-    assert yardstick._lasting(lambda n: lambda: 0.0)[0] == 2**22  # 16 times a power of 8: the first not below 2^20
-    assert yardstick._lasting(lambda n: lambda: 0.9 * yardstick.SAMPLE)[0] == 16
-    assert yardstick._lasting(lambda n: lambda: n * 2e-5)[0] == 20
+    assert yardstick.last_a_sample(lambda n: lambda: n * 2.4e-5)[0] == 16
+    assert yardstick.last_a_sample(lambda n: lambda: 0.0)[0] == 2**22  # 16 times a power of 8: the first not below 2^20
+    assert yardstick.last_a_sample(lambda n: lambda: 0.9 * yardstick.SAMPLE)[0] == 16
+    assert yardstick.last_a_sample(lambda n: lambda: n * 2e-5)[0] == 20
 
 
 def test_the_ratio_is_of_a_step_to_a_turn(clock, monkeypatch):

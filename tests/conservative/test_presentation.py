@@ -1,4 +1,5 @@
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -44,6 +45,32 @@ def test_a_picture_draws_rates_and_drifts(trajectory):
     last = [row["value"] for row in rates if row["t"] == trajectory.t[-1]]
     np.testing.assert_array_equal(last, trajectory.w_WB_B[-1])
     assert max(row["value"] for row in drifts) < 1e-13  # measured 8e-16
+
+
+def test_a_notebook_shows_the_picture_without_a_network(trajectory, monkeypatch):
+    """Altair's own HTML asks a server for its scripts; neither the specification nor the SVG has an address to ask."""
+    chart = trajectory.plot().properties(title="renamed")
+    shown = chart._repr_mimebundle_()
+    assert sorted(shown) == ["application/vnd.vegalite.v6+json", "image/svg+xml", "text/plain"]
+    assert "cdn" in trajectory.plot().to_html()  # what would be shown otherwise
+    assert not re.search(r"(src|href)=", shown["image/svg+xml"])
+    assert "renamed" in shown["image/svg+xml"]
+    assert len(shown["application/vnd.vegalite.v6+json"]["vconcat"]) == 2
+    monkeypatch.setitem(sys.modules, "vl_convert", None)
+    assert "image/svg+xml" not in chart._repr_mimebundle_()
+
+
+def test_a_drift_is_asked_for_by_name(trajectory):
+    energy, _ = trajectory.scene.invariants
+    np.testing.assert_array_equal(trajectory.drift("energy"), trajectory.drift(energy))
+    with pytest.raises(cv.BadInput, match="'energy' \\(nearest\\), or one of energy, vertical momentum"):
+        trajectory.drift("enrgy")
+
+
+def test_a_scene_shows_its_start(trajectory):
+    shown = repr(trajectory.scene)
+    assert "w_WB_B0=[0.5, -1.5, 2.5]" in shown
+    assert f"R_WB0={R0.tolist()}" in shown
 
 
 def test_a_short_run_is_drawn_as_it_is(trajectory):

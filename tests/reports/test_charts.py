@@ -1,5 +1,7 @@
 """What charts draw is in the unit that their axes name."""
 
+import math
+from itertools import pairwise
 from types import SimpleNamespace
 
 import pandas as pd
@@ -8,7 +10,7 @@ import pytest
 from conservative import Reduced
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
-from conservative.reports.charts.style import power_axis
+from conservative.reports.charts.style import WIDTH, power_axis
 from conservative.reports.tables import orders, work_precision
 
 from .rows import frame, point, row, table
@@ -73,3 +75,12 @@ def test_what_is_behind_the_sphere_is_pale():
 @pytest.mark.parametrize(("low", "high", "powers"), [(0.05, 200.0, [0.1, 1.0, 10.0, 100.0]), (1.0, 100.0, [1.0, 10.0, 100.0])])
 def test_a_logarithmic_axis_has_a_label_at_each_power_of_ten(low, high, powers):
     assert power_axis("title", low, high).values == pytest.approx(powers)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.011, 0.043), (0.9, 12.0), (2e-7, 3e-4), (1e-13, 0.5), (1e-17, 3.0)])
+def test_labels_of_a_logarithmic_axis_do_not_overlap(low, high):
+    """A label such as 1e-12 is 30 px wide at most."""
+    values = power_axis("title", low, high).values
+    gaps = [WIDTH * math.log(b / a) / math.log(high / low) for a, b in pairwise(values)]
+    assert min(gaps) >= 30  # measured 33
+    assert len(values) > 1

@@ -103,7 +103,7 @@ def test_an_engine_as_installed_stands_beside_its_best(rows):
     header, body = beside(list(rows.values()))
     found = {row[0]: dict(zip(header, map(str, row), strict=True)) for row in body}
     assert list(found) == ["a==1", "b==2", "c==3"]
-    assert [found["a==1"][f"{part}: attitude error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-06"]
+    assert [found["a==1"][f"{part}: attitude error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-6"]
     assert found["b==2"]["as installed: setting"] == "–"
 
 

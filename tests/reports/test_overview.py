@@ -6,40 +6,20 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.errors import Diverged
 from conservative.reports.tables import hard_cases, overview
 from conservative.reports.tables.cells import Cell, Grade, grade_drift
-from conservative.reports.tables.work_precision import points
 
 from .made_up import row, table
-from .rows import frame, point
+from .rows import frame
 
 
-def test_verdict_names_the_cheapest_and_what_it_keeps():
-    header, body = overview.verdict(table(), points(table()))
-    rows = [dict(zip(header, line, strict=True)) for line in body]
-    assert [line["error, rad"] for line in rows] == ["1e-03"]  # nothing reaches 1e-6 or 1e-9
-    assert rows[0]["cheapest"] == "reduced"
-    assert "energy ✓" in rows[0]["conserves"]
-    assert rows[0]["fails"] == "nowhere here"
-
-
-def test_a_line_of_tolerances_keeps_what_its_tightest_keeps():
-    names = {"scene": "brick_flip", "role": "engine", "series": "heyoka"}
+def test_methods_are_ranked_by_what_they_keep():
+    """Ours and the engines' are among each other: who drifts least comes first, who fails last."""
     found = [
-        finding
-        for method, error, drift in (("heyoka:tol=1e-3", 1e-2, 1e-3), ("heyoka:tol=1e-15", 1e-9, 1e-15))
-        for finding in (
-            *point("heyoka", "engine", error, 1e-6, scene="brick_flip", method=method, series_setting=""),
-            row("long_runs", method, "energy drift max", drift, **names),
-        )
+        row("long_runs", "b", "energy drift max", math.nan, outcome=Diverged(0.36, "why").outcome),
+        row("long_runs", "mujoco", "energy drift max", 1e-2, role="engine"),
+        row("long_runs", "reduced", "energy drift max", 1e-15),
     ]
-    header, (first, *_) = overview.verdict(frame(found), points(frame(found)))
-    assert dict(zip(header, first, strict=True))["conserves"] == "energy ✓ 1.0e-15"
-
-
-def test_verdict_tells_where_the_cheapest_fails():
-    failed = row("long_runs", "reduced", "energy drift max", math.nan, scene="other", outcome=Diverged(0.36, "why").outcome)
-    cannot = [row("long_runs", "reduced", "energy drift max", math.nan, scene=f"s{k}", outcome="unsupported") for k in range(5)]
-    shown = overview.verdict(frame([failed, *cannot]), points(table()))
-    assert shown[1][0][-1] == "diverged: other; unsupported: s0, s1 and 3 more scenes"
+    _, body = overview.conservation(frame(found), "brick_flip")
+    assert [line[0] for line in body] == ["reduced", "mujoco", "b"]
 
 
 def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
@@ -55,7 +35,7 @@ def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
     ("value", "text", "grade"),
     [
         (3e-15, "✓ 3.0e-15", "good"),
-        (2e-6, "≈ 2.0e-06", "fair"),
+        (2e-6, "≈ 2.0e-6", "fair"),
         (0.3, "✗ 0.3", "bad"),
         (math.inf, "✗ inf", "bad"),
         (math.nan, "–", "none"),
@@ -71,15 +51,32 @@ def test_hard_cases_are_a_matrix():
         row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", outcome="not converged"),
         row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", role="engine"),
     ]
-    header, body = hard_cases.hard_cases(frame(found))
+    header, body = hard_cases.hard_cases(frame(found)).as_table
     assert header == ["method", "needle", "falling_top"]
-    assert [[str(cell)[0] for cell in line[1:]] for line in body] == [["✓", "✗"], ["✗", "–"]]
+    assert body == [
+        ["reduced", "motion –, invariants ✓ 1.0e-15 energy", "✗ not converged"],
+        ["mujoco", "motion –, invariants ✗ 0.1 energy", "– not run"],
+    ]
     assert hard_cases.hard_cases(table()) is None
 
 
-def test_a_hard_case_is_graded_by_its_largest_drift():
-    found = [row("hard_cases", "reduced", "energy drift max", drift, dt) for drift, dt in ((1e-15, 0.1), (1e-2, 0.2))]
-    assert hard_cases.hard_cases(frame(found))[1][0][1].grade is Grade.BAD
+def judged(*values):
+    found = [row("hard_cases", "reduced", measure, value) for measure, value in values]
+    judgement = hard_cases.judge(frame(found))
+    return judgement.motion.grade, judgement.invariants.grade
+
+
+def test_a_hard_case_is_judged_by_its_motion_and_by_its_worst_invariant():
+    """Neither speaks for the other: what keeps everything can be wrong by 0.2 rad, and what is right can drift."""
+    wrong = judged(("attitude error max", 0.2), ("energy drift max", 1e-15), ("momentum drift max", 0))
+    assert wrong == (Grade.BAD, Grade.GOOD)
+    assert judged(("attitude error max", 1.4e-6), ("energy drift max", 1e-8)) == (Grade.GOOD, Grade.FAIR)
+    assert judged(("attitude error max", 0.05), ("energy drift max", 1e-15), ("momentum drift max", 1e-2))[1] is Grade.BAD
+
+
+def test_methods_stand_in_the_order_in_which_they_did_well():
+    found = [row("hard_cases", name, "attitude error max", error, scene="needle") for name, error in (("a", 1.0), ("b", 1e-9))]
+    assert hard_cases.hard_cases(frame(found)).methods == ("b", "a")
 
 
 def test_longest_steps_are_a_matrix():

@@ -94,8 +94,8 @@ def test_every_chart_has_marks(opened):
     marks = "svg .mark-symbol path, svg .mark-line path"
     script = "return [...document.querySelectorAll('.chart')].map(e => e.querySelectorAll(arguments[0]).length)"
     counts = opened.execute_script(script, marks)
-    assert len(counts) > 15  # measured 20
-    assert min(counts) >= 3
+    assert len(counts) > 15  # measured 20 and more
+    assert min(counts) >= 2  # the errors of two maps, in a figure of the paper
 
 
 def drawn_symbols(browser, colour):
@@ -156,7 +156,7 @@ def test_a_table_sorts_by_number_both_ways_and_says_so(opened):
     head = table.find_elements("css selector", "thead th")[2]
     for wanted, backwards in (("ascending", False), ("descending", True)):
         head.find_element("css selector", "button").click()
-        found = [float(text) for text in column(opened, table, 2) if text != "–"]
+        found = [float(text.replace(",", "")) for text in column(opened, table, 2) if text != "–"]
         assert found == sorted(found, reverse=backwards)
         assert len(found) > 3
         assert head.get_attribute("aria-sort") == wanted

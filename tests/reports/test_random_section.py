@@ -37,7 +37,7 @@ def folder(plan, tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("file", "then"), [("report.md", "The scenes of this report"), ("index.html", "The cheapest method for an error")]
+    ("file", "then"), [("report.md", "The scenes of this report"), ("index.html", '<section id="brick_flip"')]
 )
 def test_random_bodies_come_before_the_scenes(folder, file, then):
     text = (folder / file).read_text(encoding="utf-8")
@@ -63,8 +63,8 @@ def test_a_report_without_random_bodies_does_not_mention_them(tmp_path):
 
 def test_rows_of_random_bodies_are_nowhere_else(plan):
     alone, both = built(plan), built(plan, ROWS)
-    assert both.verdict == alone.verdict
-    assert both.headline == alone.headline
+    assert [each for each in both.headline if not each.scene.startswith("random")] == list(alone.headline)
+    assert both.scenes[0].summary.classes == alone.scenes[0].summary.classes
     assert len(both.failures[1]) == len(alone.failures[1])
 
 
@@ -100,5 +100,5 @@ def test_the_readme_has_a_table_of_them(name, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["readme_table", str(tmp_path), "--random"])
     readme_table.main()
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "| field | engine | 1e-03 | 1e-06 | 1e-09 | 1e-12 |"
+    assert lines[0] == "| field | engine | 1e-3 | 1e-6 | 1e-9 | 1e-12 |"
     assert lines[2].startswith("| spring | heyoka | 1.00 (0.50 to 2.00) |")

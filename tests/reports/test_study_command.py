@@ -42,7 +42,7 @@ def test_a_study_of_random_bodies_shows_its_ratios(made_up):
     done = conservative(*RANDOM)
     assert done.exit_code == 0, done.output
     text = " ".join(done.stdout.split())
-    assert "spring 1e-02 2 of 2 ✓ 1.00 ✗ 0.50 ✓ 2.00 1" in text
+    assert "spring 1e-2 2 of 2 ✓ 1.00 ✗ 0.50 ✓ 2.00 1" in text
     assert "on the worst body 0.50 times" in text
 
 
@@ -58,7 +58,7 @@ def test_files_have_the_rows_and_the_tables(made_up, tmp_path):
     assert done.exit_code == 0, done.output
     with (tmp_path / "a.csv").open(newline="") as file:
         assert len(list(csv.DictReader(file))) == len(made_up)
-    assert "| spring | 1e-02 | 2 of 2 | ✓ 1.00 | ✗ 0.50 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
+    assert "| spring | 1e-2 | 2 of 2 | ✓ 1.00 | ✗ 0.50 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["study.csv", "study.json", "study.md"]
 
 

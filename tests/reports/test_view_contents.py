@@ -13,7 +13,7 @@ from conservative.reports import view
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables import lines, work_precision
+from conservative.reports.tables import lines, scene_views, work_precision
 
 from .made_up import convergence, row
 from .rows import frame, parts, point
@@ -85,5 +85,5 @@ def test_views_are_frozen_and_compared_as_objects(built):
             setattr(value, dataclasses.fields(value)[0].name, None)
         assert dataclasses.replace(value) != value
         assert isinstance(hash(value), int)
-    assert view._Builder.__dataclass_params__.frozen
-    assert not view._Builder.__dataclass_params__.eq
+    assert scene_views.SceneViews.__dataclass_params__.frozen
+    assert not scene_views.SceneViews.__dataclass_params__.eq

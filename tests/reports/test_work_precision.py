@@ -99,24 +99,24 @@ def test_verdict_names_the_engine_the_errors_and_the_factor():
     decades = [1e-2, 1e-6, 1e-7]
     lines = statements(work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), decades))
     assert lines == [
-        "made_up: engine beats us: it is faster than anything of ours at 1e-06 rad, by 3.5 times, "  # 16 / (2 x 4^0.6)
-        "and reaches 1e-07 rad, which nothing of ours was measured to reach.",
-        "made_up: ours is faster at 1e-02 rad, by 2 times.",
+        "made_up: engine is 3.5 times as fast as our general integrators, at 1e-6 rad, "  # 16 / (2 x 4^0.6)
+        "and reaches 1e-7 rad, which none of them was measured to reach.",
+        "made_up: our general integrators are faster by 2.0 times, at 1e-2 rad.",
     ]
 
 
 def test_verdict_where_ours_wins_everywhere():
     lines = statements(work_precision.contests(work_precision.points(table(point("ours", "ours", 1e-6, 1.0), *ENGINE)), [1e-2]))
-    assert lines[0] == "made_up: no engine beats us at any error that it reaches."
+    assert lines[0] == "made_up: no engine beats our general integrators at any error that it reaches."
 
 
 def test_verdict_joins_neighbouring_decades():
     lines = statements(work_precision.contests(work_precision.points(table(*OURS, *ENGINE))))
-    assert "reaches 1e-07, 1e-08 rad" in lines[0]
-    assert "1e-04 to 1e-06 rad" in lines[0]
+    assert "reaches 1e-7, 1e-8 rad" in lines[0]
+    assert "1e-4 to 1e-6 rad" in lines[0]
 
 
 def test_verdict_without_engines_claims_nothing():
     lines = statements(work_precision.contests(work_precision.points(table(*OURS)), [1e-2]))
     assert lines == ["made_up: no engine was measured."]
-    assert "No engine" in statements([])[0]
+    assert "no engine" in statements([])[0]

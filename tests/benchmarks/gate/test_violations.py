@@ -8,7 +8,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.benchmarks.gate import baseline, yardstick
+from conservative.benchmarks.gate import baseline, compare, yardstick
 from conservative.benchmarks.gate.results import Results, Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.verification.gate_false_alarms import Slower
@@ -132,6 +132,7 @@ def test_a_baseline_of_a_foreign_machine(kept, untouched):
     assert "was this one, is another" in text
     found, text = failures(kept, elsewhere, "known")
     assert found == set()
+    assert compare.judge(kept, elsewhere).passed  # which is the default
     assert "note: unbaselined machine" in text
     worse = replace(with_row(untouched, SECOND, values={"rate error max": 1.0}), machine="another")
     assert failures(kept, worse, "known")[0] == {("rate error max", SECOND)}  # all but time is gated everywhere

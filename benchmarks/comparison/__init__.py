@@ -1,0 +1,1 @@
+"""Two versions of a project against each other, in one run: times in turn, and what else the gate compares. No baseline."""

@@ -1,0 +1,143 @@
+"""One side of a comparison: a version's process, and its methods as methods of ours, which studies and measures take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from conservative.errors import IntegrationFailed
+from conservative.method import Grid, Method, Role
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.client import Worker
+from conservative.references.environments.engine_method import WorkerRun
+from conservative.references.environments.environment import temporary_folder
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory
+
+from . import inside
+from .version import Version
+
+_COUNTS = tuple(each.name for each in fields(Counters))
+_START: Mapping[str, Any] = {"adapter": str(Path(inside.__file__).resolve()), "settings": {}}
+
+
+class FailedThere(IntegrationFailed):
+    """A run of a version failed. Attribute: `outcome`, as that version has it."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        super().__init__(f"dt: got a run that {outcome}; allowed: one that this version takes to its end")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A method with its settings in one version, as `Method` has them; `engine` is its label if it is somebody else's."""
+
+    name: str
+    label: str
+    order: int | None
+    engine: str
+
+
+class Side:
+    """A version, and the process in which it is asked; kernels are compiled into a folder of the version alone."""
+
+    def __init__(self, version: Version) -> None:
+        self.version, home = version, version.environment.folder / "home"
+        variables = {"NUMBA_CACHE_DIR": str(home / "kernels")}
+        self._worker = Worker(version.environment.interpreter, home, temporary_folder(), variables)
+
+    def close(self) -> None:
+        """End the process; the next question starts another one."""
+        self._worker.close()
+
+    def ask(self, task: str, **values: Any) -> dict[str, Any]:
+        """Return the answer to a task of `inside`. Raises `IntegrationFailed` where the version cannot answer."""
+        run = self._worker.ask("prepare", **_START, task=task, **values)["run"]
+        try:
+            return self._worker.ask("run", run=run)
+        finally:
+            self._worker.forget(self._worker.starts, run)
+
+    def settings(self, names: Sequence[str]) -> tuple[Setting, ...]:
+        """Return the settings of the suite of some methods, by default of all that are under test."""
+        return tuple(Setting(**each) for each in self.ask("list", names=list(names))["methods"])
+
+    def solver(self, states: States, **values: Any) -> WorkerRun:
+        """Return a run that gives a trajectory."""
+        return WorkerRun(self._worker, {**_START, "task": "solve", **values}, states)
+
+    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> TimedRun:
+        """Return a run of n_steps steps dt, s, to be timed, prepared."""
+        values = {"task": "time", "scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
+        run = TimedRun(self._worker, {**_START, **values}, States())
+        run.prepare()
+        return run
+
+
+class TimedRun(WorkerRun):
+    """A run that is only ever timed."""
+
+    def __call__(self) -> Any:
+        return self.wall_time(1)
+
+    def wall_time(self, calls: int) -> float:
+        return float(self._ask("time", calls=calls)["seconds"])
+
+
+@dataclass(frozen=True)
+class States:
+    """Makes trajectories of a scene of the states that a version hands over."""
+
+    scene: Scene | None = None
+    label: str = ""
+
+    def trajectory(self, found: Mapping[str, Any]) -> Trajectory:
+        """Return the samples that there are, with the failure that the version has seen."""
+        assert self.scene is not None
+        counts = Counters(**{name: found["counts"].get(name) for name in _COUNTS})
+        failure = found["failure"]
+        ended = FailedThere(Outcome(OutcomeKind(failure[0]), *failure[1:])) if failure else None
+        return Trajectory(self.scene, found["t"], found["R_WB"], found["w_WB_B"], self.label, counts, ended)
+
+    def failure(self, failure: IntegrationFailed) -> Trajectory:
+        """Return a trajectory without samples."""
+        assert self.scene is not None
+        return Trajectory(self.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), failure)
+
+
+@dataclass(frozen=True)
+class Remote(Method):
+    """A method of a version on a scene that both sides know by `scene_name`; `longest` is its longest step there, s."""
+
+    side: Side = field(compare=False, repr=False)
+    setting: Setting
+    scene_name: str
+    longest: float
+
+    family: ClassVar[str] = "remote"
+    role: ClassVar[Role] = Role.OURS
+
+    @property
+    def name(self) -> str:
+        return self.setting.name
+
+    @property
+    def label(self) -> str:
+        return self.setting.label
+
+    @property
+    def order(self) -> int | None:
+        return self.setting.order
+
+    def longest_step(self, scene: Scene) -> float:
+        return self.longest
+
+    def prepare(self, scene: Scene, grid: Grid) -> WorkerRun:
+        """Return the run; it is prepared when it is first called, so that what cannot be prepared is a failure of the run."""
+        values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
+        return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)

@@ -1,0 +1,109 @@
+"""A version of a project: what names it, a git ref, a folder or a wheel, and the environment in which it runs."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import subprocess
+import tarfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from conservative.errors import BadInput
+from conservative.references.environments.environment import Environment
+from conservative.references.environments.lock import Source
+from conservative.references.environments.projects import build_project, environment_of, keep_wheel
+
+from ..measures.origin import commit, git
+
+_ALLOWED = "a git ref of the project's repository, a wheel, or a folder with pyproject.toml or setup.py"
+
+
+@dataclass(frozen=True)
+class Version:
+    """A version of a project.
+
+    Attributes
+    ----------
+    name
+        The ref, or the name of the folder or of the wheel.
+    commit
+        Its commit; of a folder with changes that are not committed with "+changes", of a wheel empty.
+    environment
+        Where it runs.
+    """
+
+    name: str
+    commit: str
+    environment: Environment
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """All that is installed beside it, as `name==version` or the file of a wheel."""
+        return tuple(text.rpartition("/")[2] for text in self.environment.packages)
+
+    @property
+    def title(self) -> str:
+        """What tables call it."""
+        head, plus, changes = self.commit.partition("+")
+        return f"{self.name} ({head[:9]}{plus}{changes})" if head and not self.name.startswith(head[:9]) else self.name
+
+
+def install_version(name: str, project: Path, source: Source, requirements: Sequence[str] = ()) -> Version:
+    """Return a version, in an environment that is made where it is not there.
+
+    Parameters
+    ----------
+    name
+        A wheel, a folder of sources, or a ref of the git repository that the project is in.
+    project
+        Folder of the project, which need not be the top of its repository.
+    source
+        Where packages come from.
+    requirements
+        What its environment is to have beside the project.
+
+    Raises
+    ------
+    BadInput
+        There is no such version, it does not build, or what it needs cannot be had.
+    """
+    path = Path(name)
+    if path.suffix == ".whl" and path.is_file():
+        return Version(path.name, "", environment_of(keep_wheel("", lambda folder: path), requirements, source))
+    if name and path.is_dir():
+        wheel = keep_wheel("", build_project(path, source))
+        return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
+    found = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
+    if not found:
+        raise BadInput("against", repr(name), _ALLOWED)
+    return Version(name, found, environment_of(_wheel_of_commit(found, project, source), requirements, source))
+
+
+def _wheel_of_commit(found: str, project: Path, source: Source) -> Path:
+    """Return the wheel of a commit: what is kept of it, or what its files build, which are taken out of the repository."""
+    inside = git(project, "rev-parse", "--show-prefix")
+
+    def make_wheel(folder: Path) -> Path:
+        sources = folder / "sources"
+        _take_out(found, project, sources)
+        # setuptools-scm, and what is built on it, would look for a version in a repository
+        return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{found[:12]}")(folder)
+
+    return keep_wheel(f"{found}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
+
+
+def _take_out(found: str, project: Path, folder: Path) -> None:
+    """Write the files of a commit into a folder."""
+    top = git(project, "rev-parse", "--show-toplevel")
+    try:
+        done = subprocess.run(
+            ["git", "-C", top, "archive", "--format=tar", found], capture_output=True, check=True, timeout=600
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        raise BadInput("against", f"{found}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
+        if hasattr(tarfile, "data_filter"):  # not before 3.11.4
+            archive.extraction_filter = tarfile.data_filter
+        archive.extractall(folder)

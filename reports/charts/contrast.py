@@ -1,0 +1,52 @@
+"""Colours that can be seen on the paper they are on, light or dark: a stand-in for each that is too close to it.
+
+Contrast is that of the Web Content Accessibility Guidelines 2.2, which ask for 3 or more of lines and marks (criterion 1.4.11).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+LIGHT_PAPER, DARK_PAPER = "#ffffff", "#14171a"
+"""Background of the page, as page.css has it."""
+LEAST = 3.0
+"""Contrast that a line has at least."""
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}\b")
+
+
+def colours_in(text: str) -> frozenset[str]:
+    """Return the colours that a text names, in capitals."""
+    return frozenset(found.upper() for found in _COLOUR.findall(text))
+
+
+def stand_ins(colours: Iterable[str], paper: str) -> dict[str, str]:
+    """Return what stands for each colour that has too little contrast with the paper: mixed with white, or with black."""
+    return {colour: _readable(colour, paper) for colour in sorted(colours) if contrast(colour, paper) < LEAST}
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of two colours, 1 to 21."""
+    low, high = sorted((_luminance(one), _luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def _readable(colour: str, paper: str) -> str:
+    towards = 255.0 if _luminance(paper) < 0.18 else 0.0
+    mixed = (_mix(colour, towards, share / 50) for share in range(51))
+    return next(each for each in mixed if contrast(each, paper) >= LEAST)
+
+
+def _mix(colour: str, towards: float, share: float) -> str:
+    return "#" + "".join(f"{round(channel + (towards - channel) * share):02X}" for channel in _channels(colour))
+
+
+def _channels(colour: str) -> list[int]:
+    return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+
+
+def _luminance(colour: str) -> float:
+    """Return the relative luminance, 0 to 1, of a colour in sRGB."""
+    parts = [channel / 255 for channel in _channels(colour)]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -1,0 +1,167 @@
+"""What two versions differ in, from rows with chosen values: what fails, what is said beside that, and what passes."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from conservative.benchmarks.comparison.compare import TIME, judge
+from conservative.benchmarks.comparison.rows import Place, judge_values, measure_rows
+from conservative.benchmarks.comparison.side import Setting
+from conservative.benchmarks.gate.results import Status
+from conservative.benchmarks.suite.points import GatedValue
+from conservative.errors import BadInput
+from conservative.references.environments.failures import EngineCrashed
+
+from .made_up import BASE, HEAD, PLACE, TIMED, found, timed, version
+
+SAME = (1.0, 0.98, 1.02)
+SLOW = (1.1, 1.08, 1.12)
+
+
+def compare(was, now, time=None):
+    rows = [{TIMED.id: each} if each else {} for each in (was, now)]
+    return judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {})
+
+
+def violations(*arguments):
+    result = compare(*arguments)
+    assert result.passed == (not result.violations)
+    return {each.measure for each in result.violations}
+
+
+def test_the_same_passes_and_says_nothing():
+    result = compare(found(), found(), timed(SAME))
+    assert result.passed
+    assert result.notes == ()
+
+
+WORSE = {
+    "attitude error max": found(attitude_error_max=1.01e-3),
+    "energy drift max": found(energy_drift_max=1e-14),
+    "steps": found(steps=601.0),
+    "observed order": found(observed_order=1.9),
+}
+
+
+@pytest.mark.parametrize("name", WORSE)
+def test_a_value_that_is_worse_fails(name):
+    assert violations(found(), WORSE[name]) == {name}
+    assert violations(WORSE[name], found()) == set()
+
+
+def test_last_digits_fail_nothing():
+    assert violations(found(), found(attitude_error_max=1e-3 * (1 + 1e-8), energy_drift_max=9e-16)) == set()
+
+
+def test_a_time_fails_where_it_is_slower_twice():
+    (each,) = compare(found(), found(), timed(SLOW, SLOW)).violations
+    assert (each.measure, each.scene, each.method) == (TIME, "brick_flip", "reduced")
+    assert each.now == "1.100 times as long (1.080 to 1.120)"
+    assert compare(found(), found(), timed(SLOW, SAME)).notes == (
+        "brick_flip, reduced: looked slower (1.100), and was not when measured again (1.000)",
+    )
+
+
+def test_a_time_that_cannot_be_measured_fails():
+    (each,) = compare(found(), found(), timed((math.nan,) * 3, reason="crashed (signal 11)")).violations
+    assert each.now == "crashed (signal 11)"
+
+
+def test_what_is_faster_is_said():
+    assert compare(found(), found(), timed((0.9, 0.88, 0.92))).notes == ("brick_flip, reduced: faster, 0.900 of the time",)
+
+
+def test_a_row_that_fails_now_or_is_gone_fails():
+    failed = found("diverged at 1 s", status=Status.FAILED)
+    assert violations(found(), failed) == {"row"}
+    assert violations(found(), None) == {"row"}
+    assert compare(found(), failed).notes == ("brick_flip, reduced: is without values: diverged at 1 s",)
+
+
+def test_what_is_new_or_failed_before_has_nothing_to_be_compared_with():
+    failed = found("diverged at 1 s", status=Status.FAILED)
+    old = replace(found(), row=replace(found().row, id="a", method="gauss"))
+    new = judge(BASE, HEAD, {"a": old}, {"a": old, TIMED.id: found()}, {})
+    assert new.passed
+    assert new.notes == ("brick_flip, reduced: was not there",)
+    mended = judge(BASE, HEAD, {"a": old, TIMED.id: failed}, {"a": old, TIMED.id: found()}, {})
+    assert mended.passed
+    assert mended.notes == ("brick_flip, reduced: was without values: diverged at 1 s",)
+
+
+def test_without_a_row_that_passed_there_is_no_verdict():
+    assert violations(found("diverged", status=Status.FAILED), found()) == {"rows"}
+    assert violations(None, found()) == {"rows"}
+
+
+def test_what_differs_between_environments_is_said():
+    other = version("is", "numpy==2.1", "numba==0.68", python="3.12.1")
+    result = judge(BASE, other, {TIMED.id: found()}, {TIMED.id: found()}, {})
+    assert result.notes == (
+        "another Python: was 3.11.7, is 3.12.1",
+        "another numba: was not there, is numba==0.68",
+        "another numpy: was numpy==2.0, is numpy==2.1",
+    )
+
+
+RUNAWAY = "energy drift max is 2.7e+11, more than 1: the run failed"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("energy drift max", 2.7e11, RUNAWAY),
+        ("energy drift max", math.inf, "energy drift max is inf, more than 1: the run failed; energy drift max is inf"),
+        ("rate error max", math.nan, "rate error max is nan"),
+    ],
+)
+def test_a_run_that_ran_away_failed_whatever_it_says(name, value, reason):
+    row = judge_values(found().row, {name: GatedValue(value, 0.0)})
+    assert (row.row.status, row.reason) == (Status.FAILED, reason)
+    assert judge_values(found().row, {"energy drift max": GatedValue(0.36, 0.0)}).reason == ""
+
+
+class Answers:
+    """A side that answers tasks from a table, or does not survive them."""
+
+    def __init__(self, **answers):
+        self.answers = answers
+
+    def ask(self, task, **values):
+        if task not in self.answers:
+            raise EngineCrashed("ImportError: no such thing")
+        return self.answers[task]
+
+
+SETTING = Setting("reduced", "made==1/reduced", 2, "")
+
+
+def test_a_scene_that_a_version_does_not_have_is_an_error_of_its_rows():
+    (each,) = measure_rows(Answers(), PLACE, [SETTING])
+    assert each.row.status is Status.ERROR
+    assert "no such thing" in each.reason
+
+
+def test_a_scene_of_another_motion_is_not_compared():
+    place = Place.of("brick_flip")
+    numbers = {"inertia": place.scene.body.inertia * 2, "R_WB0": place.scene.R_WB0, "w_WB_B0": place.scene.w_WB_B0}
+    other = Answers(scene={**numbers, "ends": [6.0, 0.01], "energies": [], "invariants": ["energy"]})
+    (each,) = measure_rows(other, place, [SETTING])
+    assert each.reason == "another motion"
+    same = found()
+    assert violations(same, each) == {"definition"}
+
+
+def test_a_scene_that_a_version_cannot_do_is_skipped():
+    here = Place.of("brick_flip")
+    numbers = {"inertia": here.scene.body.inertia, "R_WB0": here.scene.R_WB0, "w_WB_B0": here.scene.w_WB_B0}
+    names = [invariant.name for invariant in here.scene.invariants]
+    scene = {**numbers, "ends": [here.scene.t_end, here.scene.dt], "energies": [], "invariants": names}
+    (each,) = measure_rows(Answers(scene=scene, pair={"unsupported": "for tops only", "longest_step": 1.0}), here, [SETTING])
+    assert (each.row.status, each.reason) == (Status.SKIPPED, "for tops only")
+
+
+def test_an_unknown_scene_is_refused():
+    with pytest.raises(BadInput, match="scene: got 'nowhere'"):
+        Place.of("nowhere")

@@ -1,0 +1,169 @@
+"""What is said of two versions: text, table, JSON, Markdown, JUnit, the page; and which options go together."""
+
+import json
+import math
+import re
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner
+
+from conservative.benchmarks.comparison.compare import judge
+from conservative.benchmarks.comparison.times import Ratio
+from conservative.benchmarks.gate.results import Status
+from conservative.reports.cli import against
+from conservative.reports.cli.main import main
+from conservative.reports.page.comparison import WIDEST, bar, place, render
+from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
+
+from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
+from ..environments import ROOT
+
+SAME, SLOW, FAST = (1.0, 0.98, 1.02), (1.1, 1.08, 1.12), (0.8, 0.79, 0.81)
+
+
+GOOD, ON_TIME = found(), timed(SAME)
+
+
+def answer(was=GOOD, now=GOOD, time=ON_TIME):
+    rows = [{TIMED.id: each} if each else {} for each in (was, now)]
+    return Answer(judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {}), {"command": "conservative gate --against was"})
+
+
+SLOWER = answer(time=timed(SLOW, SLOW))
+FAILED = found("diverged at 1 s", status=Status.FAILED)
+STANDINGS = {
+    Standing.SAME: answer(),
+    Standing.SLOWER: SLOWER,
+    Standing.FASTER: answer(time=timed(FAST)),
+    Standing.WORSE: answer(now=found(steps=601.0)),
+    Standing.NOTHING: answer(was=FAILED, now=FAILED, time=None),
+}
+
+
+@pytest.mark.parametrize("standing", STANDINGS)
+def test_each_row_has_a_standing(standing):
+    (line,) = STANDINGS[standing].lines
+    assert line.standing is standing
+    assert str(line.cells[2]).endswith(standing)
+
+
+def test_the_table_has_both_versions():
+    (row,) = answer(now=found(attitude_error_max=2e-3), time=timed(SLOW, SAME)).table[1]
+    assert [str(cell) for cell in row] == [
+        "brick_flip",
+        "reduced",
+        "✗ worse",
+        "1.000",
+        "0.980 to 1.020",
+        "1 → 1.1",
+        "1.00e-03 → 2.00e-03",
+        "2.00e-16",
+        "2",
+    ]
+    (row,) = STANDINGS[Standing.NOTHING].table[1]
+    assert [str(cell) for cell in row[3:]] == ["–"] * 6
+
+
+def test_the_text_has_a_line_for_each_violation_and_note():
+    assert str(SLOWER).splitlines() == [
+        "gate: FAILED, 1 rows, 1 of them timed, 1 violations",
+        "time of a step, brick_flip, reduced: was 1e-06 s, is 1.100 times as long (1.080 to 1.120), "
+        "allowed at most 1.05 times as long",
+    ]
+    assert str(answer(time=timed(FAST))).splitlines()[1:] == ["note: brick_flip, reduced: faster, 0.800 of the time"]
+
+
+def test_json_has_what_was_measured_and_null_for_what_was_not():
+    content = json.loads(answer(time=timed((math.nan,) * 3, reason="crashed")).json_text())
+    assert not content["passed"]
+    (row,) = content["rows"]
+    assert row["time"]["first"] == {"value": None, "low": None, "high": None, "processes": 7}
+    assert row["is"]["values"]["steps"] == 600
+    assert content["versions"]["was"] == {"name": "was", "commit": "", "packages": ["numpy==2.0"]}
+
+
+def test_markdown_and_junit_have_the_violations():
+    text = SLOWER.markdown_text()
+    assert text.startswith("## is against was\n\n**gate: FAILED")
+    assert "| brick_flip | reduced | ✗ slower | 1.100 | 1.080 to 1.120 |" in text
+    assert EXPLANATION in text
+    suite = ElementTree.fromstring(SLOWER.junit_text()).find("testsuite")
+    assert (suite.get("tests"), suite.get("failures")) == ("1", "1")
+    assert ElementTree.fromstring(answer().junit_text()).find("testsuite").get("failures") == "0"
+
+
+def test_the_page_has_rows_ratios_and_filters():
+    page = render(SLOWER)
+    assert 'data-standing="slower"' in page
+    assert 'aria-label="1.100, 1.080 to 1.120"' in page
+    assert re.findall(r'name="standing" value="(\w+)"', page) == ["slower"]
+    assert "conservative gate --against was" in page
+    assert not re.search(r'(?:src|href)="(?!data:)', page)  # it opens without a network
+    assert 'role="img"' not in render(STANDINGS[Standing.NOTHING])
+
+
+def test_a_ratio_lies_where_it_belongs():
+    assert place(1.0) == 50
+    assert (place(WIDEST), place(1 / WIDEST), place(9.0)) == (100, 0, 100)
+    assert place(1.1) + place(1 / 1.1) == pytest.approx(100)
+    assert bar(Ratio(1.0, 1.0, 1.0, 7)).width > 0
+    assert bar(None) is bar(Ratio(*(math.nan,) * 3, 0)) is None
+
+
+# ---------------------------------------------------------------------------------------------------------------- the command
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    """Return exit code and output of the command, where a comparison has ended."""
+
+    def run(*arguments, ended=SLOWER):
+        monkeypatch.setattr(against, "_compare", lambda options: ended)
+        done = CliRunner().invoke(main, ["gate", *map(str, arguments)])
+        return done.exit_code, done.output
+
+    return run
+
+
+def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
+    files = {name: tmp_path / f"gate.{name}" for name in ("html", "markdown", "junit")}
+    options = [text for name, path in files.items() for text in (f"--{name}", path)]
+    code, text = gate("--against", "main", *options)
+    assert code == 1
+    assert text == f"{SLOWER}\n"
+    assert files["markdown"].read_text() == SLOWER.markdown_text()
+    assert files["html"].read_text() == render(SLOWER)
+    assert files["junit"].read_text() == SLOWER.junit_text()
+    assert gate("--against", "main", ended=answer())[0] == 0
+
+
+@pytest.mark.parametrize("options", [("--update", "why"), ("--times", "known"), ("--baseline", "kept.json"), ("results.json",)])
+def test_options_of_a_baseline_do_not_go_with_two_versions(gate, options):
+    code, text = gate("--against", "main", *options)
+    assert code == 2
+    assert "cannot be used with --against" in text
+
+
+@pytest.mark.parametrize(
+    "options", [("--scenes", "brick_flip"), ("--html", "page.html"), ("--project", "."), ("--with", "numpy")]
+)
+def test_options_of_two_versions_need_two(gate, options):
+    code, text = gate(*options)
+    assert code == 2
+    assert "can be used with --against alone" in text
+
+
+def test_a_file_that_cannot_be_written_is_an_error_before_any_work(gate, tmp_path):
+    code, text = gate("--against", "main", "--html", tmp_path / "nowhere" / "page.html")
+    assert code == 2
+    assert "html: got" in text
+
+
+def test_the_action_and_the_workflow_use_options_that_there_are():
+    known = {option for parameter in main.commands["gate"].params for option in parameter.opts}
+    for path in (".github/actions/gate/action.yml", "tests/example_package/pull_request.yml"):
+        text = (ROOT / path).read_text()
+        used = set(re.findall(r"(?<= )--(?!quiet|disable|no-tags|depth)[a-z-]+", text))
+        assert used
+        assert used <= known, used - known

@@ -1,0 +1,189 @@
+"""What is told first of a scene and of random bodies: classes of methods, a sentence, the picture of families."""
+
+import math
+
+import pandas as pd
+import pytest
+
+from conservative import registry
+from conservative.benchmarks.measures import measurement
+from conservative.reports.labels import with_names
+from conservative.reports.tables import families, random_contests, random_summary, summary
+from conservative.reports.tables.classes import MethodClass, class_of
+from conservative.reports.tables.headline import first_lost, of_points, of_random_bodies
+from conservative.reports.tables.work_precision import points
+
+from .rows import frame, point, row
+from .test_random_ratios import ENGINE_ALONE, OURS_ALONE, SLOWER, TWICE, flat, line
+
+SOLUTION = point("lame", "ours", 1e-12, 1e-7)
+OURS = [*point("gauss", "ours", 1e-3, 2e-6), *point("gauss", "ours", 1e-7, 4e-6, 0.01)]
+SOLVER = [*point("scipy", "engine", 1e-3, 6e-6), *point("scipy", "engine", 1e-7, 8e-6, 0.01)]
+ENGINE = point("mujoco:RK4", "engine", 1e-4, 5e-4)
+NOTHING = frame([])
+
+
+def told(*lines, drifts=NOTHING, troubles=NOTHING, integrable=True):
+    return summary.of_scene(points(frame([each for line in lines for each in line])), drifts, troubles, integrable)
+
+
+def cells(found, kind):
+    (line,) = [line for line in found.classes[1] if line[0].startswith(kind)]
+    return dict(zip(found.classes[0], line, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("method", "role", "kind"),
+    [
+        ("taylor", "ours", MethodClass.GENERAL),
+        ("reduced:order=4", "ours", MethodClass.GENERAL),
+        ("moser_veselov", "ours", MethodClass.SOLUTION),
+        ("moser_veselov:order=10", "ours", MethodClass.SOLUTION),
+        ("lame", "ours", MethodClass.SOLUTION),
+        ("heyoka:frame=lean", "engine", MethodClass.SOLVER),
+        ("scipy", "engine", MethodClass.SOLVER),
+        ("mujoco:RK4", "engine", MethodClass.ENGINE),
+        ("pinocchio", "engine", MethodClass.ENGINE),
+        ("nobody knows it", "ours", MethodClass.GENERAL),
+        ("nobody@1.0:knows", "engine", MethodClass.ENGINE),
+    ],
+)
+def test_a_method_for_integrable_motions_is_no_general_integrator(method, role, kind):
+    assert class_of(role, method) is kind
+
+
+@pytest.mark.parametrize(
+    ("name", "integrable"),
+    [
+        *(("brick_flip", True), ("lagrange_top", True), ("kovalevskaya_top", True), ("spherical_body", True)),
+        *(("asymmetric_top", False), ("turned_top", False), ("random_body", False), ("stable_satellite", False)),
+    ],
+)
+def test_a_scene_says_whether_it_is_integrable(name, integrable):
+    assert registry.scene(name).integrable is integrable
+
+
+def test_a_sentence_compares_general_integrators_and_tells_of_a_solution_apart():
+    between = 6e-6 * (8 / 6) ** 0.75 / (2e-6 * 2**0.75)  # three of four decades from 1e-3 to 1e-7
+    sentence = told(OURS, SOLVER, SOLUTION).sentence
+    assert sentence.startswith(
+        "An integrable motion, with a closed form. Our cheapest general integrator, gauss, gets to 1e-6 rad "
+    )
+    assert (
+        f"{between:.1f} times as fast as the cheapest engine, scipy. lame, which solves integrable motions only, is" in sentence
+    )
+    assert sentence.endswith("74 times as fast.")  # 6 (8/6)^0.75 / 0.1
+
+
+def test_what_is_lost_is_said_of_the_engine():
+    slow = [*point("gauss", "ours", 1e-3, 2e-5), *point("gauss", "ours", 1e-7, 4e-5, 0.01)]
+    sentence = told(slow, SOLVER, integrable=False).sentence
+    assert sentence.startswith(
+        "Not integrable: no closed form is known. The cheapest engine, scipy, gets to 1e-6 rad 4.5 times as fast"
+    )
+
+
+@pytest.mark.parametrize(("lines", "words"), [((OURS,), "Only gauss gets to"), ((ENGINE,), "Nothing measured gets to 1e-6")])
+def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
+    assert words in told(*lines).sentence
+
+
+def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
+    found = told(OURS, SOLVER, SOLUTION, ENGINE)
+    assert [line[0].partition(":")[0] for line in found.classes[1]] == [kind.value for kind in MethodClass]
+    ours = cells(found, MethodClass.GENERAL)
+    assert (ours["µs at 1e-3 rad"], ours["µs at 1e-6 rad"], ours["µs at 1e-9 rad"]) == ("2.00 gauss", "3.36 gauss", "–")
+    assert float(ours["error at equal cost"]) == 1e-7  # no smaller one was measured, at any cost
+    assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
+    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.100 lame"
+    assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
+    assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
+
+
+def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_for_other_scenes():
+    outcomes = (("diverged", "gauss:stages=2"), ("diverged", "taylor"), ("unsupported", "gauss:stages=8"))
+    found = [row("convergence", name, "attitude error max", math.nan, outcome=outcome) for outcome, name in outcomes]
+    other = point("taylor", "ours", 1e-3, 1e-5)
+    ours = cells(told(OURS, other, troubles=frame(found)), MethodClass.GENERAL)
+    assert ours["where it fails"] == "diverged at some settings: gauss, taylor"
+
+
+def test_a_class_keeps_what_its_best_setting_keeps():
+    found = [row("long_runs", f"gauss:{k}", "energy drift max", drift) for k, drift in enumerate((1e-3, 1e-15))]
+    found += [
+        row("long_runs", "gauss", f"{name} drift max", drift) for name, drift in (("momentum", 1e-6), ("a momentum", 1e-15))
+    ]
+    drifts = frame(found)
+    assert cells(told(OURS, drifts=drifts), MethodClass.GENERAL)["keeps"] == "✓ energy; ≈ momenta"
+    assert cells(told(OURS), MethodClass.GENERAL)["keeps"] == "not measured"
+
+
+def test_the_best_of_a_family_is_what_nothing_of_its_own_beats():
+    bad = point("gauss:stages=2", "ours", 1e-2, 9e-6)
+    picture = told(OURS, bad, SOLVER).points
+    best = picture[~picture["single"].astype(bool)]
+    assert best[best["name"] == "gauss"]["error"].tolist() == [1e-3, 1e-7]
+    assert (picture["name"] == "gauss").sum() == 2 + 3  # and all three as single settings
+    assert set(picture[picture["single"].astype(bool)]["line"]) == {"gauss", "gauss stages=2", "scipy"}
+
+
+def test_at_most_eight_families_are_shown_at_first_of_both_sides():
+    lines = [point(f"ours{k}", "ours", 10.0**-k, 1e-6) for k in range(1, 8)]
+    lines += [point(f"engine{k}", "engine", 10.0**-k, 1e-6) for k in range(1, 8)]
+    shown = told(*lines).shown
+    assert len(shown) == 8
+    assert sorted(name[:4] for name in shown) == ["engi"] * 4 + ["ours"] * 4
+    assert told(OURS, SOLVER).shown == ("gauss", "scipy")
+
+
+def test_what_lies_exactly_under_another_line_is_said():
+    one, other = (pd.DataFrame({"x": [1.0, 2.0], "y": [y, 4.0]}) for y in (1e-16, 1.1e-16))
+    lines = [("a", one), ("b", one), ("c", other), ("d", one)]  # drawn in this order, the last on top
+    assert list(families.under(lines, "x", "y")) == ["Exactly under d: a, b."]
+
+
+def random(*lines, drifts=NOTHING):
+    table = with_names(measurement.frame([each for rows in lines for each in rows]))
+    return random_summary.of_random_bodies(table, random_contests.contests(table), drifts)
+
+
+def test_random_bodies_are_told_by_their_geometric_mean_and_by_what_is_lost():
+    sentence = random(*TWICE, *SLOWER, line(2, "gauss", "ours", flat(1.0)), line(2, "heyoka", "engine", flat(4.0))).sentence
+    assert (
+        "On 3 random bodies in fields, not integrable, our cheapest general integrator gets to 1e-6 rad 1.6 times" in sentence
+    )
+    assert "(geometric mean; on 1 of them an engine is faster, by up to 2.0 times)" in sentence
+    assert "the cheapest engine gets to 1e-6 rad 2.0 times as fast as our cheapest" in random(*SLOWER).sentence
+    assert "on single ones 2.0 to 2.0; on 2 more, not both get there" in random(*TWICE, *OURS_ALONE, *ENGINE_ALONE).sentence
+    assert "on none" in random(TWICE[0]).sentence
+
+
+def test_random_bodies_have_a_row_a_class_too():
+    found = random(*TWICE)
+    ours, engine = cells(found, MethodClass.GENERAL), cells(found, MethodClass.SOLVER)
+    assert (ours["µs at 1e-6 rad"], engine["µs at 1e-6 rad"]) == ("1,000,000 gauss", "2,000,000 heyoka")
+    assert (float(ours["error at equal cost"]), ours["where it fails"]) == (1e-12, "nowhere here")
+    assert "no closed form" in cells(found, MethodClass.SOLUTION)["where it fails"]
+    missed = random(*TWICE, *ENGINE_ALONE)
+    assert cells(missed, MethodClass.GENERAL)["where it fails"] == "misses 1e-6 on 1 of 2 bodies; misses 1e-9 on 1 of 2 bodies"
+    assert cells(missed, MethodClass.GENERAL)["µs at 1e-6 rad"] == "–"  # one of two is no mean of all
+
+
+def test_random_bodies_have_points_where_most_of_them_get_there():
+    picture = random(*TWICE, *ENGINE_ALONE).points
+    ours = picture[(picture["name"] == "gauss") & ~picture["single"].astype(bool)]
+    assert ours["error"].min() == pytest.approx(1e-4)
+    assert set(ours["within"]) == {"2 of 2"}
+    assert math.isclose(ours["time"].iloc[0], 1.0)
+
+
+def test_what_is_lost_comes_first():
+    table = measurement.frame([each for rows in (*TWICE, *SLOWER) for each in rows])
+    found = first_lost(
+        [*of_points(points(frame([*OURS, *SOLVER, *SOLUTION]))), *of_random_bodies(random_contests.contests(table))]
+    )
+    assert [each.lost for each in found] == [True, False, False, False]
+    assert found[0].text == "an engine is faster in 11 of 22 cases, by up to 2.0 times, at 1e-2 rad."
+    assert found[-1].text.startswith(
+        "lame, which solves integrable motions only, is 60 to 80 times as fast as the cheapest engine"
+    )
