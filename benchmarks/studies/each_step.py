@@ -1,13 +1,13 @@
 """The study of samples at each of a scene's own steps: what a method takes that keeps them all within an error.
 
-`work_precision` reads a dozen samples, and one step leads from one to the next where a solution or a high order allows that. Who
-wants the motion at short intervals pays for each: a method with a step takes one or more to an interval, one with a tolerance
-evaluates between its own steps, which can be longer.
+`work_precision` reads a dozen samples, and one step leads from one to the next where a solution or a high order allows that.
+Who wants the motion at short intervals pays for each: a method with a step takes one or more to an interval, one with a
+tolerance evaluates between its own steps, which can be longer.
 
 * A method is taken at the coarsest of its settings whose largest attitude error, over all samples, is at most `ERROR`: so many
   steps to an interval, or a tolerance. One that gets there at none has errors and no time.
-* It is timed twice, interleaved with all others: with all samples kept, attitude matrices and rates as a run returns them, which
-  for an engine includes the conversion from its own state; and the same steps with the end alone kept, as all other studies do.
+* It is timed twice, interleaved with all others: with all samples kept, attitude matrices and rates as a run returns them,
+  which for an engine includes the conversion from its own state; and with the end alone kept, as all other studies do.
 """
 
 from __future__ import annotations

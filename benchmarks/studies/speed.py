@@ -58,13 +58,11 @@ def shorten(study: Study, case: Case) -> Case:
     return replace(case, grid=Grid(case.grid.dt, n, n))
 
 
-def lengthen(
-    case: Case, done: Success, limit: float = HANG_LIMIT, extend: Extend = keep_end
-) -> tuple[Case, Success]:
+def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Extend = keep_end) -> tuple[Case, Success]:
     """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
 
-    No run may take more than `limit` s, and `extend` says which samples it keeps. The number is found in several rounds, because a short call is mostly overhead and says
-    little of its steps.
+    No run may take more than `limit` s, and `extend` says which samples it keeps. The number is found in several rounds,
+    because a short call is mostly overhead and says little of its steps.
     """
     bare, times = case, 1
     while times < LONGEST and (spent := wall_time(done.run)) < CALL / 2:
