@@ -38,9 +38,9 @@ TERMS = (
 """What the table says, in words."""
 SAMPLE_TERMS = (
     f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution takes one step "
-    "from each to the next, however far, so what it costs per simulated second is a matter of their number. Therefore the cost of a "
-    f"sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a run that keeps "
-    "them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one that keeps the end "
+    "from each to the next, however far: what it costs per simulated second depends on how many there are. Therefore the cost of "
+    f"a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a run that "
+    "keeps them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one that keeps the end "
     "alone, where a solver need not stop at each."
 )
 """What a sample is, and what it costs."""
