@@ -38,10 +38,10 @@ TERMS = (
 """What the table says, in words."""
 SAMPLE_TERMS = (
     f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution takes one step "
-    "from each to the next, however far: what it costs per simulated second depends on how many there are. Therefore the cost of "
-    f"a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a run that "
-    "keeps them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one that keeps the end "
-    "alone, where a solver need not stop at each."
+    "from each to the next, however far: what it costs per simulated second depends on how many there are. Therefore the "
+    f"cost of a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a "
+    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one "
+    "that keeps the end alone, where a solver need not stop at each."
 )
 """What a sample is, and what it costs."""
 CAVEAT = (
