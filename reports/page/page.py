@@ -14,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from conservative.benchmarks.studies import long_runs
+from conservative.benchmarks.studies import long_runs, step_ladder
 
 from ..charts import contrast, spheres
 from ..charts.vega_embed import PageFigure
@@ -46,6 +46,8 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         paper=paper_figures,
         caveat=summary.CAVEAT,
         class_terms=summary.TERMS,
+        sample_terms=summary.SAMPLE_TERMS,
+        samples=step_ladder.SAMPLES,
         hard_terms=hard_cases.TERMS,
         random_figure=random_figure,
         many_figure=many_figure,
