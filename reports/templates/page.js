@@ -55,9 +55,10 @@
     const DataTable = await unpack("datatables");
     DataTable.type("words", { detect: () => true, order: ways(String, words.compare) });
     DataTable.type("numbers", { detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
+    const language = { zeroRecords: "No row has all of these words." };
     const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
     for (const table of document.querySelectorAll("table.sortable")) {
-      const rows = new DataTable(table, { autoWidth: false, paging: false, order: [], layout });
+      const rows = new DataTable(table, { autoWidth: false, paging: false, order: [], language, layout });
       const filter = table.closest(".scroll").previousElementSibling?.closest(".filter");
       filter?.querySelector("input").addEventListener("input", ({ target }) => {
         const { recordsDisplay: left, recordsTotal: all } = rows.search(target.value).draw().page.info();
