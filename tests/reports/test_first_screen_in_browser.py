@@ -99,8 +99,8 @@ def test_sentence_and_picture_and_where_the_table_begins_are_on_the_first_screen
 
 
 def test_a_picture_of_rows_of_panels_has_a_chart_for_each_of_them(opened):
-    script = "return [...document.querySelectorAll('#many_bodies .chart')].map((e) => e.querySelectorAll('.mark-symbol path').length)"
-    counts = opened.execute_script(script)
+    script = "return [...document.querySelectorAll('#many_bodies .chart')].map((e) => e.querySelectorAll(arguments[0]).length)"
+    counts = opened.execute_script(script, ".mark-symbol path")
     assert len(counts) == 6  # kinds of bodies times errors
     assert min(counts) >= 2
     assert len(opened.find_elements("css selector", "#many_bodies .entry")) == 5
