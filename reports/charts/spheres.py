@@ -8,6 +8,8 @@ import pandas as pd
 from .style import GREY, colours
 from .vega_embed import Spec, as_csv
 
+SIDES = (("datum.near < 0", 0.3), ("datum.near >= 0", 1.0))
+"""Which points are behind the sphere and which before it, and their opacity; `near` is towards the eye."""
 TURN, TILT = 35, 25
 """Where the spheres are looked at from at first, degrees."""
 
@@ -26,20 +28,31 @@ def chart(curve: pd.DataFrame) -> Spec:
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
         "layer": [
-            {"data": _grid(), "transform": _project(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding() | _order("part")},
             {
-                "data": as_csv(points, ("x", "y", "z")),
+                "data": _grid(),
                 "transform": _project(),
-                "mark": {"type": "circle", "color": colours({name: family})[name], "size": 7},
-                "encoding": _encoding() | {"opacity": _fade()},
+                "mark": _line(GREY, 0.6, 0.5),
+                "encoding": _encoding() | {"detail": {"field": "part"}},
             },
+            *(_dots(points, colours({name: family})[name], *side) for side in SIDES),
         ],
         "config": {"view": {"stroke": None}},
     }
 
 
+def _dots(points: list[dict[str, float]], colour: str, side: str, opacity: float) -> Spec:
+    """Return the points on one side as dots of one line: it breaks before each of them, and its caps are round."""
+    breaks = [{"calculate": "[null, datum.across]", "as": "across"}, {"flatten": ["across"]}]
+    return {
+        "data": as_csv(points, ("x", "y", "z")),
+        "transform": [*_project(), {"filter": side}, *breaks],
+        "mark": _line(colour, 2.4, opacity) | {"strokeCap": "round", "invalid": "break-paths-show-domains"},
+        "encoding": _encoding(),
+    }
+
+
 def _line(colour: str, width: float, opacity: float) -> Spec:
-    return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "strokeJoin": "round"}
+    return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}  # of points: their own
 
 
 def _grid() -> Spec:
@@ -70,11 +83,3 @@ def _encoding() -> Spec:
     scale = {"domain": [-1.15, 1.15], "nice": False, "clamp": False}
     hidden: Spec = {"type": "quantitative", "axis": None, "scale": scale}
     return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}}
-
-
-def _order(detail: str) -> Spec:
-    return {"order": {"field": "k", "type": "quantitative"}, "detail": {"field": detail}}
-
-
-def _fade() -> Spec:
-    return {"condition": {"test": "datum.near < 0", "value": 0.3}, "value": 1}

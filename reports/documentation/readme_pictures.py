@@ -49,7 +49,16 @@ TIMED_SCENE, TIMED = (
     ),
 )
 DRIFT_SCENE = "brick_flip"
-DRIFTING = ("reduced", "moser_veselov", "heyoka:1e-9", "mujoco:RK4", "mujoco:implicitfast", "pinocchio:RK4", "scipy:rtol=1e-9")
+DRIFTING = (
+    "reduced",
+    "moser_veselov",
+    "heyoka:1e-9",
+    "heyoka:1e-16",
+    "mujoco:RK4",
+    "mujoco:implicitfast",
+    "pinocchio:RK4",
+    "scipy:rtol=1e-9",
+)
 SEEN = ("exact", "reduced", "mujoco:RK4", "mujoco:implicit")
 
 

@@ -1,11 +1,14 @@
 """What charts draw is in the unit that their axes name."""
 
 import math
+import re
 from itertools import pairwise
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
+import vl_convert
 
 from conservative import Reduced
 from conservative.benchmarks.measures.measure import Measure
@@ -67,9 +70,16 @@ def test_the_cost_of_a_recommendation_is_in_microseconds():
 
 def test_what_is_behind_the_sphere_is_pale():
     curve = pd.DataFrame({"name": "a", "family": "a", "x": [1.0, 0.0], "y": [0.0, 1.0], "z": [0.0, 0.0]})
-    fade = spheres.chart(curve)["layer"][1]["encoding"]["opacity"]
-    assert fade["condition"]["test"] == "datum.near < 0"  # `near` is towards the eye
-    assert fade["condition"]["value"] < fade["value"]
+    behind, before = spheres.chart(curve)["layer"][1:]
+    assert {"filter": "datum.near < 0"} in behind["transform"]  # `near` is towards the eye
+    assert behind["mark"]["opacity"] < before["mark"]["opacity"]
+
+
+def test_samples_on_a_sphere_are_not_joined():
+    k = np.arange(100)
+    curve = pd.DataFrame({"name": "a", "family": "a", "x": np.sin(k), "y": np.cos(k), "z": 0.0})
+    drawn = re.findall(r' d="([^"]*)"', vl_convert.vegalite_to_svg(spheres.chart(curve)))
+    assert sum(path.count("Z") for path in drawn if "L" not in path) >= 100  # a dot each, and no line between any two
 
 
 @pytest.mark.parametrize(("low", "high", "powers"), [(0.05, 200.0, [0.1, 1.0, 10.0, 100.0]), (1.0, 100.0, [1.0, 10.0, 100.0])])

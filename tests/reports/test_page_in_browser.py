@@ -137,7 +137,7 @@ def test_hovering_shows_exact_values(opened):
 
 
 def test_turning_the_sphere_moves_its_curve(opened):
-    path = "return document.querySelector('#sphere_brick_flip .mark-symbol path').getAttribute('transform')"
+    path = "return document.querySelector('#sphere_brick_flip .chart svg .mark-line path').getAttribute('d')"
     before = opened.execute_script(path)
     opened.execute_script(
         "const i = document.querySelector('#sphere_brick_flip input'); i.value = 90; i.dispatchEvent(new Event('input'))"
