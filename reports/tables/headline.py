@@ -98,8 +98,12 @@ def _solutions(contests: Sequence[Contest]) -> Iterator[Statement]:
 
 def of_each_step(scene: str, each: EachStep) -> Iterator[Statement]:
     """Yield who is faster where each of a scene's own steps is kept, and where the end alone is, for each class of ours."""
-    kept = f"with a sample at each {each.interval:.3g} s, at {tolerance(ERROR)} rad"
-    alone = f"with these samples not kept, where a solver need not stop at each, at {tolerance(ERROR)} rad"
+    kept = (
+        f"with a sample at each {each.interval:.3g} s (our conversion of an engine's state included), at {tolerance(ERROR)} rad"
+    )
+    alone = (
+        f"in steps of {each.interval:.3g} s of which the end is kept, where a solver need not stop, at {tolerance(ERROR)} rad"
+    )
     for points, where in ((each.kept, kept), (each.alone, alone)):
         for kind in (MethodClass.GENERAL, MethodClass.SOLUTION) if len(points) else ():
             ours, engine = cheapest(points, (kind,), ERROR), cheapest(points, OF_ENGINES, ERROR)

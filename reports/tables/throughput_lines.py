@@ -113,7 +113,7 @@ class Cheapest:
 
 @dataclass(frozen=True)
 class Contest:
-    """Ours of a class (`group`) against an engine, among `size` bodies of a kind, at an error, rad, of which `which` says whose.
+    """Ours of a class (`group`) against an engine, among `size` bodies of a kind, at an error, rad, of those `which` names.
 
     `ratio` is the engine's time over ours, nan where a side does not get there; above 1 ours is faster.
     """

@@ -55,13 +55,11 @@ def test_contests_have_both_at_last_in_the_units_of_their_columns():
 def test_what_is_lost_with_the_end_alone_is_said():
     found = list(headline.of_each_step("made_up", FOUND))
     assert [each.lost for each in found] == [False, False, True, False]
-    assert (
-        found[0].text
-        == "gauss (our general integrators) is 2.0 times as fast as heyoka, with a sample at each 0.1 s, at 1e-6 rad."
+    assert found[0].text.startswith(
+        "gauss (our general integrators) is 2.0 times as fast as heyoka, with a sample at each 0.1 s"
     )
-    assert found[2].text.startswith(
-        "heyoka is 2.0 times as fast as reduced (our general integrators), with these samples not kept"
-    )
+    assert found[0].text.endswith("at 1e-6 rad.")
+    assert found[2].text.startswith("heyoka is 2.0 times as fast as reduced (our general integrators), in steps of 0.1 s")
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])
