@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -21,7 +21,7 @@ from conservative.method import Role
 
 from ..labels import with_names
 from ..tables.engine_rows import ONE_STEP, EngineRow, engine_rows, points_of
-from ..tables.random_contests import contests
+from ..tables.random_contests import Contest, contests
 from ..tables.random_ratios import by_engine
 from ..tables.work_precision import cost, points
 
@@ -96,11 +96,17 @@ def _run(row: EngineRow) -> list[str]:
     return [row.label.partition("/")[2], f"{row.error:.2g}", f"{row.energy.size:.1g} {row.energy.direction}".strip()]
 
 
-def random_bodies(table: pd.DataFrame) -> Iterator[Sequence[str]]:
-    """Yield the header, and a row for each field and engine: its time over ours, mean (worst to best)."""
-    header, body = by_engine(contests(table))
-    yield header
-    yield from ([str(cell) for cell in row] for row in body)
+def random_bodies(found: Iterable[Contest]) -> Iterator[Sequence[str]]:
+    """Yield the header, and a row for each field and engine: its time over ours, mean (worst to best); one engine has no column."""
+    header, body = by_engine(found)
+    first = 1 if len({str(row[1]) for row in body}) > 1 else 2
+    yield from ([str(row[0]), *map(str, row[first:])] for row in (header, *body))
+
+
+def markdown(lines: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table in Markdown."""
+    header, *body = lines
+    return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *body)]
 
 
 def main() -> None:
@@ -110,13 +116,12 @@ def main() -> None:
     parser.add_argument("--engines", action="store_true", help="the table of engines")
     parser.add_argument("--random", action="store_true", help="the table of random bodies")
     options = parser.parse_args()
-    found = with_names(read(_rows_in(options.report)))
-    header, *body = random_bodies(found) if options.random else engines(found) if options.engines else rows(points(found))
-    for row in (header, ["---"] * len(header), *body):
-        print("|", " | ".join(row), "|")
+    found = with_names(read(rows_in(options.report)))
+    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(points(found))
+    print("\n".join(markdown(lines)))
 
 
-def _rows_in(folder: Path) -> Path:
+def rows_in(folder: Path) -> Path:
     """Return the file of measurements in the folder of a report, or of a study."""
     names = ("measurements.csv", "study.csv")
     return next((folder / name for name in names if (folder / name).exists()), folder / names[0])

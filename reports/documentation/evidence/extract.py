@@ -1,0 +1,86 @@
+"""Which rows of a report and of a study of random bodies README's numbers follow from; the rest is left out.
+
+Of every cell the line that decides it stays, with all its settings. That nothing else decides is checked: README's tables, made
+of the rows that stay, have to be those made of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import product
+
+import pandas as pd
+
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.paper import APPROXIMATE
+from conservative.errors import BadInput
+
+from ...labels import with_names
+from ...tables.random_contests import ANY, contests
+from ...tables.random_ratios import MILESTONES
+from ...tables.work_precision import points
+from ..readme_table import ERRORS, cheapest, groups, random_bodies, rows
+
+Lines = set[tuple[str, str]]
+"""Scene and series of lines."""
+
+
+def of_costs(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a report that README's table of costs and its drifts follow from.
+
+    Raises
+    ------
+    BadInput
+        They do not give the table that the whole report gives.
+    """
+    compared = (table["study"] == "work_precision") & _among(table, set(_cheapest_lines(points(with_names(table)))))
+    drifts = (table["study"] == "paper") & (table["measure"] == Measure.DRIFT_MAX.text) & (table["quantity"] == "energy")
+    truths = (table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)
+    return _checked(table, compared | drifts | truths, lambda some: list(rows(points(with_names(some)))))
+
+
+def _cheapest_lines(found: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Yield the cheapest line of each group at each error, and of each group one in any case."""
+    for members in groups(found).values():
+        yield from _line(members)
+        for scene, error in product(members["scene"].unique(), ERRORS):
+            here = members[members["scene"] == scene]
+            yield from _line(here[here["name"] == cheapest_name(here, error)])
+
+
+def cheapest_name(members: pd.DataFrame, error: float) -> str:
+    """Return the name of the cheapest line of some points at an error, rad; "" where none gets there."""
+    costs = {str(name): cheapest(line, error)[0] for name, line in members.groupby("name", sort=False)}
+    name = min(costs, key=lambda each: costs[each], default="")
+    return name if name and costs[name] < float("inf") else ""
+
+
+def _line(members: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    return members[["scene", "series"]].head(1).itertuples(index=False, name=None)  # type: ignore[return-value]
+
+
+def of_random_bodies(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a study of random bodies that README's table of them follows from.
+
+    Raises
+    ------
+    BadInput
+        They do not give the table that the whole study gives.
+    """
+    found = [contest for contest in contests(with_names(table)) if contest.engine != ANY and contest.error in MILESTONES]
+    sides = ((pair.scene, side) for contest in found for pair in contest.pairs for side in (pair.ours, pair.engine))
+    lines = {(scene, side.line) for scene, side in sides if side}
+    return _checked(table, _among(table, lines), lambda some: list(random_bodies(contests(with_names(some)))))
+
+
+def _among(table: pd.DataFrame, lines: Lines) -> pd.Series[bool]:
+    found = [line in lines for line in zip(table["scene"], table["series"], strict=True)]
+    return pd.Series(found, index=table.index, dtype=bool)
+
+
+def _checked(table: pd.DataFrame, kept: pd.Series[bool], tables: Callable[[pd.DataFrame], object]) -> pd.DataFrame:
+    """Return the rows that are kept, if what README shows of them is what it shows of all."""
+    extract = table[kept].reset_index(drop=True)
+    if extract.empty or tables(extract) != tables(table):
+        raise BadInput("folder", f"{len(table)} rows, of which {len(extract)} decide", "rows that README's tables follow from")
+    return extract
