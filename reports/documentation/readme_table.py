@@ -97,7 +97,7 @@ def _run(row: EngineRow) -> list[str]:
 
 
 def random_bodies(found: Iterable[Contest]) -> Iterator[Sequence[str]]:
-    """Yield the header, and a row for each field and engine: its time over ours, mean (worst to best); one engine has no column."""
+    """Yield the header, and a row for each field and engine, which has no column if it is the only one: its time over ours."""
     header, body = by_engine(found)
     first = 1 if len({str(row[1]) for row in body}) > 1 else 2
     yield from ([str(row[0]), *map(str, row[first:])] for row in (header, *body))

@@ -83,8 +83,8 @@ def _only(values: pd.Series[float], what: str) -> float:
 def random_bodies(evidence: Evidence, error: float | None = None) -> Values:
     """Return how many random bodies there are in each `field`, at how many errors, `milestones`, and in what cases ours loses.
 
-    At one error, or at all milestones: in `lost` of `cases` an engine is faster, by up to `most` times; in `alone` ours does not
-    get there. A case is a body at an error. From the `first` milestone to `won`, rad, ours is faster on every body.
+    At one error, or at all milestones: in `lost` of `cases` an engine is faster, by up to `most` times; in `alone` ours does
+    not get there. A case is a body at an error. From the `first` milestone to `won`, rad, ours is faster on every body.
     """
     found = [contest for contest in evidence.contests if contest.engine == ANY and contest.error in _errors(error)]
     lost = list(_lost(found))

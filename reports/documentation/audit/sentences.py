@@ -1,15 +1,15 @@
 """Sentences with numbers: which ones stand on a page, and whether their numbers are those that follow from rows.
 
-A sentence is a text with places for what is measured: `{low}` for a number, `{low>}` for one that no value is below, `{high<}` for
-one that none is above; `{error:given}` for a number, and `{engine:words}` for words, that the values depend on; `{commit:text}`
-for words that are what the values say.
+A sentence is a text with places for what is measured: `{low}` for a number, `{low>}` for one that no value is below, `{high<}`
+for one that none is above; `{error:given}` for a number, and `{engine:words}` for words, that the values depend on;
+`{commit:text}` for words that are what the values say.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -38,11 +38,14 @@ class Sentence:
         Returns the values; takes what is `given` and `words` by name, and raises `NoSupportError`.
     parameters
         What the values depend on and what stands in the text as it is.
+    words
+        Regular expression of what `{engine:words}` stands for.
     """
 
     text: str
     values: Callable[..., Values]
-    parameters: Collection[Value] = field(default=())
+    parameters: Collection[Value] = ()
+    words: str = WORDS
 
     @cached_property
     def pattern(self) -> re.Pattern[str]:
@@ -50,7 +53,8 @@ class Sentence:
         parts = PLACE.split(self.text)
         found = [_literal(parts[0])]
         for name, _, kind, literal in zip(parts[1::4], parts[2::4], parts[3::4], parts[4::4], strict=True):
-            found.append(f"(?P<{name}>{WORDS if kind in ('words', 'text') else NUMBER.pattern}){_literal(literal)}")
+            place = {"words": self.words, "text": WORDS}.get(kind, NUMBER.pattern)
+            found.append(f"(?P<{name}>{place}){_literal(literal)}")
         return re.compile("".join(found))
 
     @cached_property
@@ -88,7 +92,7 @@ def _read(found: re.Match[str], name: str, kind: str) -> Any:
 
 def _compare(written: Number | str, relation: str, value: Value | Sequence[Value]) -> str:
     """Return what the values are where they are not what is written."""
-    several = [value] if isinstance(value, int | float | str) else list(value)
+    several: Sequence[Value] = [value] if isinstance(value, int | float | str) else value
     if isinstance(written, str):
         holds = all(written == each for each in several)
     else:
@@ -108,6 +112,6 @@ def judge(page: Page, sentences: Sequence[Sentence], covered: Collection[Number]
         for found in sentence.pattern.finditer(page.text):
             for number, wrong in sentence.check(page, found):
                 verdicts.setdefault(number, []).append(wrong)
-    for number in sorted(verdicts, key=lambda each: each.start):
-        wrong = verdicts[number] or ([] if number in covered else [NOTHING])
-        yield from (f"{page.describe(number)}: {each}" for each in wrong[:1] if "" not in wrong)
+    for number, wrong in sorted(verdicts.items(), key=lambda item: item[0].start):
+        if number not in covered and "" not in wrong:
+            yield f"{page.describe(number)}: {(wrong or [NOTHING])[0]}"

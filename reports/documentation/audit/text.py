@@ -1,7 +1,7 @@
 """Numbers in prose: where they stand, what they say, and how exactly.
 
-Prose is what is left of a page without code and addresses of links. A name such as `RK4` is no number; `7.13.2` is one, and so is
-a word that counts, such as `half` or `hundreds`.
+Prose is what is left of a page without code and addresses of links. A name such as `RK4` is no number; `7.13.2` is one, and so
+is a word that counts, such as `half` or `hundreds`.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def cheapest_name(members: pd.DataFrame, error: float) -> str:
 
 
 def _line(members: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    return members[["scene", "series"]].head(1).itertuples(index=False, name=None)  # type: ignore[return-value]
+    return members[["scene", "series"]].head(1).itertuples(index=False, name=None)
 
 
 def of_random_bodies(table: pd.DataFrame) -> pd.DataFrame:

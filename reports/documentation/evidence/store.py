@@ -111,7 +111,7 @@ def _write(rows: pd.DataFrame, path: Path) -> None:
 
 
 def _origin(told: Mapping[str, Any]) -> dict[str, str]:
-    """Return command, commit, date, machine and versions, of a report or of a study, without the folder that it was written to."""
+    """Return command, commit, date, machine and versions of a report or of a study, without the folder it was written to."""
     flat = {**told, **told.get("machine", {}), **told.get("packages", {})}
     kept = {name: str(flat[name]) for name in (*_TOLD, *_MACHINE, *COMPARED) if name in flat}
     return kept | {"command": kept["command"].partition(" --out ")[0]}
