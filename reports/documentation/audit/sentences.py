@@ -94,7 +94,7 @@ def _compare(written: Number | str, relation: str, value: Value | Sequence[Value
     """Return what the values are where they are not what is written."""
     several: Sequence[Value] = [value] if isinstance(value, int | float | str) else value
     if isinstance(written, str):
-        holds = all(written == each for each in several)
+        holds = bool(several) and all(written == each for each in several)
     else:
         agrees = {"": written.agrees, "<": written.lies_above, ">": written.lies_below}[relation]
         holds = bool(several) and all(agrees(each) for each in several)
