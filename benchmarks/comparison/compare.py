@@ -111,8 +111,7 @@ def judge(
     baseline = update_baseline(None, [_results(before)], f"measured beside {head.name}")
     verdict = gate.judge(baseline, _results({id: found.row for id, found in now.items()}), "known")
     rows = tuple(_row(id, was.get(id), now.get(id), times.get(id)) for id in dict.fromkeys([*was, *now]))
-    nothing = [] if before else [Violation("rows", "all", "all", "none", "none", "one or more that pass")]
-    violations = (*(verdict.violations if before else nothing), *(each for row in rows for each in _time_violations(row)))
+    violations = (*verdict.violations, *(each for row in rows for each in _time_violations(row)))
     return Comparison(base, head, rows, violations, (*_notes(rows), *_packages(base, head)))
 
 

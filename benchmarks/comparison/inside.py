@@ -51,15 +51,24 @@ def _describe(method: Method) -> Answer:
 def describe_scene(given: SimpleNamespace) -> Callable[[], Answer]:
     """Return what says which motion a `scene` is, with its energies at attitudes `probes` (n, 3, 3)."""
     scene = _scene(given.scene)
-    energies = [] if scene.potential is None else [float(scene.potential.energy(R)) for R in given.probes]
     return lambda: {
         "inertia": scene.body.inertia,
         "R_WB0": scene.R_WB0,
         "w_WB_B0": scene.w_WB_B0,
         "ends": [scene.t_end, scene.dt],
-        "energies": energies,
+        "energies": _energies(scene, given.probes),
         "invariants": [invariant.name for invariant in scene.invariants],
     }
+
+
+def _energies(scene: Scene, probes: Any) -> list[float]:
+    """Return energies, J, at attitudes (n, 3, 3); of a field that turns, at the start and at the end."""
+    potential: Any = scene.potential  # a version may be older than the protocols of potentials
+    if potential is None:
+        return []
+    if getattr(potential, "time_dependent", False):
+        return [float(potential.energy_at(R, t)) for t in (0.0, scene.t_end) for R in probes]
+    return [float(potential.energy(R)) for R in probes]
 
 
 def describe_pair(given: SimpleNamespace) -> Callable[[], Answer]:

@@ -67,7 +67,7 @@ class Side:
         """Return the settings of the suite of some methods, by default of all that are under test."""
         return tuple(Setting(**each) for each in self.ask("list", names=list(names))["methods"])
 
-    def solver(self, states: States, **values: Any) -> WorkerRun:
+    def solver(self, states: States, **values: Any) -> WorkerRun[Trajectory]:
         """Return a run that gives a trajectory."""
         return WorkerRun(self._worker, {**_START, "task": "solve", **values}, states)
 
@@ -79,7 +79,7 @@ class Side:
         return run
 
 
-class TimedRun(WorkerRun):
+class TimedRun(WorkerRun[Trajectory]):
     """A run that is only ever timed."""
 
     def __call__(self) -> Any:
@@ -137,7 +137,7 @@ class Remote(Method):
     def longest_step(self, scene: Scene) -> float:
         return self.longest
 
-    def prepare(self, scene: Scene, grid: Grid) -> WorkerRun:
+    def prepare(self, scene: Scene, grid: Grid) -> WorkerRun[Trajectory]:
         """Return the run; it is prepared when it is first called, so that what cannot be prepared is a failure of the run."""
         values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
         return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)

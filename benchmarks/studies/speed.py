@@ -7,7 +7,7 @@ what they compiled is not compiled again. Preparation is then the conversion of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from conservative.method import Grid, grid_for
@@ -34,6 +34,8 @@ TRIAL = 8
 """Steps of the run that tells how slow a foreign method is."""
 LONGEST = 2**16
 """Largest factor by which the number of steps of a timed run is raised."""
+Extend = Callable[[Grid, int], Grid]
+"""Takes a grid to one of so many times as many steps."""
 UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
 
 
@@ -56,16 +58,16 @@ def shorten(study: Study, case: Case) -> Case:
     return replace(case, grid=Grid(case.grid.dt, n, n))
 
 
-def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT) -> tuple[Case, Success]:
+def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Extend = keep_end) -> tuple[Case, Success]:
     """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
 
-    No run may take more than `limit` s. The number is found in several rounds, because a short call is mostly overhead and says
-    little of its steps.
+    No run may take more than `limit` s, and `extend` says which samples it keeps. The number is found in several rounds,
+    because a short call is mostly overhead and says little of its steps.
     """
     bare, times = case, 1
     while times < LONGEST and (spent := wall_time(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
-        longer = replace(bare, grid=keep_end(bare.grid, times))
+        longer = replace(bare, grid=extend(bare.grid, times))
         found = attempt_here(limit, longer)
         if not isinstance(found, Success):
             break

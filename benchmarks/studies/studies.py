@@ -16,6 +16,7 @@ from conservative.scene import Scene
 from ..measures.measurement import Measurement
 from . import (
     convergence,
+    each_step,
     engines_at_one_step,
     engines_over_steps,
     hard_cases,
@@ -40,6 +41,7 @@ MAKERS: Mapping[str, Maker] = {
     "convergence": convergence.findings,
     "speed": speed.findings,
     "work_precision": work_precision.findings,
+    "each_step": each_step.findings,
     "long_runs": long_runs.findings,
     "sphere_curves": sphere_curves.findings,
     "paper_figures": paper_figures.findings,

@@ -32,7 +32,7 @@ DASHES: Mapping[str, list[int]] = {
 
 def work_precision(picture: pd.DataFrame) -> Any:
     """Return time against error, from the columns of `tables.families`."""
-    data = picture.assign(microseconds=picture["time"] * 1e6, rank=range(len(picture)))
+    data = picture.assign(microseconds=picture["time"] * 1e6, sample=picture["sample"] * 1e6, rank=range(len(picture)))
     families = families_of(data)
     x = alt.X(**log_channel("error", "largest attitude error, rad", data["error"]))
     y = alt.Y(**log_channel("microseconds", "computing time per simulated second, µs", data["microseconds"]))

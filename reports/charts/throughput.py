@@ -7,6 +7,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
+from ..tables.cells import tolerance
 from .figures import log_channel
 from .style import HEIGHT, WIDTH, apply_style, colour_scale, dash_scale, families_of
 
@@ -30,7 +31,7 @@ def costs(points: pd.DataFrame) -> Any:
 def _panel(part: pd.DataFrame, kind: str, error: Any, points: pd.DataFrame, look: dict[str, Any]) -> Any:
     x = alt.X(**log_channel("size", "number of bodies", points["size"]))
     y = alt.Y(**log_channel("time", "µs a body and simulated second", points["time"]))
-    title = f"{kind.replace('_', ' ')}, {error:.0e} rad"
+    title = f"{kind.replace('_', ' ')}, {tolerance(error)} rad"
     base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **look)
     shown = [alt.Tooltip("name:N"), alt.Tooltip("size:Q"), alt.Tooltip("time:Q", format=".3g")]
     marks = alt.Chart(part).mark_point(filled=True, size=30).encode(x=x, y=y, color=look["color"].legend(None), tooltip=shown)

@@ -77,17 +77,28 @@ def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
 def embed(chart: Any, tooltip: Tooltip, height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
     """Return a picture's specification as the page embeds it, without the lines that are hidden at first.
 
-    A picture of panels becomes a chart a panel.
+    A picture of panels, or of rows of panels, becomes a chart a panel.
     """
     whole: Spec = chart.to_dict()
-    panels: list[Spec] | None = whole.pop("vconcat", whole.pop("concat", None))
-    if panels is None:
-        panels = [whole]
+    if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
             unit.pop("title", None)  # the caption of the figure says it
-    shared = {"data": whole["data"]} if "data" in whole else {}  # Altair lifts what all panels have in common
     parameters = [{"name": HIDDEN, "value": list(hidden)}, *whole.get("params", ())]
-    return [_panel(shared | panel, whole, tooltip, height) | {"params": parameters} for panel in panels]
+    return [_panel(panel, whole, tooltip, height) | {"params": parameters} for panel in _panels(whole, {})]
+
+
+def _panels(spec: Spec, shared: Spec) -> Iterator[Spec]:
+    """Yield the panels of a picture, each with the data that Altair has lifted to what holds it."""
+    shared = {"data": spec["data"]} if "data" in spec else shared
+    parts = _parts(spec)
+    if parts is None:
+        yield shared | spec
+    for part in parts or ():
+        yield from _panels(part, shared)
+
+
+def _parts(spec: Spec) -> Sequence[Spec] | None:
+    return next((spec[way] for way in ("vconcat", "hconcat", "concat") if way in spec), None)
 
 
 def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:

@@ -2,24 +2,27 @@
 
 With `--engines` it prints that of engines, from a report with this option; with `--random` that of random bodies, whose rows
 are in a report or in what `conservative study random --out FOLDER` leaves.
-Each cell is the cheapest way of a group of methods to an attitude error, in µs per simulated second, with its setting. Exact
-steps are a group of their own: they exist for few scenes, and have no truncation error that a shorter step would lower.
+Each cell is the cheapest way of a class of methods to an attitude error, in µs per simulated second, with its setting.
+Solutions of integrable motions are a class of their own: they exist for few scenes, and go from sample to sample in one step.
+So the last rows of a scene take each of its own steps: with all of them kept as samples, and with the end alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from conservative import registry
-from conservative.benchmarks.studies.selection import takes_exact_steps
+from conservative.benchmarks.studies.each_step import ERROR
 from conservative.method import Role
 
 from ..labels import with_names
+from ..tables import each_step
+from ..tables.cells import DASH, factor, tolerance
+from ..tables.classes import OF_ENGINES, MethodClass, with_classes
 from ..tables.engine_rows import ONE_STEP, EngineRow, engine_rows, points_of
 from ..tables.random_contests import Contest, contests
 from ..tables.random_ratios import by_engine
@@ -27,26 +30,36 @@ from ..tables.work_precision import cost, points
 
 ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad."""
-OURS, EXACT = "ours", "ours, exact step"
+APART = (MethodClass.GENERAL, MethodClass.SOLUTION)
+"""Classes with a column of their own; of engines each one has one."""
 
 
-def groups(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Return the measured points of ours, of our exact steps, and of each engine under its name with its version."""
-    ours = found[found["role"] == Role.OURS.value]
-    exact = ours["method"].map(lambda name: takes_exact_steps(registry.method(name))).astype(bool)
-    engines = found[found["role"] == Role.ENGINE.value]
-    members = {" ".join(map(str, key)): rows for key, rows in engines.groupby(["family", "version"], sort=False)}
-    return {OURS: ours[~exact], EXACT: ours[exact], **members}
+def columns(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return points (see `work_precision.points`) by column: our classes, and each engine under its name with its version."""
+    members = with_classes(found)
+    ours = {kind.value: members[members["class"] == kind] for kind in APART}
+    engines = members[members["class"].isin(OF_ENGINES)]
+    theirs = {" ".join(map(str, key)): rows for key, rows in engines.groupby(["family", "version"], sort=False)}
+    return {**ours, **theirs}
 
 
-def rows(found: pd.DataFrame) -> Iterator[list[str]]:
-    """Yield the header, and a row for each scene and error: the cheapest is bold, and a dash says that no point gets there."""
-    members = groups(found)
-    yield ["scene", "error, rad", *members]
+def rows(table: pd.DataFrame) -> Iterator[list[str]]:
+    """Yield the header, and rows for each scene: the cheapest is bold, and a dash says that no point gets there."""
+    header = list(columns(points(table)))
+    yield ["scene", "error, rad", *header]
+    for scene, label, members, error in entries(table):
+        costs = [cheapest(members[name], error) if name in members else (math.inf, "") for name in header]
+        yield [scene, label, *cells(costs)]
+
+
+def entries(table: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, pd.DataFrame], float]]:
+    """Yield scene, what is compared, the points of each column, and the error, rad, of each row of the table."""
+    found = points(table)
     for scene in found["scene"].unique():
-        for error in ERRORS:
-            costs = {name: cheapest(lines[lines["scene"] == scene], error) for name, lines in members.items()}
-            yield [str(scene), f"{error:.0e}", *cells(costs)]
+        here, each = found[found["scene"] == scene], each_step.of_scene(table, str(scene))
+        lines = [(tolerance(error), here, error) for error in ERRORS]
+        lines += [(label, kept, ERROR) for label, kept in zip(each.labels, (each.kept, each.alone), strict=True) if len(kept)]
+        yield from ((str(scene), label, columns(members), error) for label, members, error in lines)
 
 
 def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
@@ -60,17 +73,17 @@ def _setting(point: pd.Series[str]) -> str:
     return point["setting"] if point["role"] == Role.ENGINE.value else point["name"]
 
 
-def cells(costs: Mapping[str, tuple[float, str]]) -> list[str]:
+def cells(costs: Sequence[tuple[float, str]]) -> list[str]:
     """Return the costs of a row as text: µs to three digits, and the setting."""
-    least = min(time for time, _ in costs.values())
-    return [cell(time, setting, time == least) for time, setting in costs.values()]
+    least = min(time for time, _ in costs)
+    return [cell(time, setting, time == least) for time, setting in costs]
 
 
 def cell(time: float, setting: str, bold: bool) -> str:
     """Return one cell."""
     if math.isinf(time):
-        return "–"
-    digits = f"{float(f'{1e6 * time:.3g}'):,g}"
+        return DASH
+    digits = factor(1e6 * time, 3)
     return f"**{digits}** {setting}" if bold else f"{digits} {setting}"
 
 
@@ -117,7 +130,7 @@ def main() -> None:
     parser.add_argument("--random", action="store_true", help="the table of random bodies")
     options = parser.parse_args()
     found = with_names(read(rows_in(options.report)))
-    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(points(found))
+    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(found)
     print("\n".join(markdown(lines)))
 
 

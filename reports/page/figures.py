@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from conservative.benchmarks.studies import long_runs
+from conservative.benchmarks.studies import long_runs, step_ladder
 
 from ..charts import families, figures, spheres, vega_embed
 from ..charts.style import colours, families_of
@@ -21,6 +21,7 @@ from .scene_charts import SceneCharts
 NUMBERS = {
     "error": ("error", "Q", "attitude error, rad"),
     "microseconds": ("microseconds", "Q", "µs per simulated second"),
+    "sample": ("sample", "Q", f"µs a sample, of {step_ladder.SAMPLES}"),
     "dt": ("dt", "Q", "step, s"),
     "method": ("method", "N", "setting"),
     "t": ("t", "Q", "t, s"),
@@ -64,7 +65,7 @@ def first(summary: Summary, name: str, what: str) -> PageFigure:
     title = f"{what}: computing time against attitude error, the best of each family"
     words = " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(lines, "error", "time")])
     hidden = [line for line, _ in lines if line not in summary.shown]
-    shown = hover("setting", "error", "microseconds", *(["within"] if best["within"].any() else ["dt"]))
+    shown = hover("setting", "error", "microseconds", *(["within"] if best["within"].any() else ["sample", "dt"]))
     charts = tuple(vega_embed.embed(families.work_precision(points), shown, 310, hidden)) if len(points) else ()
     legend = tuple(_entry(line, members, line in summary.shown) for line, members in lines)
     return PageFigure(name, title, words, charts, legend, "families")

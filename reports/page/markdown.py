@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from conservative.benchmarks.studies import long_runs
+from conservative.benchmarks.studies import long_runs, step_ladder
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
@@ -46,6 +46,8 @@ def render(
         engine_pictures={name: draw(f"engines_{name}", chart) for name, chart in of_engines.items()},
         engine_terms=engine_tables.TERMS,
         class_terms=summary.TERMS,
+        sample_terms=summary.SAMPLE_TERMS,
+        samples=step_ladder.SAMPLES,
         caveat=summary.CAVEAT,
         hard_terms=hard_cases.TERMS,
         conserved=f"{CONSERVED:.0e}",

@@ -1,6 +1,6 @@
 """The page: one HTML file with everything in it, to be read by someone choosing an integrator.
 
-It opens from disk without a network: style, scripts, the Vega libraries and all data stand in the file.
+It opens from disk without a network: style, scripts, libraries and all data stand in the file.
 """
 
 from __future__ import annotations
@@ -8,21 +8,20 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from itertools import chain
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from conservative.benchmarks.studies import long_runs
+from conservative.benchmarks.studies import long_runs, step_ladder
 
 from ..charts import contrast, spheres
 from ..charts.vega_embed import PageFigure
 from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, tolerance
 from ..view import View
-from . import engines, many_bodies, paper, random_bodies
+from . import engines, libraries, many_bodies, paper, random_bodies
 from .figures import first, scene_figures
 from .scene_charts import SceneCharts
 
@@ -37,7 +36,7 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     engine_figures = engines.figures(view.engines, of_engines)
     random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
     many = many_bodies.chart(view.throughput)
-    many_figure = None if many is None else many_bodies.figure(many)
+    many_figure = many_bodies.figure(view.throughput, many) if view.throughput and many is not None else None
     first_figure, paper_figures = first(view.first, "first", view.about), paper.figures(view.paper)
     drawn = [first_figure, *chain.from_iterable(figures.values()), *engine_figures.values(), *paper_figures]
     alone = [figure for figure in (random_figure, many_figure) if figure is not None]
@@ -47,6 +46,8 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         paper=paper_figures,
         caveat=summary.CAVEAT,
         class_terms=summary.TERMS,
+        sample_terms=summary.SAMPLE_TERMS,
+        samples=step_ladder.SAMPLES,
         hard_terms=hard_cases.TERMS,
         random_figure=random_figure,
         many_figure=many_figure,
@@ -59,7 +60,7 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
         charts=_in_script(_charts([*drawn, *alone])),
-        vega=_vega(),
+        libraries=libraries.packed(),
         turn=spheres.TURN,
         tilt=spheres.TILT,
     )
@@ -73,16 +74,9 @@ def _template() -> Template:
 
 
 def _whole(text: str) -> Markup:
-    """Return a sentence in which no line ends within a number such as 1e-3, or between it and its unit."""
-    return Markup(re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text))))
-
-
-@lru_cache(maxsize=1)
-def _vega() -> str:
-    """Return Vega, Vega-Lite and Vega-Embed as one script."""
-    import vl_convert
-
-    return str(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")).replace("</script", "<\\/script")
+    """Return a sentence in which no line ends within a number such as 1e-3, or between it and its unit; `this` is code."""
+    whole = re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", whole))
 
 
 def _in_script(content: Any) -> str:

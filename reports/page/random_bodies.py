@@ -22,4 +22,4 @@ def figure(view: RandomView, picture: Any) -> PageFigure:
     title = "Random bodies: the cheapest engine's time over ours"
     band = "Line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster."
     summary = f"Bodies in each field: {view.bodies}. {band}"
-    return PageFigure(NAME, title, summary, tuple(vega_embed.embed(picture, (), 220)), ())
+    return PageFigure(NAME, title, summary, tuple(vega_embed.embed(picture, (), 220)), (), "pairs")

@@ -1,8 +1,8 @@
 """Work against precision for someone who chooses: the best of each family, and its single settings.
 
 A picture has these columns: `name` (of the family), `class` (see `classes`), `single` (whether a line is that of one setting),
-`line` (what to call that line), `setting` (of a point), `error` (rad), `time` (s per simulated second), `dt` (s), and `within`,
-on how many bodies the error is reached where there are several.
+`line` (what to call that line), `setting` (of a point), `error` (rad), `time` (s per simulated second), `sample` (s per sample,
+of a scene), `dt` (s), and `within`, on how many bodies the error is reached where there are several.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..labels import display_name
 from .classes import OF_ENGINES, MethodClass, with_classes
 from .work_precision import front
 
-COLUMNS = ("name", "family", "class", "single", "line", "setting", "error", "time", "dt", "within")
+COLUMNS = ("name", "family", "class", "single", "line", "setting", "error", "time", "sample", "dt", "within")
 AT_FIRST = 8
 """Lines that a picture shows at first."""
 SAME = 0.01

@@ -10,11 +10,8 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.deferred_imports import DEFAULT_METHOD
 
-from . import work_precision
-from .cells import DASH, Row, Table, factor, number, tolerance
-from .classes import OF_ENGINES, MethodClass, with_classes
+from .cells import Row, Table, number
 from .rows import of_measure, of_study
-from .work_precision import CheapestLine, Contest
 
 
 def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
@@ -111,36 +108,6 @@ def time(table: pd.DataFrame, scene: str) -> Table:
 def _times(row: pd.Series[float], unit: float) -> Row:
     steps = number(_value(row, Measure.TIME_PER_STEP) / unit, 3)
     return [steps, *(number(_value(row, measure) * scale, 3) for measure, scale, _ in _TIMES)]
-
-
-def contests(points: pd.DataFrame) -> Table:
-    """Return the cheapest of each class of ours and of the engines at each decade, and how many times as fast ours is.
-
-    `points` are those of one scene (see `work_precision.points`).
-    """
-    found = with_classes(points)
-    solution = found["class"] == MethodClass.SOLUTION
-    general = {contest.error: contest for contest in work_precision.contests(found[~solution])}
-    solutions = {c.error: c for c in work_precision.contests(found[solution | found["class"].isin(OF_ENGINES)]) if c.ours}
-    errors = sorted(general.keys() | solutions.keys(), reverse=True)
-    return _CONTESTS, [_contest(error, general.get(error), solutions.get(error)) for error in errors]
-
-
-_CONTESTS = (
-    *("error, rad", "cheapest general integrator of ours", "µs per s", "cheapest engine", "µs per s", "ours is faster, times"),
-    *("our solution of integrable motions", "µs per s", "it is faster, times"),
-)
-
-
-def _contest(error: float, general: Contest | None, solution: Contest | None) -> Row:
-    theirs = next((c.theirs for c in (general, solution) if c), None)
-    ours = _cost(general.ours if general else None)
-    ratios = [factor(c.ratio, 3) if c else DASH for c in (general, solution)]
-    return [tolerance(error), *ours, *_cost(theirs), ratios[0], *_cost(solution.ours if solution else None), ratios[1]]
-
-
-def _cost(cost: CheapestLine | None) -> tuple[str, str]:
-    return (cost.name, factor(cost.time * 1e6, 3)) if cost else ("none gets there", DASH)
 
 
 _ONCE = ((Measure.PREPARE, 1e3), (Measure.FIRST_CALL, 1e3), (Measure.TIME, 1e6))

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import sphere_curves
+from conservative.benchmarks.studies import sphere_curves, step_ladder
 from conservative.method import Method
 from conservative.scene import Scene
 
-from . import lines, orders, overview, scene, work_precision
+from . import each_step, lines, orders, overview, scene, scene_contests, work_precision
 from .cells import Table
 from .summary import Summary, of_scene
 
@@ -30,8 +30,8 @@ class SceneView:
     summary
         What is told first.
     points, drifts, errors, curves
-        Data of its charts: see `work_precision.points`, `lines.drifts`, `orders.errors`, named by `orders.with_slopes`, and
-        `lines.curves`.
+        Data of its charts: see `work_precision.points`, here with `sample`, s per sample, `lines.drifts`, `orders.errors`,
+        named by `orders.with_slopes`, and `lines.curves`.
     front, line_count
         What nothing beats among the points (see `work_precision.front`), and the number of their lines.
     thin_drifts
@@ -102,7 +102,9 @@ class SceneViews:
     def scene(self, value: Scene) -> SceneView:
         """Return the view of one scene."""
         name, table = value.name, self.table
-        points, drifts = _of(self.points, name), _of(self.drifts, name)
+        points, drifts, each = _of(self.points, name), _of(self.drifts, name), each_step.of_scene(table, name)
+        interval = value.t_end / step_ladder.SAMPLES
+        points = points.assign(sample=points["time"] * interval)
         fits, curves = _of(self.fits, name), _of(self.curves, name)
         return SceneView(
             name=name,
@@ -111,7 +113,7 @@ class SceneViews:
             dt=f"{value.dt:g}",
             free=value.free,
             integrable=value.integrable,
-            summary=of_scene(points, _of(self.long_drifts, name), _of(self.troubles, name), value.integrable),
+            summary=of_scene(points, _of(self.long_drifts, name), _of(self.troubles, name), value.integrable, each),
             points=points,
             front=work_precision.front(points),
             line_count=points["name"].nunique(),
@@ -121,7 +123,7 @@ class SceneViews:
             fit_ends=orders.fit_ends(orders.with_slopes(fits, fits)),
             curves=curves,
             without_curve=tuple(method.name for method in self.pictures if method.name not in set(curves["method"])),
-            contests=scene.contests(points),
+            contests=scene_contests.contests(points, interval, each),
             drift=scene.drift(table, name),
             conservation=overview.conservation(table, name),
             accuracy=scene.accuracy(table, name),

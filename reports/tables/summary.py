@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.drift_class import CONSERVED, SMALL
+from conservative.benchmarks.studies.each_step import ERROR
+from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Row, Table, factor, number, tolerance
 from .classes import OF_ENGINES, MethodClass, with_classes
+from .each_step import EachStep
 from .families import first_names, picture
 from .rows import without_outcome
 from .work_precision import cost
@@ -25,12 +28,22 @@ MIDDLE = ERRORS[1]
 FINE = tuple(10 ** (-quarter / 4) for quarter in range(4, 57))
 """Errors, rad, that are looked for at a given cost."""
 HEADER = ("class", "keeps", "error at equal cost", *(f"µs at {tolerance(error)} rad" for error in ERRORS), "where it fails")
+SCENE_HEADER = (*HEADER[:-1], "µs a sample, each step kept", HEADER[-1])
+"""Of a scene; random bodies have no study of samples at each step."""
 TERMS = (
     "µs of computing per simulated second at an attitude error, by the cheapest of the class; – where none was measured to get "
     f"there. Error at equal cost: at that at which the cheapest engine has {tolerance(MIDDLE)} rad. Kept over long runs (✓ "
     f"within {tolerance(CONSERVED)}, ≈ within {tolerance(SMALL)}, ✗ more; relative), by the setting that keeps it best."
 )
 """What the table says, in words."""
+SAMPLE_TERMS = (
+    f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution takes one step "
+    "from each to the next, however far: what it costs per simulated second depends on how many there are. Therefore the "
+    f"cost of a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a "
+    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one "
+    "that keeps the end alone, where a solver need not stop at each."
+)
+"""What a sample is, and what it costs."""
 CAVEAT = (
     "MuJoCo and Pinocchio are general engines: they pay for contacts and joints that no motion here uses, Pinocchio and SciPy "
     "also for a loop in Python. This says what a rotation costs in them, and does not rank them."
@@ -67,11 +80,27 @@ class Cheapest:
     time: float
 
 
-def of_scene(points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame, integrable: bool) -> Summary:
-    """Return the summary of a scene, from its points, its drifts over long runs and where its methods fail (see `overview`)."""
+def of_scene(
+    points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame, integrable: bool, each: EachStep | None = None
+) -> Summary:
+    """Return the summary of a scene: its points, drifts over long runs, failures (see `overview`), samples at each step."""
     found, data = with_classes(points), picture(points)
-    rows = [_row(kind, found, drifts, troubles) for kind in MethodClass]
-    return Summary(_sentence(found, integrable), data, first_names(data), (HEADER, rows))
+    rows = [_with_sample(_row(kind, found, drifts, troubles), kind, each) for kind in MethodClass]
+    return Summary(_sentence(found, integrable), data, first_names(data), (SCENE_HEADER, rows))
+
+
+def _with_sample(row: Row, kind: MethodClass, each: EachStep | None) -> Row:
+    return [*row[:-1], _sample(kind, each) if each else DASH, row[-1]]
+
+
+def _sample(kind: MethodClass, each: EachStep) -> str:
+    """Return what a sample costs in a class where all are kept, by whom, and where the end alone is kept."""
+    kept, alone = (cheapest(points, (kind,), ERROR) if len(points) else None for points in (each.kept, each.alone))
+    if kept is None or alone is None:
+        return DASH
+    other = "" if alone.name == kept.name else f" {alone.name}"
+    costs = [microseconds(found.time * each.interval) for found in (kept, alone)]
+    return f"{costs[0]} {kept.name}; the end alone: {costs[1]}{other}"
 
 
 def cheapest(points: pd.DataFrame, classes: tuple[str, ...], error: float) -> Cheapest | None:

@@ -12,7 +12,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN
 from conservative.outcome import OutcomeKind
 
-from .cells import DASH, Cell, Grade, Table, number
+from .cells import DASH, Cell, Grade, Table, number, tolerance
 from .random_ratios import ratio_text
 from .throughput_lines import Contest, Line, contests, lines
 
@@ -76,13 +76,13 @@ def _contest_row(contest: Contest) -> list[str | Cell]:
     times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
     names = [each.label if each else "no time" for each in (ours, theirs)]
     kind, of_ours = contest.kind.replace("_", " "), "closed forms" if contest.exact else "integrators"
-    return [kind, of_ours, contest.engine, f"{contest.error:.0e}", contest.which, f"{contest.size:,}", graded, *times, *names]
+    return [kind, of_ours, contest.engine, tolerance(contest.error), contest.which, f"{contest.size:,}", graded, *times, *names]
 
 
 def cost_table(found: Iterable[Line]) -> Table:
     """Return every line: body-steps per second at best, the least preparation, and the time among most bodies at each error."""
     header = ["bodies", "method", "class", "10^6 body-steps/s, best", "preparation, µs a body, least"]
-    return [*header, *(f"µs a body and second at {error:.0e} rad (number)" for error in ERRORS)], [
+    return [*header, *(f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS)], [
         _cost_row(line) for line in found
     ]
 
@@ -124,7 +124,7 @@ def statements(compared: Iterable[Contest]) -> Iterator[str]:
 
 
 def _words(contest: Contest) -> str:
-    at = f"at {contest.error:.0e} rad"
+    at = f"at {tolerance(contest.error)} rad"
     if not contest.ours or not contest.theirs:
         missing = [name for name, side in (("ours", contest.ours), (contest.engine, contest.theirs)) if not side]
         return f"{at} there is no time of {' and '.join(missing)}"

@@ -23,7 +23,6 @@ from .rows import of_study, with_outcome
 _NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
 DECADES = tuple(10.0**-k for k in range(1, 14))
 _KEYS = ["scene", "series", "method", *_NAMES, "role", "dt"]
-_VALUES = {Measure.ATTITUDE_MAX.text: "error", Measure.TIME.text: "time"}
 
 
 @dataclass(frozen=True)
@@ -57,17 +56,19 @@ class Contest:
         return self.theirs is not None and (self.ours is None or self.ratio < 1)
 
 
-def points(table: pd.DataFrame, study: str = "work_precision") -> pd.DataFrame:
+def points(table: pd.DataFrame, study: str = "work_precision", time: Measure = Measure.TIME) -> pd.DataFrame:
     """Return the measured points of the work-precision study, or of another one with errors and times over steps.
 
     Columns scene, series, name (what to call its line), method, family, version, setting (of the line), role, dt, error (rad),
-    time (s per simulated second); of each line coarse to fine. An error below what the truth is known to is raised to that.
+    time (s per simulated second, by the measure `time`); of each line coarse to fine. An error below what the truth is known
+    to is raised to that.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)
-    rows = rows[rows["measure"].isin(list(_VALUES))]
+    values = {Measure.ATTITUDE_MAX.text: "error", time.text: "time"}
+    rows = rows[rows["measure"].isin(list(values))]
     wide = rows.pivot_table(index=_KEYS, columns="measure", values="value").reset_index()
     wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys
-    wide = wide.reindex(columns=[*_KEYS, *_VALUES]).rename(columns=_VALUES)
+    wide = wide.reindex(columns=[*_KEYS, *values]).rename(columns=values)
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
     return _name_lines(wide.dropna(subset=["error", "time"]).reset_index(drop=True))
 

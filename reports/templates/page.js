@@ -1,5 +1,13 @@
 "use strict";
-(() => {
+(async () => {
+  // The libraries are compressed modules.
+  const unpack = async (id) => {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0));
+    const script = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+    return (await import(URL.createObjectURL(new Blob([script], { type: "text/javascript" })))).default;
+  };
+  const [vegaEmbed, DataTable] = await Promise.all(["vega", "datatables"].map(unpack));
+
   const content = JSON.parse(document.getElementById("charts").textContent);
   const night = matchMedia("(prefers-color-scheme: dark)");
   const figures = [...document.querySelectorAll("[data-figure]")];
@@ -9,7 +17,7 @@
   // The colours of a chart on the page as it is now: those too close to the paper have a stand-in.
   const look = (ink, grid) => ({
     background: null, font: "system-ui, sans-serif", padding: 4,
-    axis: { labelColor: ink, titleColor: ink, gridColor: grid, domainColor: grid, tickColor: grid, labelFontSize: 12, titleFontSize: 12, titleFontWeight: "normal" },
+    axis: { labelColor: ink, titleColor: ink, gridColor: grid, domainColor: grid, tickColor: grid, labelSeparation: 6, labelFontSize: 12, titleFontSize: 12, titleFontWeight: "normal" },
     title: { color: ink, subtitleColor: ink, anchor: "start", fontSize: 13 }, view: { stroke: null },
   });
   const shade = (colour, dark) => content.colours[dark ? "dark" : "light"][colour.toUpperCase()] ?? colour;
@@ -63,36 +71,24 @@
     }
   }
 
-  // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol.
-  const number = (text) => parseFloat(text.replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
-  const key = (row, column) => row.cells[column].textContent.trim();
-  function sort(table, column) {
-    const head = table.tHead.rows[0].cells[column];
-    const down = head.ariaSort === "ascending";
-    const rows = [...table.tBodies[0].rows];
-    const filled = rows.filter((row) => !/^–|^$/.test(key(row, column)));
-    const numeric = filled.every((row) => !Number.isNaN(number(key(row, column))));
-    const compare = numeric
-      ? (a, b) => number(key(a, column)) - number(key(b, column))
-      : (a, b) => key(a, column).localeCompare(key(b, column), "en", { numeric: true });
-    filled.sort((a, b) => (down ? -compare(a, b) : compare(a, b)));
-    table.tBodies[0].append(...filled, ...rows.filter((row) => !filled.includes(row)));
-    [...table.tHead.rows[0].cells].forEach((cell) => { cell.ariaSort = "none"; });
-    head.ariaSort = down ? "descending" : "ascending";
-  }
-  for (const table of document.querySelectorAll("table.sortable")) {
-    [...table.tHead.rows[0].cells].forEach((cell, k) => cell.querySelector("button").addEventListener("click", () => sort(table, k)));
-  }
+  // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol; dashes stay last.
+  const number = (cell) => parseFloat(cell.replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
+  const empty = (cell) => /^–|^$/.test(cell.trim());
+  const kind = (name, detect, value, compare) => {
+    const placed = (way) => (a, b) => empty(a) - empty(b) || way * compare(value(a), value(b));
+    DataTable.type(name, { detect, order: { asc: placed(1), desc: placed(-1) } });
+  };
+  kind("text", () => true, String, new Intl.Collator("en", { numeric: true }).compare);
+  kind("measured", (cell) => empty(cell) || !Number.isNaN(number(cell)), number, (a, b) => a - b);
 
-  // A filter keeps the rows of its table that have all of its words.
-  for (const part of document.querySelectorAll(".filter")) {
-    const rows = [...part.nextElementSibling.querySelectorAll("tbody tr")];
-    const keep = () => {
-      const words = part.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean);
-      rows.forEach((row) => { row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word)); });
-      part.querySelector("output").textContent = words.length ? `${rows.filter((row) => !row.hidden).length} of ${rows.length}` : "";
-    };
-    part.querySelector("input").addEventListener("input", keep);
+  for (const table of document.querySelectorAll("table.sortable")) {
+    const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
+    const rows = new DataTable(table, { autoWidth: false, paging: false, order: [], layout });
+    const filter = table.closest(".scroll").previousElementSibling?.closest(".filter");
+    filter?.querySelector("input").addEventListener("input", ({ target }) => {
+      const { recordsDisplay: left, recordsTotal: all } = rows.search(target.value).draw().page.info();
+      filter.querySelector("output").textContent = target.value.trim() ? `${left} of ${all}` : "";
+    });
   }
 
   // What a cell of the grid of hard cases says, told below it.

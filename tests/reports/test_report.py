@@ -82,7 +82,7 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     stored = json.loads((folder / "measurements.json").read_text())
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
-    assert {"paper", "convergence", "speed", "work_precision", "long_runs", "import_time"} == set(table["study"])
+    assert {"paper", "convergence", "speed", "work_precision", "each_step", "long_runs", "import_time"} == set(table["study"])
     assert stored["schema"] == document.SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]

@@ -61,13 +61,13 @@ def test_contests_are_among_the_most_bodies_of_both_sides(compared):
 def test_a_peer_that_wins_is_said_to(compared):
     assert compared["heavy_tops", "heyoka", False, 1e-6, "median"].ratio == pytest.approx(0.5)
     (said,) = [text for text in throughput.statements(compared.values()) if "against heyoka" in text and "tops" in text]
-    assert "at 1e-03 rad heyoka takes 4.00 times as long (among 10)" in said
-    assert "at 1e-06 rad heyoka is 2.00 times as fast as ours (among 10)" in said
+    assert "at 1e-3 rad heyoka takes 4.00 times as long (among 10)" in said
+    assert "at 1e-6 rad heyoka is 2.00 times as fast as ours (among 10)" in said
 
 
 def test_what_does_not_get_there_is_no_ratio(compared):
     (said,) = [text for text in throughput.statements(compared.values()) if "against mujoco" in text]
-    assert "at 1e-06 rad there is no time of mujoco" in said
+    assert "at 1e-6 rad there is no time of mujoco" in said
     assert compared["heavy_tops", "mujoco", False, 1e-3, "95 %"].theirs is None
 
 

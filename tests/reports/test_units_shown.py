@@ -1,5 +1,6 @@
 """Costs, drifts and times in tables are in the unit of their header, and the right way up."""
 
+from itertools import chain
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import conservative as cv
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import OK
 from conservative.reports.run import single_run
-from conservative.reports.tables import recommendation, runs, scene
+from conservative.reports.tables import recommendation, runs, scene_contests
 from conservative.reports.tables.work_precision import points
 from conservative.trajectory import Trajectory
 
@@ -18,9 +19,10 @@ from .rows import frame, point, row
 
 def test_contests_are_in_microseconds():
     lines = [*point("gauss", "ours", 1e-3, 2e-6), *point("scipy", "engine", 1e-3, 8e-6), *point("lame", "ours", 1e-3, 1e-6)]
-    header, (_, _, line) = scene.contests(points(frame(lines)))
-    assert [name for name in header if "µs" in name] == ["µs per s"] * 3
-    assert line == ["1e-3", "gauss", "2.00", "scipy", "8.00", "4.00", "lame", "1.00", "8.00"]
+    header, (_, _, line) = scene_contests.contests(points(frame(lines)), 0.5)
+    assert [name for name in header if "µs" in name] == ["µs per s", "µs a sample"] * 3
+    sides = (["gauss", "2.00", "1.00"], ["scipy", "8.00", "4.00"], ["4.00"], ["lame", "1.00", "0.500"], ["8.00"])
+    assert line == ["1e-3", *chain.from_iterable(sides)]
 
 
 def advice(reached):

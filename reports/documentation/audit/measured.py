@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.metadata import entry_points
 from itertools import takewhile
 
@@ -16,6 +16,7 @@ import pandas as pd
 from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
 
+from ...tables.cells import tolerance
 from ...tables.random_contests import ANY, Contest
 from ...tables.random_ratios import MILESTONES
 from .. import readme_table
@@ -41,30 +42,30 @@ def run_of(evidence: Evidence, scene: str) -> Values:
 
 
 def ratios(evidence: Evidence, over: str, of: Sequence[str], scenes: Sequence[str] = ()) -> Values:
-    """Return the least and the largest time of some groups over that of another, `low` and `high`, where both get to an error.
+    """Return the least and the largest time of some columns of README's table over another's, `low` and `high`.
 
-    Groups are those of README's table, engines without their version; the errors are its errors.
+    That is at the errors of the table, where both get there; engines are named without their version.
     """
-    found = {
-        name.partition(" ")[0] if name not in _OURS else name: g for name, g in readme_table.groups(evidence.points).items()
-    }
-    here = scenes or evidence.points["scene"].unique()
-    every = [
-        _cost(found, name, scene, e) / _cost(found, over, scene, e)
-        for name in of
-        for scene in here
-        for e in readme_table.ERRORS
-    ]
+    every = [_ratio(members, name, over, error) for members, error in _entries(evidence, scenes) for name in of]
     return _range([ratio for ratio in every if 0 < ratio < math.inf])
 
 
-_OURS = (readme_table.OURS, readme_table.EXACT)
+def _entries(evidence: Evidence, scenes: Sequence[str]) -> Iterator[tuple[dict[str, pd.DataFrame], float]]:
+    """Yield the points of each column at each error; on some scenes, or on all."""
+    labels = [tolerance(error) for error in readme_table.ERRORS]
+    for scene, label, members, error in readme_table.entries(evidence.rows):
+        if label in labels and (not scenes or scene in scenes):
+            yield {_unversioned(name): points for name, points in members.items()}, error
 
 
-def _cost(groups: Mapping[str, pd.DataFrame], name: str, scene: str, error: float) -> float:
-    if name not in groups:
-        raise NoSupportError(f"the rows have no group {name!r}, but {', '.join(groups)}")
-    return readme_table.cheapest(groups[name][groups[name]["scene"] == scene], error)[0]
+def _unversioned(column: str) -> str:
+    return column if column in list(readme_table.APART) else column.partition(" ")[0]
+
+
+def _ratio(members: dict[str, pd.DataFrame], of: str, over: str, error: float) -> float:
+    if of not in members or over not in members:
+        return math.nan
+    return readme_table.cheapest(members[of], error)[0] / readme_table.cheapest(members[over], error)[0]
 
 
 def _range(values: Iterable[float]) -> Values:

@@ -43,7 +43,7 @@ def audit(text: str, evidence: Evidence, claims: str) -> list[str]:
 
 
 def _tables(evidence: Evidence) -> Mapping[str, Iterable[Any]]:
-    return {"costs": readme_table.rows(evidence.points), "random bodies": readme_table.random_bodies(evidence.contests)}
+    return {"costs": readme_table.rows(evidence.rows), "random bodies": readme_table.random_bodies(evidence.contests)}
 
 
 def _within(number: Number, page: Page, part: str) -> bool:

@@ -7,7 +7,6 @@ of the rows that stay, have to be those made of all.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import product
 
 import pandas as pd
 
@@ -16,10 +15,10 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.errors import BadInput
 
 from ...labels import with_names
+from ...tables import each_step
 from ...tables.random_contests import ANY, contests
 from ...tables.random_ratios import MILESTONES
-from ...tables.work_precision import points
-from ..readme_table import ERRORS, cheapest, groups, random_bodies, rows
+from ..readme_table import cheapest, entries, random_bodies, rows
 
 Lines = set[tuple[str, str]]
 """Scene and series of lines."""
@@ -33,30 +32,19 @@ def of_costs(table: pd.DataFrame) -> pd.DataFrame:
     BadInput
         They do not give the table that the whole report gives.
     """
-    compared = (table["study"] == "work_precision") & _among(table, set(_cheapest_lines(points(with_names(table)))))
+    compared = table["study"].isin(("work_precision", each_step.STUDY)) & _among(table, set(_lines(with_names(table))))
     drifts = (table["study"] == "paper") & (table["measure"] == Measure.DRIFT_MAX.text) & (table["quantity"] == "energy")
     truths = (table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)
-    return _checked(table, compared | drifts | truths, lambda some: list(rows(points(with_names(some)))))
+    return _checked(table, compared | drifts | truths, lambda some: list(rows(with_names(some))))
 
 
-def _cheapest_lines(found: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    """Yield the cheapest line of each group at each error, and of each group one in any case."""
-    for members in groups(found).values():
-        yield from _line(members)
-        for scene, error in product(members["scene"].unique(), ERRORS):
-            here = members[members["scene"] == scene]
-            yield from _line(here[here["name"] == cheapest_name(here, error)])
-
-
-def cheapest_name(members: pd.DataFrame, error: float) -> str:
-    """Return the name of the cheapest line of some points at an error, rad; "" where none gets there."""
-    costs = {str(name): cheapest(line, error)[0] for name, line in members.groupby("name", sort=False)}
-    name = min(costs, key=lambda each: costs[each], default="")
-    return name if name and costs[name] < float("inf") else ""
-
-
-def _line(members: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    return members[["scene", "series"]].head(1).itertuples(index=False, name=None)
+def _lines(table: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Yield the cheapest line of each cell; where none gets there one in any case, so that the column stays."""
+    for scene, _, columns, error in entries(table):
+        for members in columns.values():
+            names = members["name"].unique()
+            best = min(names, key=lambda name: cheapest(members[members["name"] == name], error)[0])
+            yield scene, str(members["series"][members["name"] == best].iloc[0])
 
 
 def of_random_bodies(table: pd.DataFrame) -> pd.DataFrame:

@@ -26,7 +26,6 @@ from conservative import files, references
 from ...labels import with_names
 from ...run.provenance import COMPARED
 from ...tables.random_contests import Contest, contests
-from ...tables.work_precision import points
 from .. import readme_table
 from . import extract
 
@@ -48,11 +47,6 @@ class Evidence:
     def rows(self) -> pd.DataFrame:
         """The rows of the report, with names (see `labels.with_names`)."""
         return with_names(readme_table.read(self.folder / COSTS))
-
-    @cached_property
-    def points(self) -> pd.DataFrame:
-        """Its points, see `work_precision.points`."""
-        return points(self.rows)
 
     @cached_property
     def random(self) -> pd.DataFrame:

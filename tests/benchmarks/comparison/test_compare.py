@@ -162,6 +162,11 @@ def test_a_scene_that_a_version_cannot_do_is_skipped():
     assert (each.row.status, each.reason) == (Status.SKIPPED, "for tops only")
 
 
+def test_a_field_that_turns_is_told_from_another_one():
+    orbits = [Place.of(name).definition for name in ("stable_satellite", "unstable_satellite")]
+    assert orbits[0] != orbits[1]
+
+
 def test_an_unknown_scene_is_refused():
     with pytest.raises(BadInput, match="scene: got 'nowhere'"):
         Place.of("nowhere")

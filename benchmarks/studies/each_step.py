@@ -1,0 +1,104 @@
+"""The study of samples at each of a scene's own steps: what a method takes that keeps them all within an error.
+
+`work_precision` reads a dozen samples, and one step leads from one to the next where a solution or a high order allows that.
+Who wants the motion at short intervals pays for each: a method with a step takes one or more to an interval, one with a
+tolerance evaluates between its own steps, which can be longer.
+
+* A method is taken at the coarsest of its settings whose largest attitude error, over all samples, is at most `ERROR`: so many
+  steps to an interval, or a tolerance. One that gets there at none has errors and no time.
+* It is timed twice, interleaved with all others: with all samples kept, attitude matrices and rates as a run returns them,
+  which for an engine includes the conversion from its own state; and with the end alone kept, as all other studies do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator
+from dataclasses import replace
+
+from conservative.attitude import angle_between
+from conservative.method import Grid, Method, grid_for
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..measures.measure import Measure, Value, blanks
+from ..measures.measurement import Measurement
+from ..measures.timing import time_interleaved
+from .case import Case, Failure, Success
+from .convergence import attempt_each
+from .selection import at_tolerance, tolerance_setting
+from .speed import CALL, Extend, TimedRun, keep_end, lengthen
+from .study import Progress, Study
+from .time_limit import attempt_here
+from .work_precision import ROUNDS, one_of_each_series
+
+ERROR = 1e-6
+"""Largest attitude error, rad, of a method that is timed."""
+STEPS = (1, 2, 4, 8)
+"""Steps to an interval."""
+TOLERANCES = tuple(10.0**-k for k in range(4, 13))
+
+
+def keep_each(grid: Grid, times: int = 1) -> Grid:
+    """Return a grid of `times` as many steps with a sample as often as before."""
+    return Grid(grid.dt, grid.n_steps * times, grid.every)
+
+
+KEPT: dict[Measure, Extend] = {Measure.TIME_SAMPLED: keep_each, Measure.TIME: keep_end}
+"""What is timed, and the grid of its runs: that of a case, with so many times as many steps."""
+
+
+def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
+    """Yield the errors of every method up to the setting that gets to `ERROR`, and both times of that."""
+    methods = one_of_each_series(study)
+    pieces = len(methods) + 1
+    for i, scene in enumerate(study.scenes):
+        truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
+        chosen: list[Case] = []
+        for j, method in enumerate(methods):
+            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+            chosen += yield from coarsest(study, cases(study, scene, method), truth)
+        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(chosen)} methods")
+        yield from time_rows(study, chosen)
+
+
+def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
+    """Return the settings of a method, coarse to fine; the one whose row says so of a method that cannot do the scene."""
+    setting, grid = tolerance_setting(method), grid_for(scene, scene.dt)
+    if method.unsupported(scene) or (setting is None and method.order is None):
+        return [Case(study.name, scene, method, grid)]
+    if setting is None:
+        return [Case(study.name, scene, method, Grid(grid.dt / k, grid.n_steps * k, k)) for k in STEPS]
+    return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in TOLERANCES]
+
+
+def coarsest(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
+    """Yield the errors of a method's settings; return the first that gets to `ERROR`, alone in a list, or none."""
+    for case, outcome in attempt_each(study, settings):
+        if isinstance(outcome, Failure):
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)
+            continue
+        error = float(angle_between(truth.R_WB, outcome.trajectory.R_WB).max())
+        yield case.row(Value(Measure.ATTITUDE_MAX, error))
+        if error <= ERROR:
+            return [case]
+    return []
+
+
+def time_rows(study: Study, chosen: list[Case]) -> Iterator[Measurement]:
+    """Yield both times of each case, s per simulated second, all in interleaved rounds."""
+    ready: dict[tuple[Case, Measure], TimedRun] = {}
+    for case in chosen:
+        for measure, keep in KEPT.items():
+            short = replace(case, grid=keep(case.grid, 1))
+            outcome = attempt_here(study.hang_limit, short)
+            if isinstance(outcome, Success):
+                ready[case, measure] = TimedRun(*lengthen(short, outcome, study.hang_limit, keep), outcome)
+            else:
+                yield from case.blanks(blanks(measure), outcome.outcome)
+    runs = {str(i): timed.done.run for i, timed in enumerate(ready.values())}
+    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
+    for i, ((case, measure), timed) in enumerate(ready.items()):
+        timing = timings[str(i)]
+        detail = str(timing) if timing.outcome.ok else ""
+        yield case.row(Value(measure, timing.minimum / timed.simulated), timing.outcome, detail)

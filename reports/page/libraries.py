@@ -1,0 +1,33 @@
+"""The JavaScript libraries of the page, as it carries them: compressed, for the browser to unpack.
+
+Vega, Vega-Lite and Vega-Embed draw the charts, DataTables sorts and filters the tables.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from functools import lru_cache
+from pathlib import Path
+
+
+@lru_cache(maxsize=1)
+def packed() -> dict[str, str]:
+    """Return each library by its name: a JavaScript module, by gzip, in base64, which takes 45 % of its length."""
+    return {"vega": _pack(_vega()), "datatables": _pack(_datatables())}
+
+
+def _pack(script: str) -> str:
+    return base64.b64encode(gzip.compress(script.encode(), mtime=0)).decode()
+
+
+def _vega() -> str:
+    import vl_convert
+
+    return str(vl_convert.javascript_bundle("export default vegaEmbed;"))
+
+
+def _datatables() -> str:
+    import itables.options
+
+    return Path(itables.options.dt_bundle).read_text(encoding="utf-8")
