@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -28,27 +29,24 @@ def audit(text: str, evidence: Evidence, claims: str) -> list[str]:
     """Return what README says without support, a line each; `claims` is the text of claims.toml."""
     page, entries = Page("README.md", text), tomllib.loads(claims)
     allowed = [_literal(entry["text"]) for entry in entries["allowed"]]
-    sentences = [_claim(entry, evidence) for entry in entries["claim"]]
-    tables = {name: "\n".join(readme_table.markdown(lines)) for name, lines in _tables(evidence).items()}
-    covered = {number for number in page.numbers if any(_within(number, page, table) for table in tables.values())}
-    return [
-        *(
-            f"README.md: the table of {name} is not what the evidence gives"
-            for name, table in tables.items()
-            if table not in text
-        ),
-        *judge(page, [*sentences, *allowed], covered),
-        *_stale(page, [*sentences, *allowed]),
-    ]
+    sentences = [*(_claim(entry, evidence) for entry in entries["claim"]), *allowed]
+    wrong, covered = _compare_tables(page, evidence)
+    return [*wrong, *judge(page, sentences, covered), *_stale(page, sentences)]
 
 
-def _tables(evidence: Evidence) -> Mapping[str, Iterable[Any]]:
-    return {"costs": readme_table.rows(evidence.rows), "random bodies": readme_table.random_bodies(evidence.contests)}
-
-
-def _within(number: Number, page: Page, part: str) -> bool:
-    start = page.text.find(part)
-    return start >= 0 and start <= number.start < start + len(part)
+def _compare_tables(page: Page, evidence: Evidence) -> tuple[list[str], set[Number]]:
+    """Return what the generated tables on the page say otherwise than the evidence, and all numbers in them."""
+    wrong: list[str] = []
+    covered: set[Number] = set()
+    for lines in (readme_table.rows(evidence.rows), readme_table.random_bodies(evidence.contests)):
+        given = readme_table.markdown(lines)
+        first = page.text.find(given[0].partition(" | ")[0] + " | ")
+        there = page.text[first:].partition("\n\n")[0].splitlines() if first >= 0 else []
+        line = page.text.count("\n", 0, max(first, 0)) + 1
+        pairs = enumerate(zip_longest(there, given, fillvalue="(no row)"), start=line)
+        wrong += [f"{page.name}:{at}: {one}: the evidence gives {other}" for at, (one, other) in pairs if one != other]
+        covered |= {number for number in page.numbers if first <= number.start < first + sum(len(row) + 1 for row in there)}
+    return wrong, covered
 
 
 def _claim(entry: Mapping[str, Any], evidence: Evidence) -> Sentence:

@@ -42,9 +42,12 @@ def _lines(table: pd.DataFrame) -> Iterator[tuple[str, str]]:
     """Yield the cheapest line of each cell; where none gets there one in any case, so that the column stays."""
     for scene, _, columns, error in entries(table):
         for members in columns.values():
-            names = members["name"].unique()
-            best = min(names, key=lambda name: cheapest(members[members["name"] == name], error)[0])
-            yield scene, str(members["series"][members["name"] == best].iloc[0])
+            lines = [points for _, points in members.groupby("name", sort=False)]
+            yield from ((scene, str(best["series"].iloc[0])) for best in _cheapest(lines, error))
+
+
+def _cheapest(lines: list[pd.DataFrame], error: float) -> list[pd.DataFrame]:
+    return sorted(lines, key=lambda line: cheapest(line, error)[0])[:1]
 
 
 def of_random_bodies(table: pd.DataFrame) -> pd.DataFrame:
