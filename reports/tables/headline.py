@@ -12,6 +12,7 @@ from .cells import factor, tolerance
 from .classes import OF_ENGINES, MethodClass, with_classes
 from .random_contests import ANY
 from .random_contests import Contest as RandomContest
+from .random_ratios import count_bodies
 from .work_precision import Contest, contests
 
 
@@ -44,7 +45,7 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     lost = [(1 / pair.ratio, contest.error) for contest in members for pair in contest.both if pair.ratio < 1]
     alone = sum(contest.only_engine for contest in members)
     if not (lost or alone):
-        return Statement(where, f"no engine is faster on any of {len(members[0].pairs)} bodies, at any decade.")
+        return Statement(where, f"no engine is faster on any of {count_bodies(len(members[0].pairs))}, at any decade.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
     slower = f"an engine is faster in {len(lost)} of {total} cases, by up to {factor(most)} times, at {tolerance(error)} rad"

@@ -99,7 +99,7 @@ def of_random_bodies(rows: Rows) -> Tellers:
         if not both or not math.isclose(error, MIDDLE):
             raise NoSupportError("no random body is about it")
         mean = float(np.exp(np.mean(np.log([pair.ratio for pair in both]))))
-        return {"bodies": len(both), "won": mean, "lost": 1 / mean}
+        return {"bodies": _count(len(both), "random body", "random bodies"), "won": mean, "lost": 1 / mean}
 
     def single() -> Values:
         both, every = pairs()
@@ -110,7 +110,7 @@ def of_random_bodies(rows: Rows) -> Tellers:
             **{"lost": len(lost), "most": max(lost, default=0.0), "more": every - len(both)},
         }
 
-    where, rest = "On {bodies} random bodies in fields, not integrable,", "(geometric mean;"
+    where, rest = "On {bodies:text} in fields, not integrable,", "(geometric mean;"
     ours, engine = "our cheapest general integrator", "the cheapest engine"
     yield f"{where} {ours} gets to {{error:given}} rad {{won}} times as fast as {engine} {rest}", verdict
     yield f"{where} {engine} gets to {{error:given}} rad {{lost}} times as fast as {ours} {rest}", verdict
@@ -127,28 +127,32 @@ def of_field(rows: Rows, field: str) -> Tellers:
         single = [(1 / pair.ratio, contest.error) for contest in found for pair in contest.both if pair.ratio < 1]
         most, error = max(single, default=(0.0, 1.0))
         counts = {"lost": len(single), "cases": sum(len(c.pairs) for c in found), "alone": sum(c.only_engine for c in found)}
-        return {**counts, "most": most, "error": tolerance(error), "bodies": len(found[0].pairs)}
+        return {**counts, "most": most, "error": tolerance(error), "bodies": _count(len(found[0].pairs), "body", "bodies")}
 
     def means() -> Values:
         found = [contest for contest in rows.field(field) if contest.both]
         by_mean = sorted(found, key=_mean)
         worst = min(found, key=lambda contest: contest.both[0].ratio)
         return {
-            "bodies": len(worst.pairs),
+            "bodies": _count(len(worst.pairs), "body", "bodies"),
             **{"low": _mean(by_mean[0]), "at_low": tolerance(by_mean[0].error)},
             **{"high": _mean(by_mean[-1]), "at_high": tolerance(by_mean[-1].error)},
             **{"worst": worst.both[0].ratio, "at_worst": tolerance(worst.error), "body": worst.both[0].scene},
         }
 
-    yield "no engine is faster on any of {bodies} bodies, at any decade.", lost
+    yield "no engine is faster on any of {bodies:text}, at any decade.", lost
     yield "an engine is faster in {lost} of {cases} cases, by up to {most} times, at {error:text} rad", lost
     yield "only an engine gets there in {alone} of {cases} cases", lost
     yield "Only an engine reaches the error in {alone} of {cases} cases.", lost
     yield (
-        "over {bodies} bodies the cheapest engine takes, in the geometric mean, {low} (at {at_low:text} rad) to {high} "
+        "over {bodies:text} the cheapest engine takes, in the geometric mean, {low} (at {at_low:text} rad) to {high} "
         "(at {at_high:text} rad) times as long as ours; on the worst body {worst} times (at {at_worst:text} rad, {body:text}).",
         means,
     )
+
+
+def _count(number: int, one: str, several: str) -> str:
+    return f"one {one}" if number == 1 else f"{number} {several}"
 
 
 def _mean(contest: Contest) -> float:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from conservative.benchmarks.measures.drift_class import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import ensembles, long_runs, random, throughput_extent
+from conservative.benchmarks.studies import each_step, ensembles, long_runs, random, step_ladder, throughput_extent
 from conservative.outcome import OutcomeKind
 from conservative.scene import Scene
 from conservative.scenes.random_body import CONDITION
@@ -44,6 +44,9 @@ CONSTANTS: tuple[tuple[str, Values], ...] = (
     ("of condition {low} to {high}, in a turned frame", dict(zip(("low", "high"), CONDITION, strict=True))),
     ("The error is the largest of {samples} instants", {"samples": random.SAMPLES}),
     ("its largest attitude error at {samples} instants", {"samples": throughput_extent.SAMPLES}),
+    ("errors are read at: {samples} in the duration of a scene", {"samples": step_ladder.SAMPLES}),
+    ("A sample is one of {samples} in the duration", {"samples": step_ladder.SAMPLES}),
+    ("is one, at {error:text} rad over all of them", {"error": tolerance(each_step.ERROR)}),
     ("or the {most:text}th percentile", {"most": throughput_extent.MOST.removesuffix(" %")}),
     ("Each runs for {duration} s of its motion", {"duration": ensembles.DURATION}),
     ("they take steps of {step} s", {"step": ensembles.DURATION / throughput_extent.EXACT_STEPS}),
