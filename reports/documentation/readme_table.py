@@ -13,6 +13,7 @@ import argparse
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -43,23 +44,33 @@ def columns(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {**ours, **theirs}
 
 
-def rows(table: pd.DataFrame) -> Iterator[list[str]]:
+class Entry(NamedTuple):
+    """A row of the table: scene, what is compared, the points of each column, and the error, rad."""
+
+    scene: str
+    label: str
+    columns: dict[str, pd.DataFrame]
+    error: float
+
+
+def rows(found: Iterable[Entry]) -> Iterator[list[str]]:
     """Yield the header, and rows for each scene: the cheapest is bold, and a dash says that no point gets there."""
-    header = list(columns(points(table)))
+    every = list(found)
+    header = list(dict.fromkeys(name for entry in every for name in entry.columns))
     yield ["scene", "error, rad", *header]
-    for scene, label, members, error in entries(table):
+    for scene, label, members, error in every:
         costs = [cheapest(members[name], error) if name in members else (math.inf, "") for name in header]
         yield [scene, label, *cells(costs)]
 
 
-def entries(table: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, pd.DataFrame], float]]:
-    """Yield scene, what is compared, the points of each column, and the error, rad, of each row of the table."""
+def entries(table: pd.DataFrame) -> Iterator[Entry]:
+    """Yield the rows of the table, from named measurements (see `labels.with_names`)."""
     found = points(table)
     for scene in found["scene"].unique():
         here, each = found[found["scene"] == scene], each_step.of_scene(table, str(scene))
         lines = [(tolerance(error), here, error) for error in ERRORS]
         lines += [(label, kept, ERROR) for label, kept in zip(each.labels, (each.kept, each.alone), strict=True) if len(kept)]
-        yield from ((str(scene), label, columns(members), error) for label, members, error in lines)
+        yield from (Entry(str(scene), label, columns(members), error) for label, members, error in lines)
 
 
 def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
@@ -130,7 +141,7 @@ def main() -> None:
     parser.add_argument("--random", action="store_true", help="the table of random bodies")
     options = parser.parse_args()
     found = with_names(read(rows_in(options.report)))
-    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(found)
+    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(entries(found))
     print("\n".join(markdown(lines)))
 
 

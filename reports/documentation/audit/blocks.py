@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
-from .text import NO_PROSE, Page
+from .text import Page, without_code
 
 MADE = "How this was made"
 """Heading of the end, which is about versions and machine."""
@@ -40,15 +40,11 @@ def _block(name: str, line: int, heading: str, text: str) -> Block:
 def of_markdown(name: str, text: str) -> Iterator[Block]:
     """Yield the blocks of a page in Markdown, without its emphasis."""
     heading = ""
-    for found in re.finditer(r"(?:^(?![|\n]).+\n?)+?(?=^[-|#\n]|\Z)", NO_PROSE.sub(_spaces, text), re.MULTILINE):
+    for found in re.finditer(r"(?:^(?![|\n]).+\n?)+?(?=^[-|#\n]|\Z)", without_code(text), re.MULTILINE):
         if found[0].startswith("#"):
             heading = found[0].strip("# \n")
         if heading != MADE:
             yield _block(name, text.count("\n", 0, found.start()) + 1, heading, found[0].replace("**", ""))
-
-
-def _spaces(found: re.Match[str]) -> str:
-    return re.sub(r"\S", " ", found[0])
 
 
 def of_html(name: str, text: str) -> Iterator[Block]:

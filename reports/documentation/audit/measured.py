@@ -53,7 +53,7 @@ def ratios(evidence: Evidence, over: str, of: Sequence[str], scenes: Sequence[st
 def _entries(evidence: Evidence, scenes: Sequence[str]) -> Iterator[tuple[dict[str, pd.DataFrame], float]]:
     """Yield the points of each column at each error; on some scenes, or on all."""
     labels = [tolerance(error) for error in readme_table.ERRORS]
-    for scene, label, members, error in readme_table.entries(evidence.rows):
+    for scene, label, members, error in evidence.entries:
         if label in labels and (not scenes or scene in scenes):
             yield {_unversioned(name): points for name, points in members.items()}, error
 

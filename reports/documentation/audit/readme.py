@@ -9,7 +9,6 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from .. import readme_table
 from ..evidence.store import Evidence
 from .measured import FUNCTIONS
 from .sentences import Sentence, judge
@@ -38,8 +37,7 @@ def _compare_tables(page: Page, evidence: Evidence) -> tuple[list[str], set[Numb
     """Return what the generated tables on the page say otherwise than the evidence, and all numbers in them."""
     wrong: list[str] = []
     covered: set[Number] = set()
-    for lines in (readme_table.rows(evidence.rows), readme_table.random_bodies(evidence.contests)):
-        given = readme_table.markdown(lines)
+    for given in evidence.tables:
         first = page.text.find(given[0].partition(" | ")[0] + " | ")
         there = page.text[first:].partition("\n\n")[0].splitlines() if first >= 0 else []
         line = page.text.count("\n", 0, max(first, 0)) + 1

@@ -29,10 +29,11 @@ NUMBER = re.compile(rf"{_DIGITS}|(?i:\b(?:{'|'.join(name for name in WORDS if na
 NO_PROSE = re.compile(
     r"^```.*?^```|^(?: {4}[^\n]*\n?)+"  # code
     r"|(?<=\])\([^)\s]*\)|https?://\S+"  # addresses
-    r"|`(?!\d)[^`]*`",  # code within a line; a number alone is none
+    r"|`[^`]+`",  # code within a line
     re.MULTILINE | re.DOTALL,
 )
-"""What of Markdown is not prose."""
+"""What of Markdown is not prose; but a number in code within a line is one."""
+_NUMBER_AS_CODE = re.compile(r"`\d")
 _START = re.compile(r"[.:;] |\n\n|\n[|*-] |\| ")
 _END = re.compile(r"[.;]\s|:\n|\n\n|\n[|*-] | \|")
 AROUND = 60
@@ -87,6 +88,11 @@ def _rounded(text: str) -> tuple[float, float]:
     return (value - half) * scale, (value + half) * scale
 
 
+def without_code(text: str) -> str:
+    """Return Markdown with spaces in place of what is not prose."""
+    return NO_PROSE.sub(lambda found: found[0] if _NUMBER_AS_CODE.match(found[0]) else re.sub(r"\S", " ", found[0]), text)
+
+
 @dataclass(frozen=True)
 class Page:
     """A page in Markdown: its name, and its text."""
@@ -97,8 +103,7 @@ class Page:
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
         """All numbers in its prose."""
-        prose = NO_PROSE.sub(lambda found: re.sub(r"\S", " ", found[0]), self.text)
-        return tuple(Number(*found.span(), found[0]) for found in NUMBER.finditer(prose))
+        return tuple(Number(*found.span(), found[0]) for found in NUMBER.finditer(without_code(self.text)))
 
     def describe(self, number: Number) -> str:
         """Return file and line, a number, and the words around it."""

@@ -35,7 +35,7 @@ def of_costs(table: pd.DataFrame) -> pd.DataFrame:
     compared = table["study"].isin(("work_precision", each_step.STUDY)) & _among(table, set(_lines(with_names(table))))
     drifts = (table["study"] == "paper") & (table["measure"] == Measure.DRIFT_MAX.text) & (table["quantity"] == "energy")
     truths = (table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)
-    return _checked(table, compared | drifts | truths, lambda some: list(rows(with_names(some))))
+    return _checked(table, compared | drifts | truths, lambda some: list(rows(entries(with_names(some)))))
 
 
 def _lines(table: pd.DataFrame) -> Iterator[tuple[str, str]]:

@@ -59,6 +59,17 @@ class Evidence:
         return contests(self.random)
 
     @cached_property
+    def entries(self) -> tuple[readme_table.Entry, ...]:
+        """Rows of README's table of costs, as points."""
+        return tuple(readme_table.entries(self.rows))
+
+    @cached_property
+    def tables(self) -> tuple[tuple[str, ...], ...]:
+        """README's tables of costs and of random bodies, as lines of Markdown."""
+        both = readme_table.rows(self.entries), readme_table.random_bodies(self.contests)
+        return tuple(tuple(readme_table.markdown(lines)) for lines in both)
+
+    @cached_property
     def origin(self) -> Mapping[str, Mapping[str, str]]:
         """Where each file comes from."""
         found: Mapping[str, Mapping[str, str]] = json.loads((self.folder / ORIGIN).read_text(encoding="utf-8"))
