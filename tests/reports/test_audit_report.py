@@ -1,6 +1,5 @@
 """A report has no number in a sentence that its rows do not support; and what breaks that is found."""
 
-import json
 import tomllib
 from pathlib import Path
 
@@ -8,12 +7,15 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from conservative import registry
 from conservative.benchmarks.measures import measurement
 from conservative.reports import document, view
 from conservative.reports.cli.main import main
 from conservative.reports.documentation.audit import __main__ as command
 from conservative.reports.documentation.audit import report
 from conservative.reports.documentation.audit.blocks import of_html, of_markdown
+from conservative.reports.labels import with_names
+from conservative.reports.page import markdown, page, random_bodies, scene_charts
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -22,7 +24,7 @@ from conservative.reports.tables import engine_tables, random_ratios, summary, t
 from . import test_throughput
 from .made_up import measurements
 from .made_up_engines import at_step
-from .rows import point
+from .rows import point, row
 from .test_random_ratios import ENGINE_ALONE, OURS_ALONE, SLOWER, TWICE
 
 BODIES = [each for lines in (*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE) for each in lines]
@@ -36,28 +38,30 @@ LINES = [
     *point("moser_veselov", "ours", 1e-13, 2e-7, scene="brick_flip"),
 ]
 ENGINES = [*at_step("drake==1.0", "a", 1e-6), *at_step("exudyn==2.0", "b", 1e-5)]
-ADDED = pd.concat([measurement.frame([*BODIES, *LINES, *ENGINES]), test_throughput.ROWS])
+METHODS = ["reduced:order=4", "heyoka:tol=1e-9"]
+RAN = [row("paper", registry.method(name).name, "energy drift max", 1e-15, scene="brick_flip") for name in METHODS]
+ADDED = pd.concat([measurement.frame([*BODIES, *LINES, *ENGINES, *RAN]), test_throughput.ROWS])
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A report of made-up rows with every section that has sentences about who is faster."""
-    place = tmp_path_factory.mktemp("audited")
-    plan = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], bodies=4, seed=7)
+def shown():
+    """A report of made-up rows with every section that has sentences about who is faster; its pictures are not drawn."""
+    plan = plan_report(["brick_flip"], METHODS, bodies=4, seed=7)
     found = measurements()
-    built = view.build(plan, Measurements(pd.concat([found.table, ADDED]), found.samples), provenance(["report"]))
-    document.render(built, place, png=False, announce=lambda what: None)
-    return place
+    return view.build(plan, Measurements(pd.concat([found.table, ADDED]), found.samples), provenance(["report"]))
 
 
 @pytest.fixture(scope="module")
-def rows(folder):
-    return report.Rows.of(folder)
+def rows(shown):
+    return report.Rows(with_names(shown.table), "conservative report")
 
 
 @pytest.fixture(scope="module")
-def texts(folder):
-    return {name: (folder / name).read_text(encoding="utf-8") for name in report.FILES}
+def texts(shown):
+    charts = {scene.name: scene_charts.build(scene) for scene in shown.scenes}
+    random = random_bodies.chart(shown.random)
+    md = markdown.render(shown, charts, {}, lambda name, chart: f"{name}.svg", random)
+    return {"report.md": md, "index.html": page.render(shown, charts, {}, random)}
 
 
 def test_every_number_of_a_report_is_supported(rows, texts):
@@ -102,7 +106,6 @@ def test_a_planted_sentence_fails(file, place, planted, rows, texts):
         ("only an engine gets there in ", "9"),
         ("our general integrators are faster by ", "7"),
         ("only ours reaches ", "1e-3, 7"),
-        ("taylor takes ", "8"),
         ("which solves integrable motions only, is ", "8"),
         ("gets to 1e-6 rad ", "9"),
         ("in the geometric mean, ", "9"),
@@ -157,8 +160,6 @@ def test_what_is_allowed_stands_in_a_template_or_in_terms():
 def test_the_command_fails_where_a_sentence_has_no_row(tmp_path, monkeypatch):
     monkeypatch.setattr(document, "measure", lambda plan, step, progress: measurements())
     arguments = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--out", str(tmp_path / "report")]
-    done = CliRunner().invoke(main, arguments)
-    assert done.exit_code == 0, done.output
     monkeypatch.setattr(summary, "CAVEAT", PLANTED)
     done = CliRunner().invoke(main, arguments)
     assert done.exit_code == 1
@@ -166,13 +167,15 @@ def test_the_command_fails_where_a_sentence_has_no_row(tmp_path, monkeypatch):
     assert "2 numbers in sentences that no row supports" in done.stderr
 
 
-def test_a_folder_is_audited_by_a_command(folder, tmp_path, monkeypatch, capsys):
-    for name in ("measurements.csv", "measurements.json", *report.FILES):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    text = (folder / "report.md").read_text(encoding="utf-8")
-    (tmp_path / "report.md").write_text(f"{PLANTED}\n\n{text}", encoding="utf-8")
+def test_a_folder_is_audited_by_a_command(shown, texts, tmp_path, monkeypatch, capsys):
+    shown.table.to_csv(tmp_path / "measurements.csv", index=False)
+    (tmp_path / "measurements.json").write_text('{"command": "conservative report"}')
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["audit", str(tmp_path)])
+    with pytest.raises(SystemExit, match="0"):
+        command.main()
+    (tmp_path / "report.md").write_text(f"{PLANTED}\n\n{texts['report.md']}", encoding="utf-8")
     with pytest.raises(SystemExit, match="1"):
         command.main()
-    assert capsys.readouterr().out.startswith('report.md:1: "17.3" in')
-    assert json.loads((tmp_path / "measurements.json").read_text())["command"] == "conservative report"
+    assert 'report.md:1: "17.3" in' in capsys.readouterr().out

@@ -101,7 +101,7 @@ def sentences(rows: Rows, block: Block) -> Tellers:
     if block.heading.startswith("Verdict"):
         yield from contests_told.of_random_bodies(rows)
         scene = block.heading.partition(": ")[2] or _first(rows)
-    if scene in rows.points["scene"].unique():
+    if scene in rows.table["scene"].unique():
         yield from contests_told.of_scene(rows, scene)
     if block.lead in rows.points["scene"].unique():
         yield from contests_told.of_decades(rows, block.lead)
@@ -116,8 +116,8 @@ def sentences(rows: Rows, block: Block) -> Tellers:
 
 def _first(rows: Rows) -> str:
     """Return the scene that the page's verdict is about."""
-    named = [str(name) for name in rows.points["scene"].unique()]
-    return min(named, key=lambda name: name in rows.scenes and rows.scenes[name].integrable, default="")
+    named = [str(name) for name in rows.table["scene"].dropna().unique() if name in rows.scenes]
+    return min(named, key=lambda name: rows.scenes[name].integrable, default="")
 
 
 def _of_the_bodies(rows: Rows) -> Tellers:
