@@ -80,6 +80,15 @@ def test_another_digit_in_a_table_fails(header, evidence):
     assert found[0].endswith(f": the evidence gives {row}")
 
 
+def test_tables_are_written_anew(evidence, tmp_path):
+    page = tmp_path / "README.md"
+    page.write_text(TEXT.replace("| gravity | 3", "| gravity | 9").replace("| brick_flip | 1e-9 |", "| brick_flop | 1e-9 |"))
+    readme.write_tables(page, evidence)
+    assert page.read_text() == TEXT
+    with pytest.raises(BadInput, match="no table whose header begins with"):
+        readme.write_tables(tmp_path / "README.md", changed(evidence, tables=(("| else | 1 |",),)))
+
+
 def test_another_value_in_the_evidence_fails(evidence):
     rows = evidence.rows
     other = rows.assign(value=rows["value"].where(rows["method"] != "reduced", 3 * rows["value"]))

@@ -15,7 +15,7 @@ from conservative.reports.documentation.audit import __main__ as command
 from conservative.reports.documentation.audit import report
 from conservative.reports.documentation.audit.blocks import of_html, of_markdown
 from conservative.reports.labels import with_names
-from conservative.reports.page import markdown, page, random_bodies, scene_charts
+from conservative.reports.page import libraries, markdown, page, random_bodies, scene_charts
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -61,7 +61,9 @@ def texts(shown):
     charts = {scene.name: scene_charts.build(scene) for scene in shown.scenes}
     random = random_bodies.chart(shown.random)
     md = markdown.render(shown, charts, {}, lambda name, chart: f"{name}.svg", random)
-    return {"report.md": md, "index.html": page.render(shown, charts, {}, random)}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(libraries, "packed", dict)  # which takes long, and has no sentence
+        return {"report.md": md, "index.html": page.render(shown, charts, {}, random)}
 
 
 def test_every_number_of_a_report_is_supported(rows, texts):
@@ -159,6 +161,8 @@ def test_what_is_allowed_stands_in_a_template_or_in_terms():
 
 def test_the_command_fails_where_a_sentence_has_no_row(tmp_path, monkeypatch):
     monkeypatch.setattr(document, "measure", lambda plan, step, progress: measurements())
+    monkeypatch.setattr(document, "draw", lambda chart, path, png: path.name)
+    monkeypatch.setattr(libraries, "packed", dict)
     arguments = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced", "--out", str(tmp_path / "report")]
     monkeypatch.setattr(summary, "CAVEAT", PLANTED)
     done = CliRunner().invoke(main, arguments)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
+
+from conservative import files
+from conservative.errors import BadInput
 
 from ..evidence.store import Evidence
 from .measured import FUNCTIONS
@@ -33,17 +36,32 @@ def audit(text: str, evidence: Evidence, claims: str) -> list[str]:
     return [*wrong, *judge(page, sentences, covered), *_stale(page, sentences)]
 
 
+def write_tables(readme: Path = README, evidence: Evidence | None = None) -> None:
+    """Write README's tables anew, as the evidence gives them."""
+    text = readme.read_text(encoding="utf-8")
+    for given in (evidence or Evidence()).tables:
+        text = text.replace(_find_table(text, given), "\n".join(given))
+    files.write_text(readme, text, "readme")
+
+
+def _find_table(text: str, given: Sequence[str]) -> str:
+    """Return the table of a page whose header begins as that of a table that is given; raise `BadInput` without one."""
+    _, bar, rest = text.partition("\n" + given[0].split(" | ")[0] + " | ")
+    if not bar:
+        raise BadInput("README.md", f"no table whose header begins with {given[0]}", "one for each generated table")
+    return (bar + rest.partition("\n\n")[0]).strip("\n")
+
+
 def _compare_tables(page: Page, evidence: Evidence) -> tuple[list[str], set[Number]]:
     """Return what the generated tables on the page say otherwise than the evidence, and all numbers in them."""
     wrong: list[str] = []
     covered: set[Number] = set()
     for given in evidence.tables:
-        first = page.text.find(given[0].partition(" | ")[0] + " | ")
-        there = page.text[first:].partition("\n\n")[0].splitlines() if first >= 0 else []
-        line = page.text.count("\n", 0, max(first, 0)) + 1
-        pairs = enumerate(zip_longest(there, given, fillvalue="(no row)"), start=line)
+        there = _find_table(page.text, given)
+        first = page.text.index(there)
+        pairs = enumerate(zip_longest(there.splitlines(), given, fillvalue="(no row)"), page.text.count("\n", 0, first) + 1)
         wrong += [f"{page.name}:{at}: {one}: the evidence gives {other}" for at, (one, other) in pairs if one != other]
-        covered |= {number for number in page.numbers if first <= number.start < first + sum(len(row) + 1 for row in there)}
+        covered |= {number for number in page.numbers if first <= number.start < first + len(there)}
     return wrong, covered
 
 
