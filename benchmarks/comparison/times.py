@@ -35,7 +35,7 @@ ROUNDS = 50
 """Samples of each run in a process."""
 LAYOUTS = 3
 """Runs of each version in a process, each with its data elsewhere."""
-MOST_TURNS = 3
+MOST_TURNS = 6
 """How often at most so many processes are measured until it is no longer open whether a row is slower."""
 RESAMPLES = 4999
 MOST_CALLS = 10_000
@@ -70,8 +70,8 @@ class Ratio:
 
     @property
     def open(self) -> bool:
-        """Whether it looks slower than allowed, but may not be."""
-        return self.value > 1 + SLOWER and not self.slower
+        """Whether it may be slower than allowed, or not: the interval holds the limit."""
+        return self.low <= 1 + SLOWER < self.high
 
 
 @dataclass(frozen=True)
