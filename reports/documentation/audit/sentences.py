@@ -112,6 +112,6 @@ def judge(page: Page, sentences: Sequence[Sentence], covered: Collection[Number]
         for found in sentence.pattern.finditer(page.text):
             for number, wrong in sentence.check(page, found):
                 verdicts.setdefault(number, []).append(wrong)
-    for number, wrong in sorted(verdicts.items(), key=lambda item: item[0].start):
-        if number not in covered and "" not in wrong:
-            yield f"{page.describe(number)}: {(wrong or [NOTHING])[0]}"
+    for number, found_wrong in sorted(verdicts.items(), key=lambda item: item[0].start):
+        if number not in covered and "" not in found_wrong:
+            yield f"{page.describe(number)}: {(found_wrong or [NOTHING])[0]}"
