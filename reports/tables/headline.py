@@ -15,6 +15,7 @@ from .classes import OF_ENGINES, MethodClass, with_classes
 from .each_step import EachStep
 from .random_contests import ANY
 from .random_contests import Contest as RandomContest
+from .random_ratios import count_bodies
 from .summary import cheapest
 from .work_precision import Contest, contests
 
@@ -49,8 +50,8 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     alone = sum(contest.only_engine for contest in members)
     if not (lost or alone):
         decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
-        nowhere = f"no engine is faster than our general integrators on any of {len(members[0].pairs)} bodies, at {decades}."
-        return Statement(where, nowhere)
+        of = f"any of {count_bodies(len(members[0].pairs))}, at {decades}"
+        return Statement(where, f"no engine is faster than our general integrators on {of}.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
     slower = f"an engine is faster than our general integrators in {len(lost)} of {total} cases (a body and a decade), "
