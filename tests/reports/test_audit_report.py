@@ -132,6 +132,22 @@ def test_another_row_fails(rows, texts):
         assert words in found
 
 
+@pytest.mark.parametrize(
+    ("cell", "other"),
+    [
+        ("| heyoka 7.13.2 lean | 1.00 |", "| heyoka 7.13.2 lean | 0.90 |"),
+        ("| heyoka 7.13.2 lean | 1.00 |", "| scipy DOP853 | 1.00 |"),
+        ("| none gets there | – |", "| heyoka 7.13.2 lean | 1.00 |"),
+        ("| moser_veselov | 0.200 |", "| none gets there | – |"),
+    ],
+)
+def test_another_cell_fails(cell, other, rows, texts):
+    assert cell in texts["report.md"]
+    (found,) = report.find(rows, {"report.md": texts["report.md"].replace(cell, other, 1)})
+    assert "µs on brick_flip at 1e-" in found
+    assert "the rows give" in found
+
+
 def test_names_are_no_numbers_but_numbers_beside_them_are(rows):
     names = "7.13.2 of heyoka is heyoka 7.13.2 lean."
     (found,) = report.find(rows, {"report.md": f"{names}\n"})

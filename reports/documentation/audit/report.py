@@ -25,7 +25,7 @@ from ...tables.cells import tolerance
 from ...tables.engine_rows import ERROR, ONE_STEP
 from ...tables.hard_cases import RIGHT, USABLE
 from ...tables.summary import MIDDLE
-from . import contests_told
+from . import contests_told, tables_told
 from .blocks import Block, of_html, of_markdown
 from .contests_told import Tellers
 from .rows import Rows
@@ -69,6 +69,7 @@ def find(rows: Rows, texts: dict[str, str]) -> Iterator[str]:
     for name, text in texts.items():
         for block in FILES[name](name, text):
             yield from _judge(rows, block, allowed, names)
+    yield from (wrong for name, text in texts.items() if name.endswith(".md") for wrong in tables_told.find(rows, name, text))
 
 
 def _judge(rows: Rows, block: Block, allowed: list[Sentence], names: str) -> Iterator[str]:
