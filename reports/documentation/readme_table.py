@@ -20,7 +20,7 @@ import pandas as pd
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.method import Role
 
-from ..labels import with_names
+from ..labels import display_name, with_names
 from ..tables import each_step
 from ..tables.cells import DASH, factor, tolerance
 from ..tables.classes import OF_ENGINES, MethodClass, with_classes
@@ -81,7 +81,7 @@ def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
 
 def _setting(point: pd.Series[str]) -> str:
     """Return what to call the line of a point: an engine's name heads the column."""
-    return point["setting"] if point["role"] == Role.ENGINE.value else point["name"]
+    return display_name("", "", point["setting"]) if point["role"] == Role.ENGINE.value else point["name"]
 
 
 def cells(costs: Sequence[tuple[float, str]]) -> list[str]:
