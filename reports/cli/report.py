@@ -79,7 +79,7 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     unsupported = audit(out)
     for line in unsupported:
         click.echo(line, err=True)
-    failed = [*view.failed, *([f"{len(unsupported)} numbers in sentences that no row supports"] if unsupported else [])]
+    failed = [*view.failed, *([f"numbers in sentences that no row supports: {len(unsupported)}"] if unsupported else [])]
     if failed:
         raise click.ClickException("; ".join(failed))
 

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 import numpy as np
+import pandas as pd
 
+from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.throughput_extent import MEDIAN
 
 from ...tables.cells import tolerance
 from ...tables.classes import OF_ENGINES, MethodClass
 from ...tables.random_contests import Contest, Pair
 from ...tables.summary import MIDDLE
-from .rows import OURS, SOLUTIONS, Duel, Rows, extent, told
+from .rows import OURS, SOLUTIONS, Duel, Rows, cheapest, extent, told
 from .sentences import NoSupportError, Values
 
+MANY = ", the cheapest of "
+"""Stands in front of what is said of many bodies, between the kind of bodies and our class."""
 Tellers = Iterator[tuple[str, Callable[..., Values]]]
 """Sentences, and what they have to say."""
 
@@ -29,9 +34,8 @@ def of_scene(rows: Rows, scene: str) -> Tellers:
             raise NoSupportError(f"at {error:g} rad on {scene} the cheapest are {one} and {other}")
         return other[1] / one[1]
 
-    def solution(name: str) -> Values:
-        engine = rows.cheapest(scene, OF_ENGINES, MIDDLE)
-        return {"ratio": contest(SOLUTIONS, MIDDLE, name, engine[0] if engine else "")}
+    def solution(name: str, engine: str) -> Values:
+        return {"ratio": contest(SOLUTIONS, MIDDLE, name, engine)}
 
     def alone(error: float, name: str) -> Values:
         found = [rows.cheapest(scene, classes, error) for classes in (OURS, OF_ENGINES)]
@@ -49,7 +53,7 @@ def of_scene(rows: Rows, scene: str) -> Tellers:
         "our cheapest general integrator, {ours:words}.",
         lambda error, ours, engine: {"ratio": 1 / contest(OURS, error, ours, engine)},
     )
-    yield "{name:words}, which solves integrable motions only, is {ratio} times as fast.", solution
+    yield "{name:words}, which solves integrable motions only, is {ratio} times as fast as {engine:words} there.", solution
     yield "Only {name:words} gets to {error:given} rad.", alone
     yield "Nothing measured gets to {error:given} rad.", lambda error: alone(error, "")
 
@@ -75,7 +79,7 @@ def of_decades(rows: Rows, scene: str) -> Tellers:
         "our general integrators are faster by {range:text} times, at {errors:text} rad.",
         lambda: won(duels, lambda d: d.ratio >= 1),
     )
-    yield "only ours reaches {errors:text} rad.", lambda: won(duels, lambda d: bool(d.ours and not d.engine))
+    yield "only our general integrators reach {errors:text} rad.", lambda: won(duels, lambda d: bool(d.ours and not d.engine))
     yield (
         "{names:words}, which solves integrable motions only, is {range:text} times as fast as the cheapest engine, "
         "at {errors:text} rad.",
@@ -85,6 +89,26 @@ def of_decades(rows: Rows, scene: str) -> Tellers:
 
 def _all(duels: list[Duel]) -> str:
     return told(duels, lambda duel: True)
+
+
+def of_each_step(rows: Rows, scene: str) -> Tellers:
+    """Yield who is faster where each of a scene's own steps is kept, and where the end alone is."""
+    each = rows.each_step(scene)
+    said = {"interval": f"{each.interval:.3g}", "error": tolerance(ERROR)}
+
+    def contest(points: pd.DataFrame, kind: MethodClass, ours: str, engine: str) -> Values:
+        one, other = (cheapest(points, classes, ERROR) for classes in ((kind,), OF_ENGINES))
+        if one is None or other is None or (one[0], other[0]) != (ours, engine):
+            raise NoSupportError(f"where each step of {scene} is run the cheapest are {one} and {other}")
+        return {**said, "won": other[1] / one[1], "lost": one[1] / other[1]}
+
+    kept = "with a sample at each {interval:text} s (our conversion of an engine's state included), at {error:text} rad."
+    alone = "in steps of {interval:text} s of which the end is kept, where a solver need not stop, at {error:text} rad."
+    for points, where in ((each.kept, kept), (each.alone, alone)):
+        for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
+            values = partial(contest, points, kind)
+            yield f"{{ours:words}} ({kind}) is {{won}} times as fast as {{engine:words}}, {where}", values
+            yield f"{{engine:words}} is {{lost}} times as fast as {{ours:words}} ({kind}), {where}", values
 
 
 def of_random_bodies(rows: Rows) -> Tellers:
@@ -126,8 +150,15 @@ def of_field(rows: Rows, field: str) -> Tellers:
         found = rows.field(field)
         single = [(1 / pair.ratio, contest.error) for contest in found for pair in contest.both if pair.ratio < 1]
         most, error = max(single, default=(0.0, 1.0))
+        decades = f"{tolerance(found[0].error)} to {tolerance(found[-1].error)}"
         counts = {"lost": len(single), "cases": sum(len(c.pairs) for c in found), "alone": sum(c.only_engine for c in found)}
-        return {**counts, "most": most, "error": tolerance(error), "bodies": _count(len(found[0].pairs), "body", "bodies")}
+        return {
+            **counts,
+            "most": most,
+            "error": tolerance(error),
+            "decades": decades,
+            "bodies": _count(len(found[0].pairs), "body", "bodies"),
+        }
 
     def means() -> Values:
         found = [contest for contest in rows.field(field) if contest.both]
@@ -140,13 +171,18 @@ def of_field(rows: Rows, field: str) -> Tellers:
             **{"worst": worst.both[0].ratio, "at_worst": tolerance(worst.error), "body": worst.both[0].scene},
         }
 
-    yield "no engine is faster on any of {bodies:text}, at any decade.", lost
-    yield "an engine is faster in {lost} of {cases} cases, by up to {most} times, at {error:text} rad", lost
+    yield "no engine is faster than our general integrators on any of {bodies:text}, at {decades:text} rad.", lost
+    yield (
+        "an engine is faster than our general integrators in {lost} of {cases} cases (a body and a decade), "
+        "by up to {most} times, at {error:text} rad",
+        lost,
+    )
     yield "only an engine gets there in {alone} of {cases} cases", lost
     yield "Only an engine reaches the error in {alone} of {cases} cases.", lost
     yield (
         "over {bodies:text} the cheapest engine takes, in the geometric mean, {low} (at {at_low:text} rad) to {high} "
-        "(at {at_high:text} rad) times as long as ours; on the worst body {worst} times (at {at_worst:text} rad, {body:text}).",
+        "(at {at_high:text} rad) times as long as our cheapest general integrator; "
+        "on the worst body {worst} times (at {at_worst:text} rad, {body:text}).",
         means,
     )
 
@@ -161,14 +197,14 @@ def _mean(contest: Contest) -> float:
 
 
 def of_many_bodies(rows: Rows, lead: str) -> Tellers:
-    """Yield what is said of many bodies of a kind: of our integrators, or of our closed forms, against an engine."""
-    kind, _, ours = lead.partition(", our cheapest ")
-    exact, _, engine = ours.partition(" against ")
+    """Yield what is said of many bodies of a kind: of a class of ours against an engine."""
+    kind, _, ours = lead.partition(MANY)
+    group, _, engine = ours.partition(" against ")
 
     def ratio(error: float) -> Values:
         for contest in rows.many:
-            told_of = (contest.kind.replace("_", " "), contest.engine, contest.exact, contest.which)
-            here = told_of == (kind, engine, exact == "closed form", MEDIAN) and math.isclose(contest.error, error)
+            told_of = (contest.kind.replace("_", " "), contest.engine, contest.group, contest.which)
+            here = told_of == (kind, engine, group, MEDIAN) and math.isclose(contest.error, error)
             if here and contest.ratio > 0:
                 return {"slower": contest.ratio, "faster": 1 / contest.ratio, "among": f"{contest.size:,}"}
         raise NoSupportError(f"no contest on {lead} at {error:g} rad")

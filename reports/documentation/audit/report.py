@@ -25,7 +25,7 @@ from ...tables.cells import tolerance
 from ...tables.engine_rows import ERROR, ONE_STEP
 from ...tables.hard_cases import RIGHT, USABLE
 from ...tables.summary import MIDDLE
-from . import contests_told
+from . import contests_told, tables_told
 from .blocks import Block, of_html, of_markdown
 from .contests_told import Tellers
 from .rows import Rows
@@ -49,7 +49,7 @@ CONSTANTS: tuple[tuple[str, Values], ...] = (
     ("is one, at {error:text} rad over all of them", {"error": tolerance(each_step.ERROR)}),
     ("or the {most:text}th percentile", {"most": throughput_extent.MOST.removesuffix(" %")}),
     ("Each runs for {duration} s of its motion", {"duration": ensembles.DURATION}),
-    ("they take steps of {step} s", {"step": ensembles.DURATION / throughput_extent.EXACT_STEPS}),
+    ("exact ones take steps of {step} s", {"step": ensembles.DURATION / throughput_extent.EXACT_STEPS}),
 )
 """What is said of limits that the code has."""
 ALLOWED = Path(__file__).with_name("allowed.toml")
@@ -69,6 +69,7 @@ def find(rows: Rows, texts: dict[str, str]) -> Iterator[str]:
     for name, text in texts.items():
         for block in FILES[name](name, text):
             yield from _judge(rows, block, allowed, names)
+    yield from (wrong for name, text in texts.items() if name.endswith(".md") for wrong in tables_told.find(rows, name, text))
 
 
 def _judge(rows: Rows, block: Block, allowed: list[Sentence], names: str) -> Iterator[str]:
@@ -105,12 +106,13 @@ def sentences(rows: Rows, block: Block) -> Tellers:
         yield from contests_told.of_scene(rows, scene)
     if block.lead in rows.points["scene"].unique():
         yield from contests_told.of_decades(rows, block.lead)
+        yield from contests_told.of_each_step(rows, block.lead)
     if scene in rows.scenes:
         yield _of_engines(rows, rows.scenes[scene])
     field = block.lead.removeprefix("random bodies, ")
     if any(contest.field == field for contest in rows.contests):
         yield from contests_told.of_field(rows, field)
-    if ", our cheapest " in block.lead:
+    if contests_told.MANY in block.lead:
         yield from contests_told.of_many_bodies(rows, block.lead)
 
 

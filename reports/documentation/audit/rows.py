@@ -20,7 +20,7 @@ from conservative.errors import BadInput
 from conservative.scene import Scene
 
 from ...labels import with_names
-from ...tables import random_contests, throughput_lines
+from ...tables import each_step, random_contests, throughput_lines
 from ...tables.cells import factor, tolerance
 from ...tables.classes import OF_ENGINES, MethodClass, with_classes
 from ...tables.random_contests import ANY
@@ -95,9 +95,11 @@ class Rows:
 
     def cheapest(self, scene: str, classes: Iterable[MethodClass], error: float) -> Cheapest | None:
         """Return the cheapest line of some classes on a scene; None where none gets there."""
-        here = self.points[(self.points["scene"] == scene) & self.points["class"].isin([kind.value for kind in classes])]
-        costs = ((str(name), cost(line, error)) for name, line in here.groupby("name", sort=False))
-        return min((each for each in costs if not math.isnan(each[1])), key=lambda each: each[1], default=None)
+        return cheapest(self.points[self.points["scene"] == scene], classes, error)
+
+    def each_step(self, scene: str) -> each_step.EachStep:
+        """Return what was found where each of a scene's own steps is kept."""
+        return each_step.of_scene(self.table, scene)
 
     @cached_property
     def duels(self) -> dict[tuple[str, MethodClass], list[Duel]]:
@@ -116,6 +118,13 @@ class Rows:
         if not found:
             raise NoSupportError(f"no random body is in a field {name!r}")
         return found
+
+
+def cheapest(points: pd.DataFrame, classes: Iterable[MethodClass], error: float) -> Cheapest | None:
+    """Return the cheapest line of some classes among points; None where none gets to the error."""
+    here = points[points["class"].isin([kind.value for kind in classes])]
+    costs = ((str(name), cost(line, error)) for name, line in here.groupby("name", sort=False))
+    return min((each for each in costs if not math.isnan(each[1])), key=lambda each: each[1], default=None)
 
 
 def _scenes_in(command: str) -> list[str]:
