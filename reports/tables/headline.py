@@ -49,8 +49,9 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     alone = sum(contest.only_engine for contest in members)
     if not (lost or alone):
         decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
-        nowhere = f"no engine is faster than our general integrators on any of {len(members[0].pairs)} bodies, at {decades}."
-        return Statement(where, nowhere)
+        count = len(members[0].pairs)
+        bodies = "the one body" if count == 1 else f"any of {count} bodies"
+        return Statement(where, f"no engine is faster than our general integrators on {bodies}, at {decades}.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
     slower = f"an engine is faster than our general integrators in {len(lost)} of {total} cases (a body and a decade), "
