@@ -198,7 +198,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engines": ("mujoco", "pinocchio", "heyoka"),
         "environments": ("uv", "platformdirs"),
-        "report": ("click", "rich", "jinja2", "pandas", "altair", "vl_convert", "cloudpickle"),
+        "report": ("click", "rich", "jinja2", "itables", "pandas", "altair", "vl_convert", "cloudpickle"),
         "ensembles": ("zarr",),
         "cluster": ("distributed", "cloudpickle"),
         "gate": ("click", "pytest", "pytest_benchmark", "heyoka"),

@@ -15,24 +15,23 @@ TURN, TILT = 35, 25
 def chart(curve: pd.DataFrame) -> Spec:
     """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    It has parameters `turn` and `tilt`, degrees.
+    The samples are dots, as a line between them would cut corners: a turn of the brick has but few. The sphere has parameters
+    `turn` and `tilt`, degrees.
     """
     name, family = curve[["name", "family"]].iloc[0]
-    points = [
-        {"k": k, "x": x, "y": y, "z": z} for k, (x, y, z) in enumerate(curve[["x", "y", "z"]].round(4).to_numpy().tolist())
-    ]
+    points = [{"x": x, "y": y, "z": z} for x, y, z in curve[["x", "y", "z"]].round(3).to_numpy().tolist()]
     return {
         "usermeta": {"name": name},
         "width": 190,
         "height": 190,
         "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
         "layer": [
-            {"data": _grid(), "transform": _project(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding("part")},
+            {"data": _grid(), "transform": _project(), "mark": _line(GREY, 0.6, 0.5), "encoding": _encoding() | _order("part")},
             {
-                "data": as_csv(points, ("k", "x", "y", "z")),
-                "transform": [*_project(), *_sides()],
-                "mark": _line(colours({name: family})[name], 1.3, 1.0),
-                "encoding": _encoding("stretch") | {"opacity": _fade()},
+                "data": as_csv(points, ("x", "y", "z")),
+                "transform": _project(),
+                "mark": {"type": "circle", "color": colours({name: family})[name], "size": 7},
+                "encoding": _encoding() | {"opacity": _fade()},
             },
         ],
         "config": {"view": {"stroke": None}},
@@ -67,19 +66,14 @@ def _project() -> list[Spec]:
     ]
 
 
-def _sides() -> list[Spec]:
-    """Cut the curve where it passes behind the sphere, so that each stretch has one opacity."""
-    frame = {"window": [{"op": "lag", "field": "near", "as": "before"}], "sort": [{"field": "k"}]}
-    passes = {"calculate": "datum.before !== null && (datum.before < 0) != (datum.near < 0) ? 1 : 0", "as": "passes"}
-    count = {"window": [{"op": "sum", "field": "passes", "as": "stretch"}], "sort": [{"field": "k"}]}
-    return [frame, passes, count]
-
-
-def _encoding(detail: str) -> Spec:
+def _encoding() -> Spec:
     scale = {"domain": [-1.15, 1.15], "nice": False, "clamp": False}
     hidden: Spec = {"type": "quantitative", "axis": None, "scale": scale}
-    order = {"field": "k", "type": "quantitative"}
-    return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}, "order": order, "detail": {"field": detail}}
+    return {"x": hidden | {"field": "across"}, "y": hidden | {"field": "up"}}
+
+
+def _order(detail: str) -> Spec:
+    return {"order": {"field": "k", "type": "quantitative"}, "detail": {"field": detail}}
 
 
 def _fade() -> Spec:

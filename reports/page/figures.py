@@ -83,7 +83,7 @@ def drift(scene: SceneView) -> PageFigure:
     summary = " ".join([words, *_under_another(scene.thin_drifts)])
     charts = tuple(vega_embed.embed(figures.drift(scene.thin_drifts, scene.name), hover("t", "drift"), 220))
     legend = vega_embed.legend(families_of(scene.drifts), marks=False)
-    return PageFigure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, legend)
+    return PageFigure(f"drift_{scene.name}", f"{scene.name}: drift over time", summary, charts, legend, "pairs")
 
 
 def _under_another(drifts: pd.DataFrame) -> Iterator[str]:

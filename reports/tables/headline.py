@@ -15,6 +15,7 @@ from .classes import OF_ENGINES, MethodClass, with_classes
 from .each_step import EachStep
 from .random_contests import ANY
 from .random_contests import Contest as RandomContest
+from .random_ratios import count_bodies
 from .summary import cheapest
 from .work_precision import Contest, contests
 
@@ -50,7 +51,7 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     if not (lost or alone):
         decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
         count = len(members[0].pairs)
-        bodies = "the one body" if count == 1 else f"any of {count} bodies"
+        bodies = count_bodies(count) if count == 1 else f"any of {count_bodies(count)}"
         return Statement(where, f"no engine is faster than our general integrators on {bodies}, at {decades}.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))

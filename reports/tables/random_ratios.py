@@ -157,7 +157,7 @@ def _sentences(members: list[Contest]) -> Iterator[str]:
         return
     low, high = min(compared, key=lambda c: c.mean), max(compared, key=lambda c: c.mean)
     worst, total = min(compared, key=lambda c: c.worst), sum(len(contest.pairs) for contest in members)
-    yield f"over {_bodies(len(members[0].pairs))} the cheapest engine takes, in the geometric mean, {low.mean:.2f}"
+    yield f"over {count_bodies(len(members[0].pairs))} the cheapest engine takes, in the geometric mean, {low.mean:.2f}"
     yield f"(at {tolerance(low.error)} rad) to {high.mean:.2f} (at {tolerance(high.error)} rad) times as long as our cheapest"
     yield f"general integrator; on the worst body {worst.worst:.2f} times"
     yield f"(at {tolerance(worst.error)} rad, {worst.both[0].scene})."
@@ -166,5 +166,6 @@ def _sentences(members: list[Contest]) -> Iterator[str]:
         yield f"Only an engine reaches the error in {missing} of {total} cases."
 
 
-def _bodies(count: int) -> str:
+def count_bodies(count: int) -> str:
+    """Return a number of bodies in words."""
     return "one body" if count == 1 else f"{count} bodies"

@@ -2,11 +2,11 @@
 (async () => {
   // The libraries are compressed modules.
   const unpack = async (id) => {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0));
-    const script = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+    const { body } = await fetch(`data:;base64,${document.getElementById(id).textContent}`);
+    const script = await new Response(body.pipeThrough(new DecompressionStream("gzip"))).text();
     return (await import(URL.createObjectURL(new Blob([script], { type: "text/javascript" })))).default;
   };
-  const [vegaEmbed, DataTable] = await Promise.all(["vega", "datatables"].map(unpack));
+  const vegaEmbed = await unpack("vega");
 
   const content = JSON.parse(document.getElementById("charts").textContent);
   const night = matchMedia("(prefers-color-scheme: dark)");
@@ -42,17 +42,44 @@
     return Promise.all(views.get(figure).map((view) => view.signal(name, value).runAsync()));
   };
 
-  // One figure after the other, so that the first is there at once and the page stays quick to answer.
-  let drawing = Promise.resolve();
+  // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol; dashes stay last.
+  const number = (cell) => parseFloat(cell.replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
+  const empty = (cell) => /^–|^$/.test(cell.trim());
+  const ways = (value, compare) => {
+    const placed = (way) => (a, b) => empty(a) - empty(b) || way * compare(value(a), value(b));
+    return { asc: placed(1), desc: placed(-1) };
+  };
+  const words = new Intl.Collator("en", { numeric: true });
+
+  async function equip() {
+    const DataTable = await unpack("datatables");
+    DataTable.type("words", { detect: () => true, order: ways(String, words.compare) });
+    DataTable.type("numbers", { detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
+    const language = { zeroRecords: "No row has all of these words." };
+    const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
+    for (const table of document.querySelectorAll("table.sortable")) {
+      const rows = new DataTable(table, { autoWidth: false, paging: false, order: [], language, layout });
+      const filter = table.closest(".scroll").previousElementSibling?.closest(".filter");
+      filter?.querySelector("input").addEventListener("input", ({ target }) => {
+        const { recordsDisplay: left, recordsTotal: all } = rows.search(target.value).draw().page.info();
+        filter.querySelector("output").textContent = target.value.trim() ? `${left} of ${all}` : "";
+      });
+      await pause();
+    }
+  }
+
+  // One figure after the other, so that the first is there at once and the page stays quick to answer; then come the tables.
+  const pause = () => new Promise((done) => setTimeout(done, 0));
+  let drawing = Promise.resolve(), equipped;
   const drawAll = (dark) => {
     for (const path of document.querySelectorAll("path[data-colour]")) {
       const colour = shade(path.dataset.colour, dark);
       path.setAttribute(path.hasAttribute("stroke") ? "stroke" : "fill", colour);
     }
     for (const figure of figures) {
-      drawing = drawing.then(() => draw(figure, dark)).then(() => new Promise((done) => setTimeout(done, 0)));
+      drawing = drawing.then(() => draw(figure, dark)).then(pause).then(() => (equipped ??= equip()));
     }
-    drawing = drawing.then(() => { document.documentElement.dataset.drawn = dark ? "dark" : "light"; });
+    drawing = drawing.then(() => (equipped ??= equip())).then(() => { document.documentElement.dataset.drawn = dark ? "dark" : "light"; });
     return drawing;
   };
   night.addEventListener("change", () => drawAll(night.matches));
@@ -69,26 +96,6 @@
       const value = () => (input.type === "checkbox" ? input.checked : Number(input.value));
       input.addEventListener("input", () => set(figure, input.dataset.signal, value()));
     }
-  }
-
-  // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol; dashes stay last.
-  const number = (cell) => parseFloat(cell.replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
-  const empty = (cell) => /^–|^$/.test(cell.trim());
-  const kind = (name, detect, value, compare) => {
-    const placed = (way) => (a, b) => empty(a) - empty(b) || way * compare(value(a), value(b));
-    DataTable.type(name, { detect, order: { asc: placed(1), desc: placed(-1) } });
-  };
-  kind("text", () => true, String, new Intl.Collator("en", { numeric: true }).compare);
-  kind("measured", (cell) => empty(cell) || !Number.isNaN(number(cell)), number, (a, b) => a - b);
-
-  for (const table of document.querySelectorAll("table.sortable")) {
-    const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
-    const rows = new DataTable(table, { autoWidth: false, paging: false, order: [], layout });
-    const filter = table.closest(".scroll").previousElementSibling?.closest(".filter");
-    filter?.querySelector("input").addEventListener("input", ({ target }) => {
-      const { recordsDisplay: left, recordsTotal: all } = rows.search(target.value).draw().page.info();
-      filter.querySelector("output").textContent = target.value.trim() ? `${left} of ${all}` : "";
-    });
   }
 
   // What a cell of the grid of hard cases says, told below it.

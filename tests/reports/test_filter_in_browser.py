@@ -14,7 +14,7 @@ from .made_up_engines import at_step, over_steps
 from .test_page_in_browser import start, wait
 
 pytestmark = pytest.mark.browser
-ROWS = "[...document.querySelectorAll('#engines .compact')[1].querySelectorAll('tbody tr')]"
+ROWS = "[...document.querySelectorAll('#engines .compact')[1].querySelectorAll('tbody tr:has(th)')]"
 VISIBLE = f"return {ROWS}.filter((row) => row.offsetHeight).length"
 
 

@@ -18,6 +18,7 @@ from .made_up import measurements, row
 from .rows import point
 from .test_page_in_browser import start, wait
 from .test_random_ratios import SLOWER, TWICE
+from .test_throughput import ROWS as MANY_BODIES
 
 pytestmark = pytest.mark.browser
 
@@ -48,8 +49,8 @@ def opened(tmp_path_factory):
     made = measurements()
     random = measurement.frame([each for lines in (*TWICE, *SLOWER) for each in lines])
     others = made.table[~made.table["study"].isin(("long_runs", "work_precision", "speed"))]
-    table = pd.concat([others, measurement.frame(rows()), random])
-    plan = dataclasses.replace(plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], quick=True, bodies=2), hard=True)
+    table = pd.concat([others, measurement.frame(rows()), random, MANY_BODIES])
+    plan = dataclasses.replace(plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], bodies=2), hard=True)
     view = build(plan, Measurements(table, made.samples), provenance(["report"]))
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     file = tmp_path_factory.mktemp("page") / "index.html"
@@ -94,6 +95,15 @@ def test_sentence_and_picture_are_on_the_first_screen_of_a_phone(opened, sized):
     assert bottom(opened, ".lead") < bottom(opened, "#first .chart svg") <= 844
     assert opened.execute_script("return document.documentElement.scrollWidth") <= 390
     assert max(opened.execute_script(WIDER, ".lead, .classes *, .grid, .grid td, .grid thead th, figure, .chart svg")) <= 390
+
+
+def test_a_picture_of_rows_of_panels_has_a_chart_for_each_of_them(opened):
+    script = "return [...document.querySelectorAll('#many_bodies .chart')].map((e) => e.querySelectorAll('.mark-symbol path').length)"
+    counts = opened.execute_script(script)
+    assert len(counts) == 6  # kinds of bodies times errors
+    assert min(counts) >= 2
+    assert len(opened.find_elements("css selector", "#many_bodies .entry")) == 5
+    assert opened.get_log("browser") == []
 
 
 def test_long_tables_keep_their_first_column_and_their_header(opened, sized):
@@ -148,6 +158,8 @@ def table_rows(browser):
 
 
 def test_a_long_table_is_filtered_by_text_and_sorted_by_number(opened):
+    from selenium.webdriver.common.keys import Keys
+
     field = opened.find_element("css selector", "#paid-once .filter input")
     field.send_keys("e")
     wait(opened, "return document.querySelector('#paid-once .filter output').textContent")
@@ -156,7 +168,7 @@ def test_a_long_table_is_filtered_by_text_and_sorted_by_number(opened):
     field.clear()
     field.send_keys(" ")
     head = opened.find_elements("css selector", "#paid-once thead th")[1]
-    opened.execute_script("arguments[0].querySelector('button').click()", head)
+    head.find_element("css selector", "[role=button]").send_keys(Keys.ENTER)  # as a keyboard does it
     cells = [text.split("\t")[1].replace(",", "") for text in table_rows(opened)]
     found = [float(text) for text in cells if text != "–"]
     assert found == sorted(found)
