@@ -190,7 +190,7 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
     return np.array(body.inertia), rows
 
 
-def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-12) -> Array | None:
+def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-14) -> Array | None:
     """Return the unit vector (3,), body axes, about which body and field are symmetric; None where they are not.
 
     In uniform gravity it points to the side of the centre of mass. Fields of other kinds are not looked into: None.

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import pandas as pd
 
+_PADDED = re.compile(r"(?<=\de)-0(?=\d)")
+
 
 def display_name(family: str, version: str, setting: str) -> str:
-    """Return what to call a method: `mujoco 4.0.0 RK4`; ours without the version, which the end of the report has."""
-    return " ".join(filter(None, (family, "" if "@" in family else version, setting)))
+    """Return what to call a method: `mujoco 4.0.0 RK4`; ours without the version, which the end of the report has.
+
+    Tolerances are written as people do: 1e-6, where Python has 1e-06.
+    """
+    return " ".join(filter(None, (family, "" if "@" in family else version, _PADDED.sub("-", setting))))
 
 
 def with_names(rows: pd.DataFrame) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -15,6 +15,7 @@ from .run.plan import Plan
 from .run.provenance import Provenance
 from .tables import (
     claims,
+    each_step,
     engine_scenes,
     engine_tables,
     hard_cases,
@@ -110,7 +111,9 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         about=about,
         random=random_ratios.view(contests, plan.bodies, plan.seed) if RANDOM in plan.names else None,
         throughput=throughput.view(every) if THROUGHPUT in plan.names else None,
-        headline=headline.first_lost([*headline.of_random_bodies(contests), *headline.of_points(builder.points)]),
+        headline=headline.first_lost(
+            [*headline.of_random_bodies(contests), *headline.of_points(builder.points), *_each_step(plan, table)]
+        ),
         failed=tuple(runs.failures_of_ours(table)),
         scenes=scenes,
         paper=_paper(table, samples),
@@ -124,6 +127,11 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         engines=engine_scenes.engine_scenes(every[of_engines], plan.scenes) if plan.engines else (),
         versions=_versions(plan, source),
     )
+
+
+def _each_step(plan: Plan, table: pd.DataFrame) -> Iterator[headline.Statement]:
+    for scene in plan.scenes:
+        yield from headline.of_each_step(scene.name, each_step.of_scene(table, scene.name))
 
 
 def _first(

@@ -1,1 +1,1 @@
-"""What the documentation is made with: API pages, the pictures of the READMEs and the README's table of costs."""
+"""What the documentation is made with, API pages, pictures and tables, and what audits its numbers."""

@@ -30,6 +30,7 @@ from ..charts import figures, spheres
 from ..charts.style import apply_style
 from ..labels import with_names
 from ..tables import lines, work_precision
+from ..tables.classes import without_solutions
 from ..terminal.progress import Step, progress
 
 FOLDER = Path(__file__).parents[1] / "pictures"
@@ -87,7 +88,7 @@ def time_against_error(scene: Scene, methods: tuple[Method, ...], quick: bool) -
     """Return the report's chart of time against error."""
     study = Study("work_precision", (scene,), methods, quick)
     points = work_precision.points(with_names(measurement.frame(list(studies.rows(study)))))
-    return figures.work_precision(points, work_precision.front(points), scene.name)
+    return figures.work_precision(points, work_precision.front(without_solutions(points)), scene.name)
 
 
 def drift_of_energy(scene: Scene, methods: tuple[Method, ...]) -> Any:

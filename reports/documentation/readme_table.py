@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.method import Role
 
-from ..labels import with_names
+from ..labels import display_name, with_names
 from ..tables import each_step
 from ..tables.cells import DASH, factor, tolerance
 from ..tables.classes import OF_ENGINES, MethodClass, with_classes
 from ..tables.engine_rows import ONE_STEP, EngineRow, engine_rows, points_of
-from ..tables.random_contests import contests
+from ..tables.random_contests import Contest, contests
 from ..tables.random_ratios import by_engine
 from ..tables.work_precision import cost, points
 
@@ -43,19 +44,33 @@ def columns(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {**ours, **theirs}
 
 
-def rows(table: pd.DataFrame) -> Iterator[list[str]]:
+class Entry(NamedTuple):
+    """A row of the table: scene, what is compared, the points of each column, and the error, rad."""
+
+    scene: str
+    label: str
+    columns: dict[str, pd.DataFrame]
+    error: float
+
+
+def rows(found: Iterable[Entry]) -> Iterator[list[str]]:
     """Yield the header, and rows for each scene: the cheapest is bold, and a dash says that no point gets there."""
-    found = points(table)
-    header = list(columns(found))
+    every = list(found)
+    header = list(dict.fromkeys(name for entry in every for name in entry.columns))
     yield ["scene", "error, rad", *header]
+    for scene, label, members, error in every:
+        costs = [cheapest(members[name], error) if name in members else (math.inf, "") for name in header]
+        yield [scene, label, *cells(costs)]
+
+
+def entries(table: pd.DataFrame) -> Iterator[Entry]:
+    """Yield the rows of the table, from named measurements (see `labels.with_names`)."""
+    found = points(table)
     for scene in found["scene"].unique():
         here, each = found[found["scene"] == scene], each_step.of_scene(table, str(scene))
         lines = [(tolerance(error), here, error) for error in ERRORS]
         lines += [(label, kept, ERROR) for label, kept in zip(each.labels, (each.kept, each.alone), strict=True) if len(kept)]
-        for label, members, error in lines:
-            by_column = columns(members)
-            costs = [cheapest(by_column[name], error) if name in by_column else (math.inf, "") for name in header]
-            yield [str(scene), label, *cells(costs)]
+        yield from (Entry(str(scene), label, columns(members), error) for label, members, error in lines)
 
 
 def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
@@ -66,7 +81,7 @@ def cheapest(lines: pd.DataFrame, error: float) -> tuple[float, str]:
 
 def _setting(point: pd.Series[str]) -> str:
     """Return what to call the line of a point: an engine's name heads the column."""
-    return point["setting"] if point["role"] == Role.ENGINE.value else point["name"]
+    return display_name("", "", point["setting"]) if point["role"] == Role.ENGINE.value else point["name"]
 
 
 def cells(costs: Sequence[tuple[float, str]]) -> list[str]:
@@ -105,11 +120,17 @@ def _run(row: EngineRow) -> list[str]:
     return [row.label.partition("/")[2], f"{row.error:.2g}", f"{row.energy.size:.1g} {row.energy.direction}".strip()]
 
 
-def random_bodies(table: pd.DataFrame) -> Iterator[Sequence[str]]:
-    """Yield the header, and a row for each field and engine: its time over ours, mean (worst to best)."""
-    header, body = by_engine(contests(table))
-    yield header
-    yield from ([str(cell) for cell in row] for row in body)
+def random_bodies(found: Iterable[Contest]) -> Iterator[Sequence[str]]:
+    """Yield the header, and a row for each field and engine, which has no column if it is the only one: its time over ours."""
+    header, body = by_engine(found)
+    first = 1 if len({str(row[1]) for row in body}) > 1 else 2
+    yield from ([str(row[0]), *map(str, row[first:])] for row in (header, *body))
+
+
+def markdown(lines: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table in Markdown."""
+    header, *body = lines
+    return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *body)]
 
 
 def main() -> None:
@@ -119,13 +140,12 @@ def main() -> None:
     parser.add_argument("--engines", action="store_true", help="the table of engines")
     parser.add_argument("--random", action="store_true", help="the table of random bodies")
     options = parser.parse_args()
-    found = with_names(read(_rows_in(options.report)))
-    header, *body = random_bodies(found) if options.random else engines(found) if options.engines else rows(found)
-    for row in (header, ["---"] * len(header), *body):
-        print("|", " | ".join(row), "|")
+    found = with_names(read(rows_in(options.report)))
+    lines = random_bodies(contests(found)) if options.random else engines(found) if options.engines else rows(entries(found))
+    print("\n".join(markdown(lines)))
 
 
-def _rows_in(folder: Path) -> Path:
+def rows_in(folder: Path) -> Path:
     """Return the file of measurements in the folder of a report, or of a study."""
     names = ("measurements.csv", "study.csv")
     return next((folder / name for name in names if (folder / name).exists()), folder / names[0])

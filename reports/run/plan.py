@@ -21,7 +21,7 @@ SECONDS = {
     "convergence": 1.0,
     "speed": 1.0,
     "work_precision": 2.5,
-    "each_step": 0.7,
+    "each_step": 0.3,
     "stability": 1.0,
     "hard_cases": 2.0,
     "engines_at_one_step": 0.7,

@@ -46,6 +46,11 @@ def with_classes(points: pd.DataFrame) -> pd.DataFrame:
     return points.assign(**{"class": pd.Series(kinds, index=points.index, dtype="string")})
 
 
+def without_solutions(points: pd.DataFrame) -> pd.DataFrame:
+    """Return points without those of our solutions of integrable motions."""
+    return points[with_classes(points)["class"] != MethodClass.SOLUTION]
+
+
 @lru_cache(maxsize=1024)
 def _load(method: str) -> Method | None:
     try:

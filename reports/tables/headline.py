@@ -8,10 +8,15 @@ from itertools import groupby, pairwise
 
 import pandas as pd
 
+from conservative.benchmarks.studies.each_step import ERROR
+
 from .cells import factor, tolerance
 from .classes import OF_ENGINES, MethodClass, with_classes
+from .each_step import EachStep
 from .random_contests import ANY
 from .random_contests import Contest as RandomContest
+from .random_ratios import count_bodies
+from .summary import cheapest
 from .work_precision import Contest, contests
 
 
@@ -44,10 +49,14 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     lost = [(1 / pair.ratio, contest.error) for contest in members for pair in contest.both if pair.ratio < 1]
     alone = sum(contest.only_engine for contest in members)
     if not (lost or alone):
-        return Statement(where, f"no engine is faster on any of {len(members[0].pairs)} bodies, at any decade.")
+        decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
+        count = len(members[0].pairs)
+        bodies = count_bodies(count) if count == 1 else f"any of {count_bodies(count)}"
+        return Statement(where, f"no engine is faster than our general integrators on {bodies}, at {decades}.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
-    slower = f"an engine is faster in {len(lost)} of {total} cases, by up to {factor(most)} times, at {tolerance(error)} rad"
+    slower = f"an engine is faster than our general integrators in {len(lost)} of {total} cases (a body and a decade), "
+    slower += f"by up to {factor(most)} times, at {tolerance(error)} rad"
     parts = [*([slower] if lost else []), *([f"only an engine gets there in {alone} of {total} cases"] if alone else [])]
     return Statement(where, f"{'; '.join(parts)}.", lost=True)
 
@@ -77,7 +86,7 @@ def _texts(contests: list[Contest]) -> Iterator[tuple[str, bool]]:
         yield f"our general integrators are faster by {_range([c.ratio for c in won])}, at {_errors(won)}.", False
     alone = [c for c in contests if c.theirs is None]
     if alone and any(c.theirs for c in contests):
-        yield f"only ours reaches {_errors(alone)}.", False
+        yield f"only our general integrators reach {_errors(alone)}.", False
 
 
 def _solutions(contests: Sequence[Contest]) -> Iterator[Statement]:
@@ -87,6 +96,27 @@ def _solutions(contests: Sequence[Contest]) -> Iterator[Statement]:
         names = ", ".join(dict.fromkeys(c.ours.name for c in both if c.ours))
         fast = f"is {_range([c.ratio for c in both])} as fast as the cheapest engine, at {_errors(both)}"
         yield Statement(scene, f"{names}, which solves integrable motions only, {fast}.", any(c.lost for c in both))
+
+
+def of_each_step(scene: str, each: EachStep) -> Iterator[Statement]:
+    """Yield who is faster where each of a scene's own steps is kept, and where the end alone is, for each class of ours."""
+    kept = (
+        f"with a sample at each {each.interval:.3g} s (our conversion of an engine's state included), at {tolerance(ERROR)} rad"
+    )
+    alone = (
+        f"in steps of {each.interval:.3g} s of which the end is kept, where a solver need not stop, at {tolerance(ERROR)} rad"
+    )
+    for points, where in ((each.kept, kept), (each.alone, alone)):
+        for kind in (MethodClass.GENERAL, MethodClass.SOLUTION) if len(points) else ():
+            ours, engine = cheapest(points, (kind,), ERROR), cheapest(points, OF_ENGINES, ERROR)
+            if ours and engine:
+                names = (f"{ours.name} ({kind})", engine.name)
+                yield Statement(scene, f"{_faster(names, engine.time / ours.time)}, {where}.", engine.time < ours.time)
+
+
+def _faster(names: tuple[str, str], ratio: float) -> str:
+    one, other = names if ratio >= 1 else names[::-1]
+    return f"{one} is {factor(max(ratio, 1 / ratio))} times as fast as {other}"
 
 
 def _by_engine(lost: list[Contest]) -> Iterator[tuple[str, list[Contest]]]:

@@ -17,6 +17,7 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 from ..labels import display_name
 from ..terminal.tables import TerminalTable
 from .cells import finite_or_none, outcome_record
+from .classes import MethodClass, class_of
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
 FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
@@ -141,9 +142,14 @@ def notes(recommendation: Recommendation) -> list[str]:
         _truth_text(recommendation),
         _stability_text(recommendation),
         "Cost: the fastest of interleaved runs in this machine's own time; ratios are what lasts.",
+        *(f"{method_text(a)}: no general integrator; it solves integrable motions only." for a in advice if _is_solution(a)),
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
         *(f"{name}: not installed." for name in recommendation.missing),
     ]
+
+
+def _is_solution(advice: Advice) -> bool:
+    return advice.best is not None and class_of(advice.role, advice.best.method.name) is MethodClass.SOLUTION
 
 
 def _truth_text(recommendation: Recommendation) -> str:

@@ -14,6 +14,7 @@ from conservative.scene import Scene
 
 from . import each_step, lines, orders, overview, scene, scene_contests, work_precision
 from .cells import Table
+from .classes import without_solutions
 from .summary import Summary, of_scene
 
 
@@ -33,7 +34,7 @@ class SceneView:
         Data of its charts: see `work_precision.points`, here with `sample`, s per sample, `lines.drifts`, `orders.errors`,
         named by `orders.with_slopes`, and `lines.curves`.
     front, line_count
-        What nothing beats among the points (see `work_precision.front`), and the number of their lines.
+        What nothing beats among the points but those of solutions (see `work_precision.front`), and the number of lines.
     thin_drifts
         Fewer samples of the drifts, for the page.
     fit_ends
@@ -115,7 +116,7 @@ class SceneViews:
             integrable=value.integrable,
             summary=of_scene(points, _of(self.long_drifts, name), _of(self.troubles, name), value.integrable, each),
             points=points,
-            front=work_precision.front(points),
+            front=work_precision.front(without_solutions(points)),
             line_count=points["name"].nunique(),
             drifts=drifts,
             thin_drifts=lines.thin(drifts),

@@ -117,8 +117,9 @@ def _sentence(points: pd.DataFrame, integrable: bool) -> str:
     """Return which side gets to `MIDDLE` faster, without our solutions of integrable motions, and what those do."""
     ours, engine = cheapest(points, (MethodClass.GENERAL,), MIDDLE), cheapest(points, OF_ENGINES, MIDDLE)
     solution = cheapest(points, (MethodClass.SOLUTION,), MIDDLE)
-    kind = "An integrable motion, with a closed form" if integrable else "Not integrable: no closed form is known"
-    return f"{kind}. {' '.join(filter(None, [_contest(ours, engine), _solution(solution, engine)]))}"
+    scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
+    kind = "is integrable, with a closed form" if integrable else "is not integrable: no closed form is known"
+    return f"{scene} {kind}. {' '.join(filter(None, [_contest(ours, engine), _solution(solution, engine)]))}"
 
 
 def _contest(ours: Cheapest | None, engine: Cheapest | None) -> str:
@@ -136,7 +137,8 @@ def _contest(ours: Cheapest | None, engine: Cheapest | None) -> str:
 def _solution(solution: Cheapest | None, engine: Cheapest | None) -> str:
     if solution is None or engine is None:
         return ""
-    return f"{solution.name}, which solves integrable motions only, is {factor(engine.time / solution.time)} times as fast."
+    ratio = engine.time / solution.time
+    return f"{solution.name}, which solves integrable motions only, is {factor(ratio)} times as fast as {engine.name} there."
 
 
 def _row(kind: MethodClass, points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame) -> Row:

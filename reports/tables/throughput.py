@@ -14,6 +14,7 @@ from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN
 from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Cell, Grade, Table, number, tolerance
+from .classes import MethodClass
 from .random_ratios import ratio_text
 from .throughput_lines import Contest, Line, contests, lines
 
@@ -22,8 +23,8 @@ TERMS = (
     "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
     "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
     "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
-    "not count. Closed forms, which are exact, are a class apart: they take steps of 0.1 s, and would take any. Where nothing "
-    "else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
+    "not count. Solutions of integrable motions are a class apart: exact ones take steps of 0.1 s, and would take any. Where "
+    "nothing else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
 )
 """What the tables mean."""
 
@@ -52,7 +53,7 @@ def as_table(compared: Iterable[Contest]) -> Table:
     """Return the contests, a row for each kind, engine and error."""
     header = [
         "bodies",
-        "of ours",
+        "of our methods",
         "engine",
         "error, rad",
         "at",
@@ -76,8 +77,8 @@ def _contest_row(contest: Contest) -> list[str | Cell]:
     )
     times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
     names = [each.label if each else "no time" for each in (ours, theirs)]
-    kind, of_ours = contest.kind.replace("_", " "), "closed forms" if contest.exact else "integrators"
-    return [kind, of_ours, contest.engine, tolerance(contest.error), contest.which, f"{contest.size:,}", graded, *times, *names]
+    kind, error = contest.kind.replace("_", " "), tolerance(contest.error)
+    return [kind, contest.group.value, contest.engine, error, contest.which, f"{contest.size:,}", graded, *times, *names]
 
 
 def cost_table(found: Iterable[Line]) -> Table:
@@ -91,8 +92,7 @@ def cost_table(found: Iterable[Line]) -> Table:
 def _cost_row(line: Line) -> list[str]:
     rate, prepare = line.best(Measure.BODY_STEPS, max), line.best(Measure.PREPARE, min)
     costs = [_cost_text(line, error) for error in ERRORS]
-    kind = "closed form" if line.exact else "integrator"
-    return [line.kind.replace("_", " "), line.label, kind, number(rate / 1e6, 3), number(prepare * 1e6, 3), *costs]
+    return [line.kind.replace("_", " "), line.label, line.group.value, number(rate / 1e6, 3), number(prepare * 1e6, 3), *costs]
 
 
 def _cost_text(line: Line, error: float) -> str:
@@ -116,13 +116,12 @@ def absent(table: pd.DataFrame) -> Table:
 
 def statements(compared: Iterable[Contest]) -> Iterator[str]:
     """Yield what is found at the median, a sentence for each kind, engine and class of ours."""
-    groups: dict[tuple[str, str, bool], list[Contest]] = {}
+    groups: dict[tuple[str, str, MethodClass], list[Contest]] = {}
     for contest in compared:
         if contest.which == MEDIAN:
-            groups.setdefault((contest.kind, contest.engine, contest.exact), []).append(contest)
-    for (kind, engine, exact), members in groups.items():
-        ours = "closed form" if exact else "integrator"
-        yield f"{kind.replace('_', ' ')}, our cheapest {ours} against {engine}: {'; '.join(map(_words, members))}."
+            groups.setdefault((contest.kind, contest.engine, contest.group), []).append(contest)
+    for (kind, engine, group), members in groups.items():
+        yield f"{kind.replace('_', ' ')}, the cheapest of {group} against {engine}: {'; '.join(map(_words, members))}."
 
 
 def _words(contest: Contest) -> str:

@@ -13,8 +13,9 @@ import pandas as pd
 from conservative.benchmarks.measures.cost_at_error import cost
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput_extent import ERRORS, EXACT, MEDIAN, MOST
-from conservative.method import Role
+from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN, MOST
+
+from .classes import OF_ENGINES, MethodClass, class_of
 
 _SIZE = re.compile(r"(\d+) (?:body|bodies)")
 Setting = dict[tuple[str, int], float]
@@ -29,8 +30,8 @@ class Line:
     ----------
     kind, name, way
         Kind of bodies, name of the method without its tolerance, and how it runs them: "" for at once, on one thread.
-    ours, family, exact
-        Whether it is ours, its family, and whether it is an exact solution, to which steps add no error.
+    family, group
+        Its family, and what it is compared as.
     settings
         What was found of each setting, coarse to fine.
     """
@@ -38,10 +39,14 @@ class Line:
     kind: str
     name: str
     way: str
-    ours: bool
     family: str
-    exact: bool
+    group: MethodClass
     settings: list[Setting] = field(default_factory=list)
+
+    @property
+    def ours(self) -> bool:
+        """Whether it is ours."""
+        return self.group not in OF_ENGINES
 
     @property
     def label(self) -> str:
@@ -85,8 +90,7 @@ def lines(table: pd.DataFrame) -> tuple[Line, ...]:
         size = _SIZE.fullmatch(what)
         if math.isfinite(row["value"]):
             settings[key][(row["measure"], int(size[1])) if size else (what, 0)] = float(row["value"])
-    exact = {key for key, line in found.items() if line.exact}
-    return tuple(line for key, line in found.items() if any(line.settings) or key in exact)
+    return tuple(line for line in found.values() if any(line.settings) or line.group is MethodClass.SOLUTION)
 
 
 def _line(row: dict[Any, Any], way: str) -> Line:
@@ -94,9 +98,8 @@ def _line(row: dict[Any, Any], way: str) -> Line:
         kind=str(row["scene"]),
         name=str(row["line"]),
         way=way,
-        ours=row["role"] == Role.OURS,
         family=str(row["family"]),
-        exact=row["detail"] == EXACT,
+        group=class_of(str(row["role"]), str(row["method"])),
     )
 
 
@@ -110,7 +113,7 @@ class Cheapest:
 
 @dataclass(frozen=True)
 class Contest:
-    """Ours against an engine, among `size` bodies of a kind, at an error, rad, of which `which` says whose it is.
+    """Ours of a class (`group`) against an engine, among `size` bodies of a kind, at an error, rad, of those `which` names.
 
     `ratio` is the engine's time over ours, nan where a side does not get there; above 1 ours is faster.
     """
@@ -120,7 +123,7 @@ class Contest:
     error: float
     size: int
     engine: str
-    exact: bool
+    group: MethodClass
     ours: Cheapest | None
     theirs: Cheapest | None
 
@@ -139,24 +142,24 @@ def cheapest(found: Iterable[Line], error: float, size: int, which: str) -> Chea
 def contests(found: Iterable[Line]) -> Iterator[Contest]:
     """Yield ours against each engine, both on one thread, at each error, where most bodies ran on both sides.
 
-    Ours are our integrators, and apart from them our exact solutions.
+    Ours are our general integrators, and apart from them our solutions of integrable motions.
     """
     plain = [line for line in found if line.plain]
     for kind in dict.fromkeys(line.kind for line in plain):
         here = [line for line in plain if line.kind == kind]
-        for exact in (False, True):
-            ours = [line for line in here if line.ours and line.exact == exact]
+        for group in (MethodClass.GENERAL, MethodClass.SOLUTION):
+            ours = [line for line in here if line.group is group]
             for engine in dict.fromkeys(line.family for line in here if not line.ours):
                 theirs = [line for line in here if not line.ours and line.family == engine]
                 for which in (MEDIAN, MOST):
-                    yield from (_contest((kind, which, error, engine), exact, ours, theirs) for error in ERRORS if ours)
+                    yield from (_contest((kind, which, error, engine), group, ours, theirs) for error in ERRORS if ours)
 
 
-def _contest(what: tuple[str, str, float, str], exact: bool, ours: list[Line], theirs: list[Line]) -> Contest:
+def _contest(what: tuple[str, str, float, str], group: MethodClass, ours: list[Line], theirs: list[Line]) -> Contest:
     """Return the contest among the largest number of bodies at which both sides get to the error."""
     kind, which, error, engine = what
     sizes = sorted({size for line in (*ours, *theirs) for size in line.sizes}, reverse=True) or [1]
     pairs = ((size, cheapest(ours, error, size, which), cheapest(theirs, error, size, which)) for size in sizes)
     every = list(pairs)
     size, mine, other = next(((n, a, b) for n, a, b in every if a and b), every[-1])
-    return Contest(kind, which, error, size, engine, exact, mine, other)
+    return Contest(kind, which, error, size, engine, group, mine, other)

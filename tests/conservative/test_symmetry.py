@@ -14,7 +14,8 @@ from conservative.method import Role
 from conservative.scenes.turned_frame import in_body_frame
 
 STEPS, DT = 40, 0.04
-ROUND_OFF = 1e-12  # measured 2e-14 at most, over all methods and symmetries
+# Measured 2e-14 nearly always; 1.4e-12 where a run of Taylor(order=8) is split: corrections are weighed by scales of the start.
+ROUND_OFF = 1e-11
 
 KINDS = ("free", "asymmetric top", "symmetric top")
 UP = np.array([0.0, 0.0, 1.0])

@@ -100,5 +100,5 @@ def test_the_readme_has_a_table_of_them(name, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["readme_table", str(tmp_path), "--random"])
     readme_table.main()
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "| field | engine | 1e-3 | 1e-6 | 1e-9 | 1e-12 |"
-    assert lines[2].startswith("| spring | heyoka | 1.00 (0.50 to 2.00) |")
+    assert lines[0] == "| field | 1e-3 | 1e-6 | 1e-9 | 1e-12 |"  # a single engine has no column
+    assert lines[2].startswith("| spring | 1.00 (0.50 to 2.00) |")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conservative.reports.documentation import readme_table
-from conservative.reports.documentation.readme_table import ERRORS, rows
+from conservative.reports.documentation.readme_table import ERRORS, entries, rows
 
 from .rows import point, row, table
 
@@ -20,7 +20,7 @@ CLASSES = ["our general integrators", "our solutions of integrable motions"]
 
 
 def written(*groups):
-    return list(rows(table(*groups)))
+    return list(rows(entries(table(*groups))))
 
 
 def each(line, role, kept, alone, error=1e-7, **fields):

@@ -71,7 +71,7 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     assert out == ""
     assert err.count("\n") == 1
     assert err.startswith("Interrupted; ")
-    said = re.search(r"(\d) of 8 studies are finished \((.*)\) and kept", err)
+    said = re.search(r"(\d) of 9 studies are finished \((.*)\) and kept", err)
     names = said[2].split(", ")
     assert names == list(content["pieces"])[: int(said[1])]  # a kill can come when a study is kept and not yet said to be
     assert "convergence" in names

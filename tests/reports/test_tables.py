@@ -44,7 +44,7 @@ def test_what_a_method_is_called(parts, text):
 
 def test_rows_have_the_names_of_their_method_and_of_their_line():
     found = frame([row("paper", "energy drift max", 1.0, method="heyoka", setting="tol=1e-06,body", series_setting="body")])
-    assert found[["name", "line"]].to_numpy().tolist() == [["heyoka tol=1e-06,body", "heyoka body"]]
+    assert found[["name", "line"]].to_numpy().tolist() == [["heyoka tol=1e-6,body", "heyoka body"]]
 
 
 def test_drift_is_that_of_the_scenes_own_step():

@@ -121,7 +121,7 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
     made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         document.write(made, tmp_path / "report", fail)
-    assert "1 of 8 studies are finished (paper)" in caught.value.__notes__[0]
+    assert "1 of 9 studies are finished (paper)" in caught.value.__notes__[0]
     assert list(json.loads((tmp_path / "report.partial.json").read_text())["pieces"]) == ["paper"]
 
 
