@@ -35,7 +35,7 @@ def work_precision(picture: pd.DataFrame) -> Any:
     data = picture.assign(microseconds=picture["time"] * 1e6, sample=picture["sample"] * 1e6, rank=range(len(picture)))
     families = families_of(data)
     x = alt.X(**log_channel("error", "largest attitude error, rad", data["error"]))
-    y = alt.Y(**log_channel("microseconds", "computing time per simulated second, µs", data["microseconds"]))
+    y = alt.Y(**log_channel("microseconds", "µs per simulated second", data["microseconds"]))
     single = data["single"].astype(bool)
     thin = _lines(data[single], families, 0.8, 12).transform_filter(SINGLE)
     layers = (thin + _lines(data[~single], families, 2.2, 50)).encode(x=x, y=y).properties(width=WIDTH, height=HEIGHT)

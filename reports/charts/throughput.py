@@ -34,5 +34,9 @@ def _panel(part: pd.DataFrame, kind: str, error: Any, points: pd.DataFrame, look
     title = f"{kind.replace('_', ' ')}, {tolerance(error)} rad"
     base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **look)
     shown = [alt.Tooltip("name:N"), alt.Tooltip("size:Q"), alt.Tooltip("time:Q", format=".3g")]
-    marks = alt.Chart(part).mark_point(filled=True, size=30).encode(x=x, y=y, color=look["color"].legend(None), tooltip=shown)
+    marks = (
+        alt.Chart(part)
+        .mark_point(filled=True, size=30, opacity=1)
+        .encode(x=x, y=y, color=look["color"].legend(None), tooltip=shown)
+    )
     return base.mark_line(strokeWidth=1.6).encode(tooltip=shown) + marks

@@ -70,6 +70,7 @@ def _template() -> Template:
     loader = PackageLoader("conservative.reports")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["whole"] = _whole
+    environment.filters["narrow"] = _narrow
     return environment.get_template("page.html.j2")
 
 
@@ -77,6 +78,11 @@ def _whole(text: str) -> Markup:
     """Return a sentence in which no line ends within a number such as 1e-3, or between it and its unit; `this` is code."""
     whole = re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
     return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", whole))
+
+
+def _narrow(name: str) -> Markup:
+    """Return a name in which a line may end after each underscore, so that a narrow column has whole words."""
+    return Markup(str(escape(name)).replace("_", "_<wbr>"))
 
 
 def _in_script(content: Any) -> str:

@@ -50,8 +50,9 @@ def _random(field: str, members: list[RandomContest]) -> Statement:
     alone = sum(contest.only_engine for contest in members)
     if not (lost or alone):
         decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
-        of = f"any of {count_bodies(len(members[0].pairs))}, at {decades}"
-        return Statement(where, f"no engine is faster than our general integrators on {of}.")
+        count = len(members[0].pairs)
+        bodies = count_bodies(count) if count == 1 else f"any of {count_bodies(count)}"
+        return Statement(where, f"no engine is faster than our general integrators on {bodies}, at {decades}.")
     total = sum(len(contest.pairs) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
     slower = f"an engine is faster than our general integrators in {len(lost)} of {total} cases (a body and a decade), "

@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from ..labels import display_name
 from .cells import DASH, Cell, Grade, Table, finite_or_none, tolerance
 from .random_contests import ANY, Cheapest, Contest
 
@@ -136,7 +137,8 @@ def _most_often(found: Iterable[Cheapest | None]) -> str:
     if not counts:
         return DASH
     (name, count), total = counts.most_common(1)[0], counts.total()
-    return name if count == total else f"{name} ({count} of {total})"
+    shown = display_name("", "", name)
+    return shown if count == total else f"{shown} ({count} of {total})"
 
 
 def statements(found: Iterable[Contest]) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.studies import THROUGHPUT
 from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN
 from conservative.outcome import OutcomeKind
 
@@ -104,8 +105,9 @@ def _cost_text(line: Line, error: float) -> str:
 
 def absent(table: pd.DataFrame) -> Table:
     """Return what of the study did not run, and why; what would have taken too long is left out where fewer bodies ran."""
+    here = table["study"] == THROUGHPUT
     failed = table[
-        ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
+        here & ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
     ]
     grouped = failed.groupby(["scene", "name", "outcome", "reason"], sort=False).size()
     rows = [[str(scene).replace("_", " "), str(name), f"{kind}: {reason}"] for scene, name, kind, reason in grouped.index]

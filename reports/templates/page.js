@@ -28,7 +28,7 @@
     views.get(figure).splice(0).forEach((view) => view.finalize());
     for (const [k, spec] of content.figures[figure.dataset.figure].entries()) {
       const config = dark ? look("#e8eaed", "#383e45") : look("#1a1d21", "#e3e6ea");
-      const height = Math.min(spec.height, Math.max(200, 0.65 * boxes[k].clientWidth));
+      const height = Math.min(spec.height, Math.max(200, 0.55 * boxes[k].clientWidth));
       const { view } = await vegaEmbed(boxes[k], { ...dressed(spec, dark), height }, { actions: false, renderer: "svg", config });
       views.get(figure).push(view);
       for (const [name, value] of Object.entries(signals.get(figure))) view.signal(name, value);

@@ -39,7 +39,7 @@ def drifts(*settings):
 
 def test_of_several_tolerances_the_loosest_and_the_tightest_are_drawn():
     found = drifts(("stol=3", 1e-3), ("stol=3", 1e-6), ("stol=3", 1e-9), ("stol=4", 1e-3))
-    names = ["engine stol=3,tol=0.001", "engine stol=3,tol=1e-09", "engine stol=4,tol=0.001"]
+    names = ["engine stol=3,tol=0.001", "engine stol=3,tol=1e-9", "engine stol=4,tol=0.001"]
     assert found["name"].unique().tolist() == names
 
 

@@ -29,7 +29,7 @@ def test_a_gain_is_one_sentence_with_both_versions_and_figures():
     assert said(BAD, GOOD) == (
         "midpoint on brick: from 1.0 to 2.0 the orders of attitude and rates rose from 1 to 2, "
         "the energy drift at dt = 0.01 s fell from -17 % to 2e-13, "
-        "the attitude error at dt = 0.01 s fell from 2.9 to 3.0e-03 rad",
+        "the attitude error at dt = 0.01 s fell from 2.9 to 3.0e-3 rad",
     )
 
 
@@ -52,7 +52,7 @@ SENTENCES = {
         replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")),
     ),
     "no order of the attitude can be fitted any more, which was 2 (no descent), "
-    "the attitude error at dt = 0.01 s rose from 3.0e-03 to 1 rad": (
+    "the attitude error at dt = 0.01 s rose from 3.0e-3 to 1 rad": (
         GOOD,
         replace(GOOD, attitude_order=Fit(reason="no descent"), error=near(1.0)),
     ),
@@ -76,7 +76,7 @@ def test_noise_is_not_said():
 
 def test_numbers_are_written_as_people_say_them():
     assert [order_text(order) for order in (0.99, 2.3, 4.06)] == ["1", "2.3", "4"]
-    assert [drift_text(drift) for drift in (-0.1677, 4e-4, 2.4e-13)] == ["-17 %", "4e-04", "2e-13"]
+    assert [drift_text(drift) for drift in (-0.1677, 4e-4, 2.4e-13)] == ["-17 %", "4e-4", "2e-13"]
 
 
 # -------------------------------------------------------------------------------------------------------------- the verdict
@@ -133,7 +133,7 @@ def test_junit_takes_what_an_engine_may_say():
 def test_markdown_has_tables_changes_and_versions():
     text = Answer(history(BAD, GOOD, FAILED, times=(TIMES, SLOW)), gated=True).markdown_text()
     assert text.startswith("## made: 1.0, 2.0, 3.0\n\n**3.0 against 2.0: FAILED**\n")
-    assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-04 | 3.0e-03 | ✓ done | 2 | 2 |" in text
+    assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-4 | 3.0e-3 | ✓ done | 2 | 2 |" in text
     assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
     assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text
     assert "| 1.0 | 3.11.7 | made==1.0 |" in text
