@@ -68,7 +68,7 @@ def test_the_table_has_both_versions():
 def test_the_text_has_a_line_for_each_violation_and_note():
     assert str(SLOWER).splitlines() == [
         "gate: FAILED, 1 rows, 1 of them timed, 1 violations",
-        "time of a step, brick_flip, reduced: was 1e-6 s, is 1.100 times as long (1.080 to 1.120), "
+        "time of a step, brick_flip, reduced: was 1e-06 s, is 1.100 times as long (1.080 to 1.120), "
         "allowed at most 1.05 times as long",
     ]
     assert str(answer(time=timed(FAST))).splitlines()[1:] == ["note: brick_flip, reduced: faster, 0.800 of the time"]
