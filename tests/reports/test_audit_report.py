@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from conservative import registry
 from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measure import Measure
 from conservative.reports import document, view
 from conservative.reports.cli.main import main
 from conservative.reports.documentation.audit import __main__ as command
@@ -37,10 +38,15 @@ LINES = [
     *point("heyoka", "engine", 1e-5, 1e-6, version="7.13.2", setting="lean", scene="brick_flip"),
     *point("moser_veselov", "ours", 1e-13, 2e-7, scene="brick_flip"),
 ]
+EACH_STEP = [
+    row("each_step", method, measure, value, 0.01, scene="brick_flip", role=role)
+    for method, role, kept, alone in (("gauss", "ours", 4e-6, 2e-6), ("heyoka", "engine", 9e-6, 1e-6))
+    for measure, value in ((Measure.ATTITUDE_MAX, 1e-8), (Measure.TIME_SAMPLED, kept), (Measure.TIME, alone))
+]
 ENGINES = [*at_step("drake==1.0", "a", 1e-6), *at_step("exudyn==2.0", "b", 1e-5)]
 METHODS = ["reduced:order=4", "heyoka:tol=1e-9"]
 RAN = [row("paper", registry.method(name).name, "energy drift max", 1e-15, scene="brick_flip") for name in METHODS]
-ADDED = pd.concat([measurement.frame([*BODIES, *LINES, *ENGINES, *RAN]), test_throughput.ROWS])
+ADDED = pd.concat([measurement.frame([*BODIES, *LINES, *ENGINES, *EACH_STEP, *RAN]), test_throughput.ROWS])
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +117,9 @@ def test_a_planted_sentence_fails(file, place, planted, rows, texts):
         ("only our general integrators reach ", "1e-3, 7"),
         ("which solves integrable motions only, is ", "8"),
         ("gets to 1e-6 rad ", "9"),
+        ("gauss (our general integrators) is ", "9"),
+        ("heyoka is ", "7"),
+        ("with a sample at each ", "1"),
         ("in the geometric mean, ", "9"),
         ("heavy tops, the cheapest of our general integrators against heyoka: at 1e-3 rad heyoka takes ", "9"),
         ("Bodies in each field: ", "3"),
