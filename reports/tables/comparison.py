@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -84,8 +84,8 @@ class Answer:
         found = self.comparison
         timed = sum(row.time is not None for row in found.rows)
         return (
-            f"gate: {'passed' if self.passed else 'FAILED'}, {len(found.rows)} rows, {timed} of them timed, "
-            f"{len(found.violations)} violations"
+            f"gate: {'passed' if self.passed else 'FAILED'}, {_count(found.rows, 'row')}, {timed} timed, "
+            f"{_count(found.violations, 'violation')}"
         )
 
     @property
@@ -221,3 +221,7 @@ def _plain(ratio: Ratio) -> dict[str, Any]:
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: finite_or_none(value) if isinstance(value, float) else value for name, value in values.items()}
+
+
+def _count(found: Sequence[object], what: str) -> str:
+    return f"{len(found)} {what}" + "s" * (len(found) != 1)

@@ -67,7 +67,7 @@ def test_the_table_has_both_versions():
 
 def test_the_text_has_a_line_for_each_violation_and_note():
     assert str(SLOWER).splitlines() == [
-        "gate: FAILED, 1 rows, 1 of them timed, 1 violations",
+        "gate: FAILED, 1 row, 1 timed, 1 violation",
         "time of a step, brick_flip, reduced: was 1e-06 s, is 1.100 times as long (1.080 to 1.120), "
         "allowed at most 1.05 times as long",
     ]
