@@ -40,12 +40,12 @@ def from_quaternion(q: ArrayLike) -> Array:
     quaternion drift shows that drift as lost orthonormality instead of having it tidied away.
     """
     w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    R = np.empty((*np.shape(w), 3, 3))  # written in place: engines are timed with it, and stacking takes twice as long
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = 2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz
+    return R
 
 
 def to_quaternion(R: ArrayLike) -> Array:

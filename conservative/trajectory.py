@@ -243,5 +243,7 @@ def _cut(found: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:
     """Return how many leading samples of attitudes (n, 3, 3) and rates (n, 3), rad/s, are finite."""
+    if np.isfinite(R_WB).all() and np.isfinite(w_WB_B).all():  # nearly always, and in a third of the time
+        return len(R_WB)
     finite = np.isfinite(R_WB).all(axis=(1, 2)) & np.isfinite(w_WB_B).all(axis=1)
-    return len(R_WB) if np.all(finite) else int(np.argmin(finite))
+    return int(np.argmin(finite))

@@ -217,9 +217,10 @@ def _order_axes(axes: Axes) -> Axes:
 def _least(n: Array) -> Array:
     """Return the least rotations (k, 3, 3) that take e_3 to unit vectors (k, 3), none of them -e_3."""
     x, y, z = n.T
+    a, b = x / (1 + z), y / (1 + z)
     out = np.empty((len(n), 3, 3))
-    out[:, 0, 0], out[:, 1, 1] = 1 - x * x / (1 + z), 1 - y * y / (1 + z)
-    out[:, 0, 1] = out[:, 1, 0] = -x * y / (1 + z)
+    out[:, 0, 0], out[:, 1, 1] = 1 - x * a, 1 - y * b
+    out[:, 0, 1] = out[:, 1, 0] = -x * b
     out[:, :, 2], out[:, 2, 0], out[:, 2, 1] = n, -x, -y
     return out
 
