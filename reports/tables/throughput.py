@@ -23,7 +23,7 @@ TERMS = (
     "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
     "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
     "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
-    "not count. Solutions of integrable motions are a class apart: exact ones take steps of 0.1 s, and would take any. Where "
+    "not count. Solutions of integrable motions are a class apart: solutions take steps of 0.1 s, and would take any. Where "
     "nothing else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
 )
 """What the tables mean."""

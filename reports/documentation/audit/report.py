@@ -49,7 +49,7 @@ CONSTANTS: tuple[tuple[str, Values], ...] = (
     ("is one, at {error:text} rad over all of them", {"error": tolerance(each_step.ERROR)}),
     ("or the {most:text}th percentile", {"most": throughput_extent.MOST.removesuffix(" %")}),
     ("Each runs for {duration} s of its motion", {"duration": ensembles.DURATION}),
-    ("exact ones take steps of {step} s", {"step": ensembles.DURATION / throughput_extent.EXACT_STEPS}),
+    ("solutions take steps of {step} s", {"step": ensembles.DURATION / throughput_extent.EXACT_STEPS}),
 )
 """What is said of limits that the code has."""
 ALLOWED = Path(__file__).with_name("allowed.toml")
