@@ -1,4 +1,4 @@
-"""The JavaScript libraries of the page, as it carries them: compressed, for the browser to unpack.
+"""The JavaScript libraries of the page, as it carries them: compressed, for the browser to unpack, as its charts are.
 
 Vega, Vega-Lite and Vega-Embed draw the charts, DataTables sorts and filters the tables.
 """
@@ -13,12 +13,13 @@ from pathlib import Path
 
 @lru_cache(maxsize=1)
 def packed() -> dict[str, str]:
-    """Return each library by its name: a JavaScript module, by gzip, in base64, which takes 45 % of its length."""
-    return {"vega": _pack(_vega()), "datatables": _pack(_datatables())}
+    """Return each library by its name: a JavaScript module, packed, which takes 45 % of its length."""
+    return {"vega": pack(_vega()), "datatables": pack(_datatables())}
 
 
-def _pack(script: str) -> str:
-    return base64.b64encode(gzip.compress(script.encode(), mtime=0)).decode()
+def pack(text: str) -> str:
+    """Return a text by gzip, in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def _vega() -> str:

@@ -59,7 +59,7 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         conserved=tolerance(CONSERVED),
         small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
-        charts=_in_script(_charts([*drawn, *alone])),
+        charts=libraries.pack(json.dumps(_charts([*drawn, *alone]), separators=(",", ":"))),
         libraries=libraries.packed(),
         turn=spheres.TURN,
         tilt=spheres.TILT,
@@ -83,11 +83,6 @@ def _whole(text: str) -> Markup:
 def _narrow(name: str) -> Markup:
     """Return a name in which a line may end after each underscore, so that a narrow column has whole words."""
     return Markup(str(escape(name)).replace("_", "_<wbr>"))
-
-
-def _in_script(content: Any) -> str:
-    """Return JSON that can stand in a script element."""
-    return json.dumps(content, separators=(",", ":"), ensure_ascii=False).replace("</", "<\\/")
 
 
 def _charts(figures: Iterable[PageFigure]) -> dict[str, Any]:

@@ -1,14 +1,13 @@
 "use strict";
 (async () => {
-  // The libraries are compressed modules.
+  // Charts are compressed JSON, libraries are compressed modules.
   const unpack = async (id) => {
     const { body } = await fetch(`data:;base64,${document.getElementById(id).textContent}`);
-    const script = await new Response(body.pipeThrough(new DecompressionStream("gzip"))).text();
-    return (await import(URL.createObjectURL(new Blob([script], { type: "text/javascript" })))).default;
+    return new Response(body.pipeThrough(new DecompressionStream("gzip"))).text();
   };
-  const vegaEmbed = await unpack("vega");
+  const load = async (id) => (await import(URL.createObjectURL(new Blob([await unpack(id)], { type: "text/javascript" })))).default;
+  const [vegaEmbed, content] = [await load("vega"), JSON.parse(await unpack("charts"))];
 
-  const content = JSON.parse(document.getElementById("charts").textContent);
   const night = matchMedia("(prefers-color-scheme: dark)");
   const figures = [...document.querySelectorAll("[data-figure]")];
   const views = new Map(figures.map((figure) => [figure, []]));
@@ -52,7 +51,7 @@
   const words = new Intl.Collator("en", { numeric: true });
 
   async function equip() {
-    const DataTable = await unpack("datatables");
+    const DataTable = await load("datatables");
     DataTable.type("words", { detect: () => true, order: ways(String, words.compare) });
     DataTable.type("numbers", { detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
     const language = { zeroRecords: "No row has all of these words." };

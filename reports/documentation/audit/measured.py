@@ -41,20 +41,22 @@ def run_of(evidence: Evidence, scene: str) -> Values:
     return {"t_end": float(found[1]), "dt": registry.scene(scene).dt}
 
 
-def ratios(evidence: Evidence, over: str, of: Sequence[str], scenes: Sequence[str] = ()) -> Values:
+def ratios(evidence: Evidence, over: str, of: Sequence[str], scenes: Sequence[str] = (), kept: str = "") -> Values:
     """Return the least and the largest time of some columns of README's table over another's, `low` and `high`.
 
-    That is at the errors of the table, where both get there; engines are named without their version.
+    That is at the errors of the table, where both get there, or in the rows whose label ends with `kept`; engines are named
+    without their version.
     """
-    every = [_ratio(members, name, over, error) for members, error in _entries(evidence, scenes) for name in of]
+    every = [_ratio(members, name, over, error) for members, error in _entries(evidence, scenes, kept) for name in of]
     return _range([ratio for ratio in every if 0 < ratio < math.inf])
 
 
-def _entries(evidence: Evidence, scenes: Sequence[str]) -> Iterator[tuple[dict[str, pd.DataFrame], float]]:
+def _entries(evidence: Evidence, scenes: Sequence[str], kept: str) -> Iterator[tuple[dict[str, pd.DataFrame], float]]:
     """Yield the points of each column at each error; on some scenes, or on all."""
     labels = [tolerance(error) for error in readme_table.ERRORS]
     for scene, label, members, error in evidence.entries:
-        if label in labels and (not scenes or scene in scenes):
+        chosen = label.endswith(kept) if kept else label in labels
+        if chosen and (not scenes or scene in scenes):
             yield {_unversioned(name): points for name, points in members.items()}, error
 
 
