@@ -20,7 +20,7 @@ HIGH_ORDER = 6
 HIGH_LENGTH = 14
 """Number of such steps, by sqrt 2, of which the first is one to an interval. Where the motion between two samples is slow, a
 method of high order is near round-off at that: it has no order then, and no cheaper way to a coarse error either."""
-TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+TOLERANCES = (0.5, 0.1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 """Tolerances of adaptive methods, beside their own."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -113,12 +114,18 @@ class Heyoka(Method):
         integrators, label = forms.compile_double(problem.form, self.tol, problem.fast_math), self.label
         propagate, t = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid, grid.t
 
+        @cache
+        def too_slow() -> str:  # once, so that repeated runs, which are timed, do not pay for it
+            with integrators.borrow() as integrator:
+                integrator.pars[:] = problem.parameters[: len(integrator.pars)]
+                _reset(integrator, problem.start)
+                return pace_reason(scene, integrator, float(t[-1]))
+
         def run() -> Trajectory:
+            reason = too_slow()
             with integrators.borrow() as integrator:
                 # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
                 integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-                _reset(integrator, problem.start)
-                reason = pace_reason(scene, integrator, float(t[-1]))
                 _reset(integrator, problem.start)
                 states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, t)
             R_WF, w = problem.readout(t[: len(states)], states)

@@ -19,6 +19,9 @@ from .random_ratios import count_bodies
 from .summary import cheapest
 from .work_precision import Contest, contests
 
+TIE = 1.1
+"""Ratio of two times below which neither is called faster: reports differ by as much."""
+
 
 @dataclass(frozen=True)
 class Statement:
@@ -83,7 +86,10 @@ def _texts(contests: list[Contest]) -> Iterator[tuple[str, bool]]:
         yield "no engine beats our general integrators at any error that it reaches.", False
     won = [c for c in contests if not c.lost and c.theirs]
     if won:
-        yield f"our general integrators are faster by {_range([c.ratio for c in won])}, at {_errors(won)}.", False
+        yield (
+            f"our general integrators are {_range([c.ratio for c in won])} as fast as the cheapest engine, at {_errors(won)}.",
+            False,
+        )
     alone = [c for c in contests if c.theirs is None]
     if alone and any(c.theirs for c in contests):
         yield f"only our general integrators reach {_errors(alone)}.", False
@@ -103,18 +109,20 @@ def of_each_step(scene: str, each: EachStep) -> Iterator[Statement]:
     kept = (
         f"with a sample at each {each.interval:.3g} s (our conversion of an engine's state included), at {tolerance(ERROR)} rad"
     )
-    alone = (
-        f"in steps of {each.interval:.3g} s of which the end is kept, where a solver need not stop, at {tolerance(ERROR)} rad"
-    )
+    steps = f"steps of {each.interval:.3g} s, at which a solver need not stop"
+    alone = f"where the end alone is kept of {steps}, at {tolerance(ERROR)} rad"
     for points, where in ((each.kept, kept), (each.alone, alone)):
         for kind in (MethodClass.GENERAL, MethodClass.SOLUTION) if len(points) else ():
             ours, engine = cheapest(points, (kind,), ERROR), cheapest(points, OF_ENGINES, ERROR)
             if ours and engine:
                 names = (f"{ours.name} ({kind})", engine.name)
-                yield Statement(scene, f"{_faster(names, engine.time / ours.time)}, {where}.", engine.time < ours.time)
+                ratio = engine.time / ours.time
+                yield Statement(scene, f"{_faster(names, ratio)}, {where}.", ratio < 1 / TIE)
 
 
 def _faster(names: tuple[str, str], ratio: float) -> str:
+    if max(ratio, 1 / ratio) < TIE:
+        return f"{names[0]} and {names[1]} take the same time to {TIE - 1:.0%}".replace("%", " %")
     one, other = names if ratio >= 1 else names[::-1]
     return f"{one} is {factor(max(ratio, 1 / ratio))} times as fast as {other}"
 

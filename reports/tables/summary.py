@@ -37,16 +37,17 @@ TERMS = (
 )
 """What the table says, in words."""
 SAMPLE_TERMS = (
-    f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution takes one step "
-    "from each to the next, however far: what it costs per simulated second depends on how many there are. Therefore the "
+    f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution's steps "
+    "may be as long as they are apart: what it costs per simulated second depends on how many there are. Therefore the "
     f"cost of a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a "
-    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state), and of one "
+    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state, which is most of "
+    "it for heyoka, so that this says little of heyoka itself), and of one "
     "that keeps the end alone, where a solver need not stop at each."
 )
 """What a sample is, and what it costs."""
 CAVEAT = (
-    "MuJoCo and Pinocchio are general engines: they pay for contacts and joints that no motion here uses, Pinocchio and SciPy "
-    "also for a loop in Python. This says what a rotation costs in them, and does not rank them."
+    "MuJoCo and Pinocchio are general engines, made for trees of many bodies. Most of the time of Pinocchio's RK4 is the loop "
+    "in Python around it, which is ours; SciPy's is in Python, too. This says what a rotation costs in them, and ranks none."
 )
 """What the comparison is not."""
 

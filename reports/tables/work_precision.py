@@ -1,8 +1,7 @@
 """Error against time: what each side needs to reach an error, and where it is beaten.
 
-The cost of an error, on a line of measured points, is that of the cheapest of two: a measured point with this error or a
-smaller one; and the log-log interpolation between two neighbouring points of the line, one above and one below. Nothing is
-extrapolated: where no point reaches an error, there is no cost.
+The cost of an error on a line of measured points is that of `cost_at_error`: no lucky point counts, between two neighbouring
+points the time is interpolated log-log, and nothing is extrapolated.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from conservative.benchmarks.measures import cost_at_error
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
@@ -95,19 +95,7 @@ def front(points: pd.DataFrame) -> pd.DataFrame:
 
 def cost(line: pd.DataFrame, error: float) -> float:
     """Return the time at which a line, points coarse to fine, gets to an error; nan where it does not."""
-    errors, times = line["error"].tolist(), line["time"].tolist()
-    below = [time for e, time in zip(errors, times, strict=True) if e <= error]
-    crossings = [
-        _between(error, errors[i : i + 2], times[i : i + 2])
-        for i in range(len(errors) - 1)
-        if min(errors[i : i + 2]) < error < max(errors[i : i + 2]) and min(errors[i : i + 2]) > 0
-    ]
-    return min([*below, *crossings], default=math.nan)
-
-
-def _between(error: float, errors: list[float], times: list[float]) -> float:
-    share = math.log(error / errors[0]) / math.log(errors[1] / errors[0])
-    return float(times[0] * (times[1] / times[0]) ** share)
+    return cost_at_error.cost(line["error"].tolist(), line["time"].tolist(), error)
 
 
 def contests(points: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Contest]:

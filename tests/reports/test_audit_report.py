@@ -113,7 +113,7 @@ def test_a_planted_sentence_fails(file, place, planted, rows, texts):
     [
         ("an engine is faster than our general integrators in ", "1"),
         ("only an engine gets there in ", "9"),
-        ("our general integrators are faster by ", "7"),
+        ("our general integrators are ", "7"),
         ("only our general integrators reach ", "1e-3, 7"),
         ("which solves integrable motions only, is ", "8"),
         ("gets to 1e-6 rad ", "9"),
@@ -137,7 +137,7 @@ def test_another_row_fails(rows, texts):
     table = rows.table
     slower = table.assign(value=table["value"].where(table["role"] != "engine", 3 * table["value"]))
     found = " ".join(report.find(report.Rows(slower, rows.command), {"report.md": texts["report.md"]}))
-    for words in ("our general integrators are faster", "in the geometric mean", "times as long (among", "as fast as"):
+    for words in ("our general integrators are", "in the geometric mean", "times as long (among", "as fast as"):
         assert words in found
 
 

@@ -101,7 +101,7 @@ def test_verdict_names_the_engine_the_errors_and_the_factor():
     assert lines == [
         "made_up: engine is 3.5 times as fast as our general integrators, at 1e-6 rad, "  # 16 / (2 x 4^0.6)
         "and reaches 1e-7 rad, which none of them was measured to reach.",
-        "made_up: our general integrators are faster by 2.0 times, at 1e-2 rad.",
+        "made_up: our general integrators are 2.0 times as fast as the cheapest engine, at 1e-2 rad.",
     ]
 
 

@@ -14,6 +14,7 @@ from conservative.benchmarks.studies.throughput_extent import MEDIAN
 
 from ...tables.cells import tolerance
 from ...tables.classes import OF_ENGINES, MethodClass
+from ...tables.headline import TIE
 from ...tables.random_contests import Contest, Pair
 from ...tables.summary import MIDDLE
 from .rows import OURS, SOLUTIONS, Duel, Rows, cheapest, extent, told
@@ -76,7 +77,7 @@ def of_decades(rows: Rows, scene: str) -> Tellers:
     yield f"{fast}, and reaches {only}, which none", lost
     yield f"{{engine:words}} reaches {only}, which none", lost
     yield (
-        "our general integrators are faster by {range:text} times, at {errors:text} rad.",
+        "our general integrators are {range:text} times as fast as the cheapest engine, at {errors:text} rad.",
         lambda: won(duels, lambda d: d.ratio >= 1),
     )
     yield "only our general integrators reach {errors:text} rad.", lambda: won(duels, lambda d: bool(d.ours and not d.engine))
@@ -100,15 +101,18 @@ def of_each_step(rows: Rows, scene: str) -> Tellers:
         one, other = (cheapest(points, classes, ERROR) for classes in ((kind,), OF_ENGINES))
         if one is None or other is None or (one[0], other[0]) != (ours, engine):
             raise NoSupportError(f"where each step of {scene} is run the cheapest are {one} and {other}")
-        return {**said, "won": other[1] / one[1], "lost": one[1] / other[1]}
+        ratio = other[1] / one[1]
+        same = {"same": round(100 * (TIE - 1))} if 1 / TIE < ratio < TIE else {}
+        return {**said, **same, "won": ratio, "lost": 1 / ratio}
 
     kept = "with a sample at each {interval:text} s (our conversion of an engine's state included), at {error:text} rad."
-    alone = "in steps of {interval:text} s of which the end is kept, where a solver need not stop, at {error:text} rad."
+    alone = "where the end alone is kept of steps of {interval:text} s, at which a solver need not stop, at {error:text} rad."
     for points, where in ((each.kept, kept), (each.alone, alone)):
         for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
             values = partial(contest, points, kind)
             yield f"{{ours:words}} ({kind}) is {{won}} times as fast as {{engine:words}}, {where}", values
             yield f"{{engine:words}} is {{lost}} times as fast as {{ours:words}} ({kind}), {where}", values
+            yield f"{{ours:words}} ({kind}) and {{engine:words}} take the same time to {{same}} %, {where}", values
 
 
 def of_random_bodies(rows: Rows) -> Tellers:
