@@ -26,11 +26,24 @@ from .sentences import NoSupportError, Values
 
 def drift(evidence: Evidence, scene: str, methods: Sequence[str]) -> Values:
     """Return `size`, the largest drift of the energy of each method over the scene at its own step, and that step, `dt`, s."""
-    step = registry.scene(scene).dt
+    found = _measured(evidence, scene, Measure.DRIFT_MAX, "energy")
+    return {"size": _values(found, methods), "dt": registry.scene(scene).dt}
+
+
+def attitude(evidence: Evidence, scene: str, methods: Sequence[str]) -> Values:
+    """Return `error`, rad, the largest of the attitude of each method over the scene at its own step."""
+    return {"error": _values(_measured(evidence, scene, Measure.ATTITUDE_MAX, ""), methods)}
+
+
+def _measured(evidence: Evidence, scene: str, measure: Measure, quantity: str) -> pd.DataFrame:
+    """Return the rows of a measure at a scene's own step."""
     rows = evidence.rows
-    found = rows[(rows["study"] == "paper") & (rows["scene"] == scene) & (rows["dt"] == step)]
-    found = found[(found["measure"] == Measure.DRIFT_MAX.text) & (found["quantity"] == "energy")]
-    return {"size": [_only(found[found["method"] == method]["value"], method) for method in methods], "dt": step}
+    found = rows[(rows["study"] == "paper") & (rows["scene"] == scene) & (rows["dt"] == registry.scene(scene).dt)]
+    return found[(found["measure"] == measure.text) & (found["quantity"] == quantity)]
+
+
+def _values(found: pd.DataFrame, methods: Sequence[str]) -> list[float]:
+    return [_only(found[found["method"] == method]["value"], method) for method in methods]
 
 
 def run_of(evidence: Evidence, scene: str) -> Values:
@@ -152,5 +165,5 @@ def registered(evidence: Evidence, group: str, without: Sequence[str] = ()) -> V
 
 
 FUNCTIONS: dict[str, Callable[..., Values]] = {
-    function.__name__: function for function in (drift, run_of, ratios, random_bodies, origin, by_hand, engines, registered)
+    function.__name__: function for function in (attitude, drift, run_of, ratios, random_bodies, origin, by_hand, engines, registered)
 }

@@ -25,7 +25,7 @@ Lines = set[tuple[str, str]]
 
 
 def of_costs(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of a report that README's table of costs and its drifts follow from.
+    """Return the rows of a report that README's table of costs, its drifts and errors follow from.
 
     Raises
     ------
@@ -33,9 +33,10 @@ def of_costs(table: pd.DataFrame) -> pd.DataFrame:
         They do not give the table that the whole report gives.
     """
     compared = table["study"].isin(("work_precision", each_step.STUDY)) & _among(table, set(_lines(with_names(table))))
-    drifts = (table["study"] == "paper") & (table["measure"] == Measure.DRIFT_MAX.text) & (table["quantity"] == "energy")
+    energy = (table["measure"] == Measure.DRIFT_MAX.text) & (table["quantity"] == "energy")
+    of_paper = (table["study"] == "paper") & (energy | (table["measure"] == Measure.ATTITUDE_MAX.text))
     truths = (table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)
-    return _checked(table, compared | drifts | truths, lambda some: list(rows(entries(with_names(some)))))
+    return _checked(table, compared | of_paper | truths, lambda some: list(rows(entries(with_names(some)))))
 
 
 def _lines(table: pd.DataFrame) -> Iterator[tuple[str, str]]:
