@@ -59,7 +59,9 @@ def test_what_is_lost_with_the_end_alone_is_said():
         "gauss (our general integrators) is 2.0 times as fast as heyoka, with a sample at each 0.1 s"
     )
     assert found[0].text.endswith("at 1e-6 rad.")
-    assert found[2].text.startswith("heyoka is 2.0 times as fast as reduced (our general integrators), where the end alone is kept of steps of 0.1 s")
+    assert found[2].text.startswith(
+        "heyoka is 2.0 times as fast as reduced (our general integrators), where the end alone is kept of steps of 0.1 s"
+    )
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])

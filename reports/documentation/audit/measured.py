@@ -141,6 +141,8 @@ def by_hand(evidence: Evidence, of: str, places: Sequence[str] = ()) -> Values:
     if of not in evidence.by_hand:
         raise NoSupportError(f"by_hand.csv has no row of {of!r}")
     values = evidence.by_hand[of]
+    if places and len(places) != len(values):
+        raise NoSupportError(f"by_hand.csv has {len(values)} values of {of!r}, not {len(places)}")
     return dict(zip(places, values, strict=True)) if places else _range(values)
 
 
@@ -165,5 +167,6 @@ def registered(evidence: Evidence, group: str, without: Sequence[str] = ()) -> V
 
 
 FUNCTIONS: dict[str, Callable[..., Values]] = {
-    function.__name__: function for function in (attitude, drift, run_of, ratios, random_bodies, origin, by_hand, engines, registered)
+    function.__name__: function
+    for function in (attitude, drift, run_of, ratios, random_bodies, origin, by_hand, engines, registered)
 }
