@@ -112,7 +112,6 @@ def test_a_claim_or_an_allowed_text_that_is_not_on_the_page_fails(evidence):
 
 
 def test_a_claim_covers_no_number_that_it_does_not_name(evidence):
-    text = TEXT
     was, other = (f'of = "{name}"' for name in ("1000 heavy tops: mujoco.rollout over ours at 1e-3 rad", FREE))
     claims = CLAIMS.replace(was, other)
     assert '"1e-3"' in " ".join(readme.audit(TEXT, evidence, claims))
