@@ -85,7 +85,7 @@ def _setting(point: pd.Series[str]) -> str:
 
 
 def cells(costs: Sequence[tuple[float, str]]) -> list[str]:
-    """Return the costs of a row as text: µs to three digits, and the setting."""
+    """Return the costs of a row as text: µs to two digits, as reports differ in the second, and the setting."""
     least = min(time for time, _ in costs)
     return [cell(time, setting, time == least) for time, setting in costs]
 
@@ -94,7 +94,7 @@ def cell(time: float, setting: str, bold: bool) -> str:
     """Return one cell."""
     if math.isinf(time):
         return DASH
-    digits = factor(1e6 * time, 3)
+    digits = factor(1e6 * time)
     return f"**{digits}** {setting}" if bold else f"{digits} {setting}"
 
 

@@ -160,7 +160,7 @@ def _row(kind: MethodClass, points: pd.DataFrame, drifts: pd.DataFrame, troubles
 
 def microseconds(time: float) -> str:
     """Return a time, s, in µs as people write it."""
-    return factor(1e6 * time, 3)
+    return factor(1e6 * time)
 
 
 def keeps(drifts: pd.DataFrame) -> str:
