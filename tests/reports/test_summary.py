@@ -95,7 +95,7 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert (ours["µs at 1e-3 rad"], ours["µs at 1e-6 rad"], ours["µs at 1e-9 rad"]) == ("2.0 gauss", "3.4 gauss", "–")
     assert float(ours["error at equal cost"]) == 1e-7  # no smaller one was measured, at any cost
     assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
-    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.100 lame"
+    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 lame"
     assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
 
