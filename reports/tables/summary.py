@@ -32,7 +32,8 @@ SCENE_HEADER = (*HEADER[:-1], "µs a sample, each step kept", HEADER[-1])
 """Of a scene; random bodies have no study of samples at each step."""
 TERMS = (
     "µs of computing per simulated second at an attitude error, by the cheapest of the class; – where none was measured to get "
-    f"there. Error at equal cost: at that at which the cheapest engine has {tolerance(MIDDLE)} rad. Kept over long runs (✓ "
+    "there. Error at equal cost: that of a class at the cost at which the cheapest engine gets to "
+    f"{tolerance(MIDDLE)} rad. Kept over long runs (✓ "
     f"within {tolerance(CONSERVED)}, ≈ within {tolerance(SMALL)}, ✗ more; relative), by the setting that keeps it best."
 )
 """What the table says, in words."""
@@ -40,8 +41,8 @@ SAMPLE_TERMS = (
     f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution's steps "
     "may be as long as they are apart: what it costs per simulated second depends on how many there are. Therefore the "
     f"cost of a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a "
-    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state, which is most of "
-    "it for heyoka, so that this says little of heyoka itself), and of one "
+    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state, which for "
+    "heyoka is a large part, so that this says little of heyoka itself), and of one "
     "that keeps the end alone, where a solver need not stop at each."
 )
 """What a sample is, and what it costs."""
