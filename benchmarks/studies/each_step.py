@@ -70,7 +70,9 @@ def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
         return [Case(study.name, scene, method, grid)]
     if setting is None:
         return [Case(study.name, scene, method, Grid(grid.dt / k, grid.n_steps * k, k)) for k in STEPS]
-    return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in TOLERANCES]
+    return [
+        Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in TOLERANCES[:: 2 if study.quick else 1]
+    ]
 
 
 def coarsest(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, list[Case]]:

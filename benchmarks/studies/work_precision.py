@@ -59,7 +59,7 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
     grid = step_ladder.samples(scene, method)
     if setting is None:
         return [Case(study.name, scene, method, grid)]
-    tolerances = {*step_ladder.TOLERANCES[:: 2 if study.quick else 1], getattr(method, setting)}
+    tolerances = {*(step_ladder.TOLERANCES[1::3] if study.quick else step_ladder.TOLERANCES), getattr(method, setting)}
     return [Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in sorted(tolerances, reverse=True)]
 
 

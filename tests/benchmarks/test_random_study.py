@@ -93,7 +93,7 @@ def test_what_a_family_stands_for():
     ours = {each.name for each in chosen if each.role == Role.OURS}
     assert {"projected", "gauss", "reduced:order=6"} <= ours
     assert "reduced" not in ours  # of order 2
-    assert {each.frame for each in chosen if each.family == "heyoka"} == {"body", "non_spinning", "lean"}
+    assert {each.frame for each in chosen if each.family == "heyoka"} == {"base_vectors", "body", "non_spinning", "lean"}
     assert {each.name for each in chosen if each.family in ("mujoco", "pinocchio")} == {"mujoco", "pinocchio"}
 
 

@@ -53,7 +53,7 @@ def test_what_changed_between_versions_is_found_and_left_in_files(track, tmp_pat
     assert words.splitlines() == [f"installing trial=={version}" for version in BEHAVIOUR]
     rose, gone = text.partition("What changed\n")[2].splitlines()[:2]
     assert "as_packaged on brick_flip: from 1.0 to 1.1 the orders of attitude and rates rose from 2 to 4" in rose
-    assert "the attitude error at dt = 0.01 s fell from 2.1e-03 to 2.6e-07 rad" in rose
+    assert "the attitude error at dt = 0.01 s fell from 2.1e-3 to 2.6e-7 rad" in rose
     assert gone.endswith("from 1.1 to 1.2 it disappeared")
     assert (tmp_path / "track.md").read_text() == (tmp_path / "page" / "track.md").read_text()
     assert rose.strip() in (tmp_path / "page" / "track.html").read_text()
