@@ -33,7 +33,7 @@ from .sentences import Sentence, Values, judge
 from .text import Number, Page
 
 CONSTANTS: tuple[tuple[str, Values], ...] = (
-    ("the cheapest engine has {middle:text} rad. Kept", {"middle": tolerance(MIDDLE)}),
+    ("the cheapest engine gets to {middle:text} rad. Kept", {"middle": tolerance(MIDDLE)}),
     ("✓ within {kept:text}, ≈ within {small:text}, ✗ more", {"kept": tolerance(CONSERVED), "small": tolerance(SMALL)}),
     ("✓ up to {right:text} rad, ≈ up to {usable} rad, ✗ more", {"right": tolerance(RIGHT), "usable": USABLE}),
     ("stays within {usable} rad", {"usable": USABLE}),
