@@ -58,7 +58,7 @@ def sizes(drift: Array) -> Array:
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
 
 
-def named(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
+def find_invariant(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
     """Return an invariant, which may be given by its name among those that are known.
 
     Raises

@@ -83,7 +83,7 @@ class Trajectory:
         It is one of `scene.invariants`, by itself or by name, such as "energy"; `conservative.invariants.sizes` makes sizes of
         what is returned, of a vector its length. Another name is a `BadInput`.
         """
-        invariant = invariants.named(invariant, self.scene.invariants)
+        invariant = invariants.find_invariant(invariant, self.scene.invariants)
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
         R = self.scene.in_field_axes(self.R_WB, self.t)
         return np.asarray((invariant.evaluate(R, self.w_WB_B) - start) / invariant.scale)

@@ -7,8 +7,8 @@ tolerance evaluates between its own steps, which can be longer.
 * A method is taken at the coarsest of its settings whose largest attitude error, over all samples, is at most `ERROR`: so many
   steps to an interval, or a tolerance. One that gets there at none has errors and no time.
 * It is timed twice, interleaved with all others: with all samples kept, attitude matrices and rates as a run returns them,
-  which for an engine includes the conversion from its own state (of heyoka's 0.5 to 0.9 µs a sample on the brick 0.16 to 0.19
-  are its own, measured); and with the end alone kept, as all other studies do.
+  which for an engine includes the conversion from its own state (of heyoka's 0.4 to 0.7 µs a sample on the brick about
+  0.2 are its own, measured); and with the end alone kept, as all other studies do.
 """
 
 from __future__ import annotations

@@ -115,18 +115,15 @@ class Heyoka(Method):
         propagate, t = _from_sample_to_sample if grid.n_samples <= _FEW_SAMPLES else _over_grid, grid.t
 
         @cache
-        def too_slow() -> str:  # once, so that repeated runs, which are timed, do not pay for it
+        def find_reason() -> str:  # once, so that repeated runs, which are timed, do not pay for it
             with integrators.borrow() as integrator:
-                integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-                _reset(integrator, problem.start)
+                _begin(integrator, problem)
                 return pace_reason(scene, integrator, float(t[-1]))
 
         def run() -> Trajectory:
-            reason = too_slow()
+            reason = find_reason()
             with integrators.borrow() as integrator:
-                # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
-                integrator.pars[:] = problem.parameters[: len(integrator.pars)]
-                _reset(integrator, problem.start)
+                _begin(integrator, problem)
                 states, steps, reason = (problem.start[None], 0, reason) if reason else propagate(integrator, t)
             R_WF, w = problem.readout(t[: len(states)], states)
             return problem.axes.trajectory(grid, label, R_WF, w, Counters(steps), reason)
@@ -161,9 +158,11 @@ class Heyoka(Method):
         return cls(1e-9), cls(1e-16)
 
 
-def _reset(integrator: Any, start: Array) -> None:
+def _begin(integrator: Any, problem: formulations.Formulation) -> None:
+    # Parameters at the end that equations have no use for (for a spin about a principal axis, say) are not stored.
+    integrator.pars[:] = problem.parameters[: len(integrator.pars)]
     integrator.time = 0.0
-    integrator.state[:] = start
+    integrator.state[:] = problem.start
 
 
 def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, str]:

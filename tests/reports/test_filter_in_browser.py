@@ -11,7 +11,7 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.view import build
 
 from .made_up_engines import at_step, over_steps
-from .test_page_in_browser import start, wait
+from .test_page_in_browser import open_drawn, wait
 
 pytestmark = pytest.mark.browser
 ROWS = "[...document.querySelectorAll('#engines .compact')[1].querySelectorAll('tbody tr:has(th)')]"
@@ -32,13 +32,8 @@ def opened(tmp_path_factory):
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     file = tmp_path_factory.mktemp("page") / "index.html"
     file.write_text(page.render(view, charts, engines.charts(view.engines)), encoding="utf-8")
-    browser = start(tmp_path_factory.mktemp("profile"))
-    try:
-        browser.get(file.as_uri())
-        wait(browser, "return document.documentElement.dataset.drawn")
+    with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
-    finally:
-        browser.quit()
 
 
 @pytest.mark.parametrize(("words", "count"), [("", 3), ("euler", 2), ("EULER  b==2", 1), ("as installed", 1), ("nothing", 0)])

@@ -16,7 +16,7 @@ from conservative.reports.view import build
 
 from .made_up import measurements, row
 from .rows import point
-from .test_page_in_browser import start, wait
+from .test_page_in_browser import open_drawn, wait
 from .test_random_ratios import SLOWER, TWICE
 from .test_throughput import ROWS as MANY_BODIES
 
@@ -55,13 +55,8 @@ def opened(tmp_path_factory):
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     file = tmp_path_factory.mktemp("page") / "index.html"
     file.write_text(page.render(view, charts, {}, random_bodies.chart(view.random)), encoding="utf-8")
-    browser = start(tmp_path_factory.mktemp("profile"))
-    try:
-        browser.get(file.as_uri())
-        wait(browser, "return document.documentElement.dataset.drawn")
+    with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
-    finally:
-        browser.quit()
 
 
 @pytest.fixture

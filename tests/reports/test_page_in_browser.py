@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import time
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -36,6 +37,18 @@ def folder(tmp_path_factory):
     return out
 
 
+@contextmanager
+def open_drawn(file, profile):
+    """Have a browser that has opened and drawn a page, for the length of a block."""
+    browser = start(profile)
+    try:
+        browser.get(file.as_uri())
+        wait(browser, "return document.documentElement.dataset.drawn")
+        yield browser
+    finally:
+        browser.quit()
+
+
 def start(profile):
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
@@ -55,13 +68,8 @@ def start(profile):
 @pytest.fixture(scope="module")
 def opened(folder, tmp_path_factory):
     """The page, opened and drawn, and everything that the browser asked for on the way."""
-    browser = start(tmp_path_factory.mktemp("profile"))
-    try:
-        browser.get((folder / "index.html").as_uri())
-        wait(browser, "return document.documentElement.dataset.drawn")
+    with open_drawn(folder / "index.html", tmp_path_factory.mktemp("profile")) as browser:
         yield browser
-    finally:
-        browser.quit()
 
 
 def wait(browser, script):
