@@ -60,3 +60,12 @@ def test_a_function_that_fails_in_an_engine_is_named():
     with pytest.raises(cv.PotentialFailed) as caught:
         cv.integrate(scene, 0.1, SciPy())
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+def test_what_is_timed_does_not_look_for_a_reason_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr(heyoka, "pace_reason", lambda *given: asked.append(given) or "")
+    run = Heyoka(1e-6).prepare(registry.scene("brick_flip"), cv.Grid(0.1, 10))
+    for _ in range(3):
+        assert run().outcome.ok
+    assert len(asked) == 1

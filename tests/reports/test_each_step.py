@@ -69,3 +69,15 @@ def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
     found = each_step.of_scene(table, "made_up")
     assert list(headline.of_each_step("made_up", found)) == []
     assert len(found.kept) == len(found.alone) == 0
+
+
+@pytest.mark.parametrize("ratio", [0.92, 1.0, 1.09])
+def test_times_within_a_tenth_are_the_same(ratio):
+    assert headline._faster(("ours", "heyoka"), ratio) == "ours and heyoka take the same time to 10 %"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "told"), [(1.2, "ours is 1.2 times as fast as heyoka"), (0.5, "heyoka is 2.0 times as fast as ours")]
+)
+def test_times_further_apart_are_told(ratio, told):
+    assert headline._faster(("ours", "heyoka"), ratio) == told

@@ -1,5 +1,6 @@
 import math
 
+import pandas as pd
 import pytest
 
 from conservative.benchmarks.measures.measure import Measure
@@ -30,6 +31,12 @@ def test_the_cheapest_of_several_lines_counts():
     found = contest(1e-4, *OURS, *ENGINE, *dear)
     assert found.ours == work_precision.CheapestLine("ours", 4.0)
     assert found.theirs.name == "engine"
+
+
+def test_a_lucky_point_is_no_cost():
+    line = pd.DataFrame({"error": [1e-3, 1e-8, 1e-5], "time": [1.0, 2.0, 3.0]})
+    assert work_precision.cost(line, 1e-5) == 2.0
+    assert math.isnan(work_precision.cost(line, 1e-6))
 
 
 def test_between_points_the_cost_is_log_log():
