@@ -29,7 +29,6 @@ ALLOWED = {
     "benchmarks/studies/random.py": ("precise", "the truth of a body in any field"),
     "benchmarks/studies/throughput.py": ("heyoka", "the truth of many bodies, at a tolerance below round-off"),
     "benchmarks/verification/comparison_alarms.py": ("moser_veselov reduced", "the rows that are slowed"),
-    "benchmarks/verification/gate_false_alarms.py": ("reduced", "the row that is slowed"),
     "benchmarks/verification/hostile_bodies.py": (
         "convected exact gauss moser_veselov reduced substepped",
         "what moves random bodies, and the truth that it is compared with",
@@ -41,9 +40,7 @@ ALLOWED = {
     "benchmarks/verification/interrupts.py": ("scipy", "a run that stays in Python for long"),
     "benchmarks/verification/kills.py": ("moser_veselov", "the method of the report that is killed"),
     "benchmarks/measures/measure.py": ("newton", "the word for an iteration, which is an engine's name, too"),
-    "benchmarks/verification/operations.py": ("moser_veselov reduced taylor", "whose operations are counted"),
     "benchmarks/verification/report_kills.py": ("exudyn", "default of an option"),
-    "benchmarks/verification/roofline.py": ("taylor", "whose series are counted by a formula"),
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
     "benchmarks/verification/third_truth.py": ("exact orekit precise", "the solutions that are compared, and who decides"),
     "benchmarks/verification/worker_kills.py": ("exudyn", "default of an option"),

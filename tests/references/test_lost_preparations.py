@@ -3,7 +3,6 @@
 import pytest
 
 import conservative as cv
-from conservative.benchmarks.verification.worker_cost import pairs, same_states
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.client import Worker
 from conservative.references.environments.failures import EngineCrashed
@@ -31,15 +30,3 @@ def test_a_kill_in_a_preparation_is_an_outcome(trial_cache, first_preparation_is
     killed = cv.integrate(SCENE, 0.01, Trial(), on_failure="return")
     assert (killed.outcome.kind, killed.outcome.reason) == (OutcomeKind.CRASHED, "signal 9 (SIGKILL)")
     assert cv.integrate(SCENE, 0.01, Trial()).ok
-
-
-def test_other_bits_are_seen():
-    one, same, other = (cv.integrate(SCENE, dt, cv.Reduced()) for dt in (0.01, 0.01, 0.005))
-    assert same_states(one, same)
-    assert not same_states(one, other)
-
-
-@pytest.mark.engine("mujoco==3.6.0")
-def test_two_versions_are_not_compared_as_one():
-    with pytest.raises(cv.BadInput, match="that of this process"):
-        list(pairs("mujoco", "3.6.0"))
