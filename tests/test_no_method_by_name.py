@@ -44,10 +44,6 @@ ALLOWED = {
     "benchmarks/verification/round_off.py": ("reduced", "default of an option"),
     "benchmarks/verification/third_truth.py": ("exact orekit precise", "the solutions that are compared, and who decides"),
     "benchmarks/verification/worker_kills.py": ("exudyn", "default of an option"),
-    "reports/documentation/readme_pictures.py": (
-        "exact gauss heyoka moser_veselov mujoco pinocchio projected reduced scipy taylor",
-        "what the pages picture",
-    ),
     "reports/run/provenance.py": ("heyoka mujoco scipy", "packages whose versions a report names"),
 }
 """Names that a file has beside those of its own methods, no more and no fewer, and why."""

@@ -1,1 +1,1 @@
-"""What the documentation is made with, API pages, pictures and tables, and what audits its numbers."""
+"""The pages of public names, and a notebook."""

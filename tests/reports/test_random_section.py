@@ -5,7 +5,6 @@ import pytest
 
 from conservative.benchmarks.measures import measurement
 from conservative.reports import document, view
-from conservative.reports.documentation import readme_table
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import BODIES, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
@@ -92,13 +91,3 @@ def test_progress_counts_the_bodies(plan):
     start, end = plan.spans(plan.names)["random"]
     assert start == 0
     assert 0 < end < 1
-
-
-@pytest.mark.parametrize("name", ["measurements.csv", "study.csv"])
-def test_the_readme_has_a_table_of_them(name, tmp_path, monkeypatch, capsys):
-    ROWS.to_csv(tmp_path / name, index=False)
-    monkeypatch.setattr("sys.argv", ["readme_table", str(tmp_path), "--random"])
-    readme_table.main()
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "| field | 1e-3 | 1e-6 | 1e-9 | 1e-12 |"  # a single engine has no column
-    assert lines[2].startswith("| spring | 1.00 (0.50 to 2.00) |")

@@ -18,7 +18,6 @@ from conservative.reports import document
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import split_names
-from conservative.reports.documentation.audit import report
 from conservative.reports.run import plan
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -197,7 +196,6 @@ def test_failure_of_ours_is_told(monkeypatch):
     failed = runs.failures_of_ours(frame(found))
     assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
     monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed, random=None))
-    monkeypatch.setattr(report, "audit", lambda folder: [])
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr
