@@ -1,40 +1,68 @@
-"""Tests in a real browser run with `pytest --browser`, where a browser that is missing is a failure, not a skip.
+"""Which tests run, signals as tests expect them, and programs that end with the test that started them.
 
-Those of real engines run with `pytest --engines exudyn,mujoco==3.6.0`, which installs what is not installed.
+`pytest` runs everything that needs neither minutes, a browser, an engine in an environment of its own, nor many processes.
+Tests that do are marked. `pytest --all` runs them as well, except the random search for failures: `pytest --attack`.
 """
 
 import os
+import signal
 import tarfile
 
 import pytest
 
-from .environments import ROOT, build
+from .environments import ROOT, build, programs
+
+MARKERS = {
+    "slow": "needs kills, builds, clusters, environments or many processes; runs with --all",
+    "browser": "needs chromium and its driver; runs with --browser or --all",
+    "engine(name)": "needs an engine in an environment of its own; runs with --engines name or --all",
+    "attack": "searches for failures at random; runs with --attack",
+}
+ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0"
+"""Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
+
+# A shell starts background jobs with SIGINT ignored, nohup with SIGHUP ignored, and every process started from there inherits
+# that. With a handler, programs that tests start have the default again. The handler for SIGHUP does nothing, as nohup wants.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda number, frame: None)
 
 
 def pytest_addoption(parser):
+    parser.addoption("--all", action="store_true", help=f"Also run the tests marked slow and browser, and --engines {ENGINES}.")
     parser.addoption("--browser", action="store_true", help="Also run the tests that need chromium and its driver.")
-
     parser.addoption("--engines", metavar="NAME[==VERSION],...", default="", help="Also run the tests of these engines.")
+    parser.addoption("--attack", action="store_true", help="Also run the tests that search for failures at random.")
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "engine(name): needs an engine in an environment; runs with --engines name")
-    config.addinivalue_line("markers", "browser: needs chromium; runs with --browser")
+    for name, meaning in MARKERS.items():
+        config.addinivalue_line("markers", f"{name}: {meaning}")
     for name in [name for name in os.environ if name.startswith("PYTEST_XDIST")]:
         del os.environ[name]  # a pytest that a test starts is no worker, and pytest-benchmark would take it for one
 
 
 def pytest_collection_modifyitems(config, items):
-    engines = set(filter(None, config.getoption("--engines").split(",")))
+    everything = config.getoption("--all")
+    engines = set(filter(None, (config.getoption("--engines") or (ENGINES if everything else "")).split(",")))
+    wanted = {
+        "slow": everything,
+        "browser": everything or config.getoption("--browser"),
+        "attack": config.getoption("--attack"),
+    }
     for item in items:
-        marker = item.get_closest_marker("engine")
-        if marker and not {marker.args[0], marker.args[0].partition("==")[0]} & engines:
-            item.add_marker(pytest.mark.skip(reason=f"needs {marker.args[0]}: runs with --engines {marker.args[0]}"))
-    if config.getoption("--browser"):
-        return
-    for item in items:
-        if item.get_closest_marker("browser"):
-            item.add_marker(pytest.mark.skip(reason="needs chromium and its driver: runs with --browser"))
+        for mark in item.iter_markers():
+            if not wanted.get(mark.name, True):
+                item.add_marker(pytest.mark.skip(reason=f"{mark.name}: {MARKERS[mark.name]}"))
+            if mark.name == "engine" and not {mark.args[0], mark.args[0].partition("==")[0]} & engines:
+                item.add_marker(pytest.mark.skip(reason=f"needs {mark.args[0]}: runs with --engines {mark.args[0]}"))
+
+
+@pytest.fixture
+def start():
+    """Start programs as `subprocess.Popen` does; they and their children are killed at the end of the test."""
+    with programs() as popen:
+        yield popen
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,11 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import sysconfig
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +36,29 @@ def run_python(code, *arguments, **changed):
     environment = variables(**{"PYTHONPATH": str(ROOT), **changed})
     done = subprocess.run(command, env=environment, cwd="/", capture_output=True, text=True, timeout=300, check=False)
     return done.returncode, done.stdout, done.stderr
+
+
+@contextmanager
+def programs():
+    """Yield a function that starts programs as `subprocess.Popen` does, each in a process group of its own.
+
+    All groups are killed at the end of the block. `os.killpg(process.pid, number)` sends a signal to a whole group.
+    """
+    started = []
+
+    def popen(command, **options):
+        process = subprocess.Popen(command, start_new_session=True, **options)
+        started.append(process)
+        return process
+
+    try:
+        yield popen
+    finally:
+        for process in started:
+            with suppress(ProcessLookupError):  # all of the group may have ended
+                os.killpg(process.pid, signal.SIGKILL)
+            with process:  # closes its pipes and waits for it
+                pass
 
 
 @dataclass(frozen=True)
