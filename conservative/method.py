@@ -12,7 +12,7 @@ import numpy as np
 
 from .attitude import Array
 from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory
-from .declarations import Candidacy, Claims, Cost, maker_of, refuse_time, settings_text
+from .declarations import Candidacy, Cost, maker_of, refuse_time, settings_text
 from .declarations import Role as Role
 from .errors import BadInput
 from .scene import Scene
@@ -104,15 +104,11 @@ class Method(ABC):
         The name that the class is registered with, and the side it is on.
     candidacy
         How the automatic choice considers it; None where it does not.
-    claims
-        What is claimed of it, and where: reports check `order` and `conserves` against that. None where nobody claims anything.
     colour
         A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
     module, kernel
         Module of an engine, whose import reports time, and module in `conservative.kernels` whose function `enter` takes all
         steps of a run; "" for none.
-    step_goals
-        Names of methods, and how many times longer than one of its own steps a step of theirs is meant to take.
     time_dependent
         Whether it takes potentials that depend on the time; of others `unsupported` says that by itself, whatever else it says.
     """
@@ -120,11 +116,9 @@ class Method(ABC):
     family: ClassVar[str]
     role: ClassVar[Role]
     candidacy: ClassVar[Candidacy | None] = None
-    claims: ClassVar[Claims | None] = None
     colour: ClassVar[str | None] = None
     module: ClassVar[str] = ""
     kernel: ClassVar[str] = ""
-    step_goals: ClassVar[tuple[tuple[str, float], ...]] = ()
     time_dependent: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
@@ -224,11 +218,6 @@ class Method(ABC):
     @classmethod
     def many_settings(cls) -> tuple[Method, ...]:
         """Return the settings measured on many bodies, first the one that stands for all; by default those of the suite."""
-        return cls.suite_settings()
-
-    @classmethod
-    def audit_settings(cls) -> tuple[Method, ...]:
-        """Return the settings whose order `claims` are about; by default those of the suite."""
         return cls.suite_settings()
 
     @classmethod

@@ -14,7 +14,6 @@ from .run.measure import Measurements
 from .run.plan import Plan
 from .run.provenance import Provenance
 from .tables import (
-    claims,
     each_step,
     engine_scenes,
     engine_tables,
@@ -85,7 +84,6 @@ class View:
     paper: PaperView
     hard_cases: hard_cases.HardCases | None
     stability: Table | None
-    claims: Table
     imports: Table
     truths: Table
     failures: Table
@@ -119,7 +117,6 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         paper=_paper(table, samples),
         hard_cases=hard_cases.hard_cases(table),
         stability=hard_cases.stability(table),
-        claims=claims.as_table(claims.findings(table, builder.fits, plan.scenes)),
         imports=runs.imports(table),
         truths=runs.truths(table),
         failures=runs.failures(table),

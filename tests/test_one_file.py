@@ -7,20 +7,16 @@ import pytest
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import search
 from conservative.reports.charts import style
-from conservative.reports.tables import claims, orders
-
-from .reports.rows import frame, row
 
 SOURCE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.declarations import Candidacy, Claims, Cost
+from conservative.declarations import Candidacy, Cost
 from conservative.method import Method, Role
 from conservative.methods.reduced import Reduced
 
@@ -34,7 +30,6 @@ class Borrowed(Method):
     family: ClassVar[str] = "borrowed"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(-1, "implicit")
-    claims: ClassVar[Claims] = Claims("its manual")
     colour: ClassVar[str] = "#123456"
 
     @property
@@ -124,24 +119,6 @@ def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
     assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
 
-@pytest.mark.parametrize(("drift", "order", "verdict"), [(1e-15, 2, claims.HOLDS), (1e-3, 1, claims.FAILS)])
-def test_its_claims_are_checked(installed, drift, order, verdict):
-    steps = (0.1, 0.05, 0.025, 0.0125, 0.00625)
-    common = {"scene": "brick_flip"}
-    rows = [row("convergence", "borrowed:parts=2", "attitude error max", dt**order, dt, **common) for dt in steps]
-    rows += [row("paper", "borrowed", f"{quantity} drift max", drift, 0.01, **common) for quantity in ("energy", "momentum")]
-    table, scenes = frame(rows), [cv.scenes.brick_flip()]
-    fits = orders.fits(orders.errors(table, Measure.ATTITUDE_MAX))
-    assert not claims.findings(table, fits, scenes)
-    installed(SOURCE)
-    found = {each.claim: each for each in claims.findings(table, fits, scenes)}
-    assert {claim: each.verdict for claim, each in found.items()} == {
-        "borrowed keeps energy to round-off (brick_flip)": verdict,
-        "borrowed:parts=2 is of order 2 (brick_flip)": verdict,
-    }
-    assert {each.where for each in found.values()} == {"its manual"}
-
-
 def test_the_import_of_an_engine_is_timed(installed):
     before = import_time.modules()
     installed(
@@ -169,12 +146,10 @@ NEEDY = SOURCE.replace(
 
 def test_a_method_without_what_it_needs_breaks_nothing(installed):
     top = cv.scenes.asymmetric_top()
-    nothing = frame([])
-    fits = orders.fits(orders.errors(nothing, Measure.ATTITUDE_MAX))
-    before = search.candidates(top), claims.findings(nothing, fits, [])
+    before = search.candidates(top)
     installed(NEEDY)
     assert "borrowed" in registry.list_families()
-    assert (search.candidates(top), claims.findings(nothing, fits, [])) == before
+    assert search.candidates(top) == before
     missing = [point.method for point in points.points() if point.method.name == "borrowed"]
     assert {type(method) for method in missing} == {selection.Missing}
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import positive_number
-from ..declarations import Claims
 from ..errors import NotConverged
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
@@ -45,7 +44,6 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
-    claims: ClassVar[Claims] = Claims("paper", drift_per_step=1e-8)
     colour: ClassVar[str] = "sky"
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, triple
 from ..check import choice, describe, positive_integer
-from ..declarations import README, Candidacy, Claims, Cost
+from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
@@ -63,7 +63,6 @@ class Gauss(Method):
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit", longest=1.5)
-    claims: ClassVar[Claims] = Claims(README)
     colour: ClassVar[str] = "indigo"
     kernel: ClassVar[str] = "gauss"
 
@@ -100,10 +99,6 @@ class Gauss(Method):
     @classmethod
     def suite_settings(cls) -> tuple[Gauss, ...]:
         return cls(2), cls(6)
-
-    @classmethod
-    def audit_settings(cls) -> tuple[Gauss, ...]:
-        return (cls(2),)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

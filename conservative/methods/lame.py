@@ -37,7 +37,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, to_quaternion
-from ..declarations import README, Candidacy, Claims
+from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
@@ -71,7 +71,6 @@ class Lame(Method):
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(1, exact=True)
-    claims: ClassVar[Claims] = Claims(README)
     colour: ClassVar[str] = "olive"
     kernel: ClassVar[str] = "lame"
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..check import choice, length
-from ..declarations import README, Candidacy, Claims
+from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..method import Grid, Method, Role, Run
@@ -70,7 +70,6 @@ class MoserVeselov(_Fields, Method):
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
-    claims: ClassVar[Claims] = Claims(README)
     colour: ClassVar[str] = "wine"
     kernel: ClassVar[str] = "moser_veselov"
 
@@ -103,10 +102,6 @@ class MoserVeselov(_Fields, Method):
     @classmethod
     def suite_settings(cls) -> tuple[MoserVeselov, ...]:
         return cls(2), cls("exact")
-
-    @classmethod
-    def audit_settings(cls) -> tuple[MoserVeselov, ...]:
-        return (cls(4),)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         require_short_step(scene, grid.dt, exact=self.order is None)

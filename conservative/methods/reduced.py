@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..check import choice, positive_number
-from ..declarations import README, Candidacy, Claims, Cost, SameErrors
+from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..method import Grid, Method, Role, Run
 from ..scene import Scene
@@ -77,12 +77,8 @@ class Reduced(Method):
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(4, "implicit")
-    claims: ClassVar[Claims] = Claims(
-        README, comparisons=(SameErrors("reduced is the paper's map", ("reduced", "convected"), tolerance=1e-3),)
-    )
     colour: ClassVar[str] = "blue"
     kernel: ClassVar[str] = "reduced"
-    step_goals: ClassVar[tuple[tuple[str, float], ...]] = (("mujoco:Euler", 25), ("mujoco:RK4", 100), ("convected", 100))
 
     def __post_init__(self) -> None:
         composition_of(self.order, self.composition)

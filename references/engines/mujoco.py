@@ -13,7 +13,6 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 from conservative.check import choice, positive_integer
-from conservative.declarations import BetterEnergy, Claims, SameErrors
 from conservative.errors import Unsupported
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.many import Block, Bodies, RunMany
@@ -58,18 +57,6 @@ class MuJoCo(Method):
 
     family: ClassVar[str] = "mujoco"
     role: ClassVar[Role] = Role.ENGINE
-    claims: ClassVar[Claims] = Claims(
-        "MuJoCo documentation, Computation, Numerical integration",
-        comparisons=(
-            BetterEnergy("RK4 is better than Euler on energy-conserving systems", "mujoco", "mujoco:integrator=Euler"),
-            SameErrors(
-                "implicit and implicitfast coincide for a free body",
-                ("mujoco:integrator=implicit", "mujoco:integrator=implicitfast"),
-                tolerance=1e-6,
-                free=True,
-            ),
-        ),
-    )
     colour: ClassVar[str] = "vermilion"
     module: ClassVar[str] = "mujoco"
 
