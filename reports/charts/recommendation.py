@@ -7,14 +7,13 @@ from typing import Any
 
 import altair as alt
 import pandas as pd
-import vl_convert
 
 from conservative.benchmarks.recommendation.recommend import Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..tables.recommendation import method_text, setting_text
 from .figures import log_channel
-from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale
+from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale, svg_text
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
@@ -59,7 +58,7 @@ def picture(recommendation: Recommendation) -> Any:
 
 def svg(recommendation: Recommendation) -> str:
     """Return the picture as SVG."""
-    return str(vl_convert.vegalite_to_svg(picture(recommendation).to_dict()))
+    return svg_text(picture(recommendation))
 
 
 def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> Any:

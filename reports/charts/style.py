@@ -13,10 +13,13 @@ from typing import Any
 
 import altair as alt
 import pandas as pd
+import vl_convert
 
 from conservative import registry
 from conservative.method import Method, Role
 
+SVG_MARK = "<!-- Written by conservative -->"
+"""The first line of pictures in files of their own."""
 Families = Mapping[str, str]
 """The family of each line of a picture by its name, in the order of legends."""
 
@@ -152,3 +155,8 @@ def apply_style(chart: Any) -> Any:
         .configure_legend(labelFontSize=11, titleFontSize=12, labelLimit=320, symbolStrokeWidth=2, symbolSize=80)
         .configure_title(fontSize=13, fontWeight="bold", anchor="start", offset=8)
     )
+
+
+def svg_text(chart: Any) -> str:
+    """Return a picture as SVG that begins with the mark by which a command knows its own files."""
+    return f"{SVG_MARK}\n{vl_convert.vegalite_to_svg(chart.to_dict())}"

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import click
+
+from conservative.errors import BadInput
 
 EXIT_CODES = """Exit codes:
     0    done
@@ -21,6 +26,120 @@ class FilePath(click.Path):
         if "\0" in str(value):
             self.fail(f"got {value!r}; allowed: a path without NUL", param, ctx)
         return Path(str(value))
+
+
+class OutputFile(FilePath):
+    """A file that the command writes.
+
+    Parameters
+    ----------
+    mark
+        Text within the first `HEAD` characters of every such file. A file without it was not written by this option.
+    """
+
+    def __init__(self, mark: str) -> None:
+        super().__init__()
+        self.mark = mark
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        if str(value) == "-":
+            self.fail("got '-'; allowed: the name of a file (--json writes to stdout, ./- is a file of that name)", param, ctx)
+        return super().convert(value, param, ctx)
+
+    def marks(self, path: Path) -> Mapping[Path, str]:
+        """Return the files that are written, each with its mark."""
+        return {path: self.mark}
+
+
+class OutputFolder(OutputFile):
+    """A folder that the command writes files into. Parameters: the names of the files, each with its mark (see `OutputFile`)."""
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        super().__init__("")
+        self.files = files
+
+    def marks(self, path: Path) -> Mapping[Path, str]:
+        return {path / name: mark for name, mark in self.files.items()}
+
+
+class OutputCommand(click.Command):
+    """A command with options of type `OutputFile` or `OutputFolder`, and with --force.
+
+    A file that the same option did not write is replaced only with --force. An input of the command, or the file of another
+    option, is never replaced.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.params.append(click.Option(["--force"], is_flag=True, help="Replace files that this command did not write."))
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        rest = super().parse_args(ctx, args)
+        force = ctx.params.pop("force")
+        taken = [Path(word) for each in self.params if not isinstance(each.type, OutputFile) for word in _words(ctx, each)]
+        for each in self.params:
+            if isinstance(each.type, OutputFile) and (path := ctx.params.get(str(each.name))) is not None:
+                for file, mark in each.type.marks(path).items():
+                    require_replaceable(file, mark, str(each.name), force, taken)
+                    taken.append(file)
+        return rest
+
+
+HEAD = 4096
+"""Characters of a file that are searched for a mark."""
+
+
+def require_replaceable(file: Path, mark: str, option: str, force: bool = False, inputs: Iterable[Path] = ()) -> None:
+    """Check that a file may be written.
+
+    Parameters
+    ----------
+    file
+        The file. One that does not exist, is empty, or is a pipe or a device passes.
+    mark
+        Text within the first `HEAD` characters of the files that the option writes.
+    option
+        Name of the option, for the message.
+    force
+        Whether a file without the mark may be replaced.
+    inputs
+        Files that are never replaced.
+
+    Raises
+    ------
+    BadInput
+        The file must not be replaced.
+    """
+    try:
+        if not file.is_file() or not file.stat().st_size:
+            return
+    except OSError:  # such as a name that is too long: writing the file reports it
+        return
+    if any(_is_same(file, other) for other in inputs):
+        raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
+    if not force and mark not in _head(file):
+        allowed = "a new file, an earlier result of the same option, or --force to replace the file"
+        raise BadInput(option, f"{str(file)!r}, which this option did not write", allowed)
+
+
+def _is_same(file: Path, other: Path) -> bool:
+    with suppress(OSError, ValueError):
+        return file.samefile(other)
+    return False
+
+
+def _head(file: Path) -> str:
+    with suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
+        return stream.read(HEAD)
+    return ""
+
+
+def _words(ctx: click.Context, parameter: click.Parameter) -> Iterator[str]:
+    """Yield the texts that may name a file in the value of a parameter, which may be a list, with commas."""
+    value = ctx.params.get(str(parameter.name))
+    for text in value if isinstance(value, tuple) else (value,):
+        if isinstance(text, str | Path):
+            yield from {str(text), *str(text).split(",")}
 
 
 class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the checker, not before click 8.2

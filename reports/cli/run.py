@@ -10,10 +10,11 @@ from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion
-from .options import FilePath, epilog
+from .options import OutputCommand, OutputFile, epilog
 
 
 @click.command(
+    cls=OutputCommand,
     short_help="Integrate one scene once.",
     epilog=epilog(
         "conservative run brick_flip --method reduced --dt 0.01",
@@ -31,7 +32,7 @@ from .options import FilePath, epilog
 @click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
-@click.option("--csv", type=FilePath(), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
+@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
 def run(scene: str, method: str | None, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and show how it ended, its drifts and its last state.
 

@@ -13,18 +13,19 @@ from conservative.errors import require_extra
 
 from ..terminal.interrupts import interruptible
 from . import completion
-from .options import FilePath, epilog, split_list, split_names
+from .options import OutputCommand, OutputFile, OutputFolder, epilog, split_list, split_names
 
 if TYPE_CHECKING:
     from ..tables.study_rows import StudyRows
 
-FILES = ("study.md", "study.csv", "study.json")
-"""The files of `--out`."""
+FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": '}
+"""The files of `--out`, and how each begins."""
 COLUMNS = 7
 """Columns that a terminal has room for: of ratios all but the winners, which the files have."""
 
 
 @click.command(
+    cls=OutputCommand,
     short_help="Make one study: random bodies, work against precision, ...",
     epilog=epilog(
         "conservative study random --bodies 40 --seed 7",
@@ -51,9 +52,9 @@ COLUMNS = 7
 @click.option("--time-limit", type=float, metavar="S", help="Longest run to plan for, s.  [default: 0.6, with --quick 0.15]")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that finds the rows of a study without times.")
 @click.option("--json", "as_json", is_flag=True, help="Rows and samples as JSON on stdout.")
-@click.option("--csv", type=FilePath(), help="Write the rows as CSV.")
-@click.option("--markdown", type=FilePath(), help="Write the tables as Markdown.")
-@click.option("--out", type=FilePath(), help=f"Folder for {', '.join(FILES)}.")
+@click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
+@click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
+@click.option("--out", type=OutputFolder(FILES), help=f"Folder for {', '.join(FILES)}.")
 def study(name: str, as_json: bool, **options: Any) -> None:
     """Make the study NAME and show what it finds: of random bodies the ratios of times, of any other study its rows.
 
