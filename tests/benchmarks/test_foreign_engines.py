@@ -25,7 +25,6 @@ DEPENDENT = (
     "tests/benchmarks/test_recommendation.py::test_bad_questions",
     "tests/benchmarks/test_selection.py",
     "tests/conservative/test_registry.py",
-    "tests/test_no_method_by_name.py",
 )
 """Tests that look at everything that is registered: all that would notice another engine, and are quick."""
 
