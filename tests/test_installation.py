@@ -61,7 +61,7 @@ def requirements(wheel):
     return found
 
 
-def test_four_packages_are_required_and_no_more(requirements):
+def test_five_packages_are_required_and_no_more(requirements):
     assert requirements[""] == LEAN
     assert set(requirements) == {"", "engines", "environments", "report", "ensembles", "cluster", "gate", "all", "dev"}
 
