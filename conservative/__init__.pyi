@@ -50,4 +50,5 @@ from .trajectory import Counters as Counters
 from .trajectory import Trajectory as Trajectory
 from .version import VERSION as VERSION
 
+__all__: list[str]
 __version__: str

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -27,23 +26,6 @@ from .places import Place
 from .shared_choice import Goal, choose_for_all, pick_hardest
 
 
-class Details(TypedDict, total=False):
-    """What `integrate_many` can be given by keyword only, and seldom is."""
-
-    method: Method | str | None
-    sample_every: int
-    error: float | None
-    threads: int | None
-    progress: Tell | None
-    path: str | Path | None
-    resume: bool
-    client: Any
-
-
-_DETAILS = Details.__annotations__.keys()
-_PLACES = frozenset({"threads", "path", "resume", "client"})
-
-
 def integrate_many(
     scene: Scene,
     R_WB0: ArrayLike | None = None,
@@ -53,7 +35,14 @@ def integrate_many(
     parameters: Mapping[str, ArrayLike] | None = None,
     dt: float | None = None,
     t_end: float | None = None,
-    **details: Unpack[Details],
+    method: Method | str | None = None,
+    sample_every: int = 1,
+    error: float | None = None,
+    threads: int | None = None,
+    progress: Tell | None = None,
+    path: str | Path | None = None,
+    resume: bool = False,
+    client: Any = None,
 ) -> Ensemble:
     """Integrate n bodies, each by itself, from n starts.
 
@@ -72,7 +61,7 @@ def integrate_many(
     dt, t_end
         Step and duration, s, as `integrate` has them. All bodies have the same steps.
     method
-        By keyword, as all that follow: a method, or its name, as `integrate` has it.
+        A method, or its name, as `integrate` has it.
     sample_every
         Keep every so many steps (and the first and last state).
     error
@@ -112,39 +101,20 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    if not details.keys() <= _DETAILS:
-        raise TypeError(f"integrate_many() got an unexpected keyword argument {min(details.keys() - _DETAILS)!r}")
-    progress, place = _read_progress(details.get("progress")), _read_place(details)
+    if progress is not None and not callable(progress):
+        raise BadInput("progress", describe(progress), "a function of a ProgressOfMany, such as print, or None")
+    place = Place(_read_threads(threads), client, path, resume)
     alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     try:
-        method, grid, choice = make_plan(bodies, dt, t_end, details)
+        found, grid, choice = make_plan(bodies, dt, t_end, method, sample_every, error)
         if len(bodies) == 1 and place.here:
-            return run_one(method, bodies, grid, choice, progress)
+            return run_one(found, bodies, grid, choice, progress)
         if place.path is None:
             _require_memory(bodies, grid)
-        return replace(run_all(method, bodies, grid, place, progress), choice=choice)
+        return replace(run_all(found, bodies, grid, place, progress), choice=choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
-
-
-def _read_progress(value: Any) -> Tell | None:
-    if value is not None and not callable(value):
-        raise BadInput("progress", describe(value), "a function of a ProgressOfMany, such as print, or None")
-    return value
-
-
-def _read_place(details: Details) -> Place:
-    """Return where the run is made: nearly always here, and on as many threads as there are processors."""
-    if details.keys().isdisjoint(_PLACES):
-        return _usual_place()
-    to = details.get("client"), details.get("path"), details.get("resume", False)
-    return Place(_read_threads(details.get("threads")), *to)
-
-
-@lru_cache(maxsize=1)
-def _usual_place() -> Place:
-    return Place(_read_threads(None))
 
 
 def _read_threads(value: object) -> int:
@@ -154,7 +124,12 @@ def _read_threads(value: object) -> int:
 
 
 def make_plan(
-    bodies: Bodies, dt: float | None, t_end: float | None, details: Details
+    bodies: Bodies,
+    dt: float | None,
+    t_end: float | None,
+    method: Method | str | None,
+    sample_every: int,
+    error: float | None,
 ) -> tuple[Method, Grid, ChoiceForMany | None]:
     """Return the method and the grid of steps, s, as they are given, or as they were chosen for an error.
 
@@ -165,27 +140,21 @@ def make_plan(
     Unsupported
         The method cannot do the scene.
     """
-    first, every, error = bodies.first, details.get("sample_every", 1), details.get("error")
+    first = bodies.first
     if error is not None:
-        choice = _choose(bodies, error, (dt, t_end, every), details.get("method"))
+        wanted = positive_number("error", error, "a finite attitude error above 0, rad")
+        if method is not None:
+            raise BadInput("method", describe(method), "None together with error, which chooses the method")
+        end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+        samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", sample_every))
+        choice = choose_for_all(bodies, Goal(wanted, end, samples))
         return choice.method, choice.grid, choice
-    method = read_method(details.get("method"), first)
-    grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, every)
-    require_support(method, first)
+    found = read_method(method, first)
+    grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
+    require_support(found, first)
     if len(bodies) > 1:  # of one, the run says the same
-        require_steps(method, bodies, grid)
-    return method, grid, None
-
-
-def _choose(bodies: Bodies, error: object, steps: tuple[Any, ...], method: object) -> ChoiceForMany:
-    """Return what is chosen for an error, rad; steps are dt and t_end, s, and sample_every."""
-    (dt, t_end, every), first = steps, bodies.first
-    wanted = positive_number("error", error, "a finite attitude error above 0, rad")
-    if method is not None:
-        raise BadInput("method", describe(method), "None together with error, which chooses the method")
-    end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", every))
-    return choose_for_all(bodies, Goal(wanted, end, samples))
+        require_steps(found, bodies, grid)
+    return found, grid, None
 
 
 def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:

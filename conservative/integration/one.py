@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, TypedDict, Unpack
+from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -22,13 +22,6 @@ from ..trajectory import Trajectory
 
 DEFAULT_DT = 0.01
 """Step, s, where nobody names one: the paper's."""
-
-
-class Details(TypedDict, total=False):
-    """What `integrate` can be given by keyword only, and seldom is."""
-
-    t_eval: ArrayLike | int | None
-    progress: Callable[[Progress], object] | None
 
 
 def require_support(method: Method, scene: Scene) -> None:
@@ -69,7 +62,8 @@ def integrate(
     *,
     error: float | None = None,
     on_failure: Literal["raise", "return"] = "raise",
-    **details: Unpack[Details],
+    t_eval: ArrayLike | int | None = None,
+    progress: Callable[[Progress], object] | None = None,
 ) -> Trajectory:
     """Integrate a scene.
 
@@ -94,9 +88,9 @@ def integrate(
     on_failure
         "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
     t_eval
-        By keyword, as `progress`: times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0
-        to t_end, instead of `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step
-        before it, by short steps that leave nothing but round-off. The run ends with the last sample.
+        Times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0 to t_end, instead of
+        `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step before it, by short
+        steps that leave nothing but round-off. The run ends with the last sample.
     progress
         Called with a `Progress`, whose text is a line, before a trial run for an `error`: from one second on, and not more
         often than ten times a second. `print` will do. Nothing is shown by itself.
@@ -121,7 +115,9 @@ def integrate(
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
     choice("on_failure", on_failure, ("raise", "return"))
-    at, progress = _read_details(scene, t_end, sample_every, details) if details else (None, None)
+    if progress is not None and not callable(progress):
+        raise BadInput("progress", describe(progress), "a function of a Progress, such as print, or None")
+    at = None if t_eval is None else _read_t_eval(scene, t_end, sample_every, t_eval)
     try:
         if error is not None:
             _require_choice(error, dt, method, at)
@@ -143,22 +139,12 @@ def interrupt_of(failure: SystemError) -> BaseException:
     return reason if isinstance(reason, KeyboardInterrupt) else failure
 
 
-def _read_details(
-    scene: Scene, t_end: float | None, sample_every: int, details: Details
-) -> tuple[Array | None, Callable[[Progress], object] | None]:
-    """Return the times of samples asked for, s, and the function to tell progress to."""
-    unknown = sorted(set(details) - set(Details.__annotations__))
-    if unknown:
-        raise TypeError(f"integrate() got an unexpected keyword argument {unknown[0]!r}")
-    t_eval, progress = details.get("t_eval"), details.get("progress")
-    if progress is not None and not callable(progress):
-        raise BadInput("progress", describe(progress), "a function of a Progress, such as print, or None")
-    if t_eval is None:
-        return None, progress
+def _read_t_eval(scene: Scene, t_end: float | None, sample_every: int, t_eval: ArrayLike | int) -> Array:
+    """Return the times of samples, s, that `integrate` was asked for."""
     if sample_every != 1:
         raise BadInput("sample_every", describe(sample_every), "1, the default, together with t_eval, which says what is kept")
     end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    return read_times(t_eval, end), progress
+    return read_times(t_eval, end)
 
 
 def _require_choice(error: float, dt: float | None, method: Method | str | None, at: Array | None) -> None:

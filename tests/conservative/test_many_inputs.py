@@ -135,11 +135,6 @@ def test_other_arguments(what):
         cv.integrate_many(**{"scene": scene(GRAVITY), "threads": 1} | given)
 
 
-def test_an_unknown_argument_is_a_type_error():
-    with pytest.raises(TypeError, match="unexpected keyword argument 'thread'"):
-        cv.integrate_many(scene(), thread=2)
-
-
 def test_a_step_that_is_too_long_for_the_fastest_is_refused_before_any_work():
     with pytest.raises(cv.BadInput, match=r"^dt: got 0.05.*\(body 321\)"):
         cv.integrate_many(scene(), w_WB_B0=changed(W, 321, (300.0, 20, 10)), method="moser_veselov", dt=0.05, t_end=1.0)

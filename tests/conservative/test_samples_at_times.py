@@ -80,11 +80,6 @@ def test_what_contradicts_times_is_refused(arguments, argument):
     assert caught.value.argument == argument
 
 
-def test_an_unknown_keyword_is_an_error():
-    with pytest.raises(TypeError, match="unexpected keyword argument 'tevals'"):
-        cv.integrate(TOP, tevals=[0.0])
-
-
 def test_a_run_that_fails_has_the_samples_before():
     scene = cv.scenes.lagrange_top()
     whole = cv.integrate(scene, dt=0.6, on_failure="return")
