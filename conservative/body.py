@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array
-from .check import LARGEST, finite_array, read_only
+from .check import LARGEST, finite_array, read_only, set_fields
 from .errors import BadInput
 
 TENSOR_CONDITION = 1e13
@@ -23,13 +23,8 @@ _ROUNDED = 4e-15
 _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    inertia: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class RigidBody(_Fields):
+class RigidBody:
     """A rigid body that turns about a fixed point.
 
     Parameters
@@ -46,11 +41,13 @@ class RigidBody(_Fields):
         are let through: the equations hold for them, though some engines refuse them.
     """
 
+    inertia: Array
+
     def __init__(self, inertia: ArrayLike) -> None:
         value = finite_array("inertia", inertia, ((3,), (3, 3)), _ALLOWED)
         tensor = np.diag(value) if value.ndim == 1 else value
         _check_tensor(tensor)
-        super().__init__(read_only((tensor + tensor.T) / 2))
+        set_fields(self, inertia=read_only((tensor + tensor.T) / 2))
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:

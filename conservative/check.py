@@ -1,11 +1,8 @@
 """Checks of arguments, made before any work. `value` may have any unit; `allowed` is what the message says of it.
 
-Frozen values whose constructors convert what they are given are written in two classes, here and everywhere: a frozen dataclass
-has the fields, and the public class derived from it has an `__init__` that checks, converts, and calls the generated one. So
-nothing is ever assigned to a frozen value, and `dataclasses.replace` works, as what is converted already converts to itself.
-
-Why not attrs: a lean install does not bring it. Why not `__post_init__`: it would have to assign to frozen fields, and the
-constructor's types would be those of the fields, where the public ones accept more (array-likes, plain functions, None).
+Frozen dataclasses whose constructors convert their arguments have an `__init__` of their own, which checks, converts and calls
+`set_fields`. `__post_init__` would not do: the constructor's types would be those of the fields, where the public ones accept
+more (array-likes, plain functions, None). `dataclasses.replace` works, as converting twice changes nothing.
 """
 
 from __future__ import annotations
@@ -243,8 +240,13 @@ def geometric_mean(a: float, b: float) -> float:
     return math.ldexp(math.sqrt(math.ldexp(x * y, (i + j) % 2)), (i + j) // 2)
 
 
-def build_unchecked(kind: type[T], **values: Any) -> T:
-    """Return a frozen value of two classes (see above) without its checks: for numbers in units of our own, of any size."""
+def set_fields(value: object, **fields: Any) -> None:
+    """Set the fields of a frozen dataclass, in its constructor: assignments are refused there, too."""
+    vars(value).update(fields)
+
+
+def build_unchecked(kind: type[T], **fields: Any) -> T:
+    """Return a frozen dataclass with these fields, without the checks of its constructor: for units of our own, of any size."""
     made = object.__new__(kind)
-    kind.__bases__[0].__init__(made, **values)  # type: ignore[misc]  # that of the class which has the fields
+    set_fields(made, **fields)
     return made

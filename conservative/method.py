@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .attitude import Array
-from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory
+from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory, set_fields
 from .declarations import Candidacy, Cost, maker_of, refuse_time, settings_text
 from .declarations import Role as Role
 from .errors import BadInput
@@ -21,15 +21,8 @@ from .trajectory import Bounds, Trajectory, accept
 Run = Callable[[], Trajectory]
 
 
-@dataclass(frozen=True)
-class _Steps:
-    dt: float
-    n_steps: int
-    every: int = 1
-
-
 @dataclass(frozen=True, init=False)
-class Grid(_Steps):
+class Grid:
     """Steps of dt, s, and the samples kept of them: the start, every `every`-th step, and the last.
 
     The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
@@ -40,8 +33,13 @@ class Grid(_Steps):
         dt is not a finite number above 0, n_steps or every is not an integer of 1 to 2^53, or samples do not fit in memory.
     """
 
+    dt: float
+    n_steps: int
+    every: int = 1
+
     def __init__(self, dt: float, n_steps: int, every: int = 1) -> None:
-        super().__init__(*convert_steps(dt, n_steps, every))
+        step, count, each = convert_steps(dt, n_steps, every)
+        set_fields(self, dt=step, n_steps=count, every=each)
 
     @property
     def steps(self) -> Array:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, TypeVarTuple, Unpack
+from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation
+from .check import SMALLEST, describe, finite_array, positive_number, printable_text, rotation, set_fields
 from .errors import BadInput
 from .invariants import Invariant, axial_direction, invariants_of
 from .potentials.potential import AnyPotential, Potential, PotentialInTime
@@ -28,31 +28,8 @@ MOST_DERIVATIONS = 64
 """Results that `Scene.derive` keeps at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    name: str
-    body: RigidBody
-    R_WB0: Array
-    w_WB_B0: Array
-    t_end: float
-    potential: AnyPotential | None
-    dt: float
-    extra_invariants: tuple[Invariant, ...] = ()
-    group: str = "your own"
-    source: str = ""
-
-
-class Details(TypedDict, total=False):
-    """What a `Scene` can be given by keyword only."""
-
-    dt: float | None
-    extra_invariants: Iterable[Invariant]
-    group: str
-    source: str
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class Scene(_Fields):
+class Scene:
     """A rigid body turning about a fixed point, from a start, for a time.
 
     Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range our
@@ -74,8 +51,8 @@ class Scene(_Fields):
         What acts on the body; None for a free body, which then carries no torque code anywhere. One that depends on the time
         is `Turning`, or is given by functions of attitude and time.
     dt
-        By keyword, as all that follow: step of the source, s, which commands and studies take unless told otherwise; default
-        a 20th of a radian of the start's rate, at most a hundredth of t_end.
+        Step of the source, s, which commands and studies take unless told otherwise; default a 20th of a radian of the
+        start's rate, at most a hundredth of t_end.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
@@ -87,6 +64,17 @@ class Scene(_Fields):
         An argument is not finite, has another shape, is out of range, or is not a rotation.
     """
 
+    name: str
+    body: RigidBody
+    R_WB0: Array
+    w_WB_B0: Array
+    t_end: float
+    potential: AnyPotential | None
+    dt: float
+    extra_invariants: tuple[Invariant, ...] = ()
+    group: str = "your own"
+    source: str = ""
+
     def __init__(
         self,
         name: str,
@@ -95,18 +83,33 @@ class Scene(_Fields):
         w_WB_B0: ArrayLike,
         t_end: float,
         potential: AnyPotential | None = None,
-        **details: Unpack[Details],
+        *,
+        dt: float | None = None,
+        extra_invariants: Iterable[Invariant] = (),
+        group: str = "your own",
+        source: str = "",
     ) -> None:
-        _check_parts(name, body, potential)
+        if not printable_text("name", name, _NAME):
+            raise BadInput("name", "''", _NAME)
+        if not isinstance(body, RigidBody):
+            raise BadInput("body", describe(body), "a RigidBody")
+        if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
+            raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
         rates = finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
         end = positive_number("t_end", t_end, "a finite duration above 0, s")
-        others: dict[str, Any] = {**details}
-        dt, more = others.pop("dt", None), _invariants(others.pop("extra_invariants", ()))
-        for key in ("group", "source"):
-            printable_text(key, others.get(key, ""), "a text")
-        step = _usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s")
-        R = rotation("R_WB0", R_WB0)
-        super().__init__(name, body, R, rates, end, potential, step, more, **others)
+        set_fields(
+            self,
+            name=name,
+            body=body,
+            R_WB0=rotation("R_WB0", R_WB0),
+            w_WB_B0=rates,
+            t_end=end,
+            potential=potential,
+            dt=_usual_step(rates, end) if dt is None else positive_number("dt", dt, "a finite step above 0, s"),
+            extra_invariants=_invariants(extra_invariants),
+            group=printable_text("group", group, "a text"),
+            source=printable_text("source", source, "a text"),
+        )
 
     @property
     def free(self) -> bool:
@@ -177,15 +180,6 @@ class Scene(_Fields):
     def __repr__(self) -> str:
         start = f"R_WB0={self.R_WB0.tolist()}, w_WB_B0={self.w_WB_B0.tolist()}"
         return f"Scene({self.name!r}, {self.body!r}, {start}, t_end={self.t_end:g}, potential={self.potential!r})"
-
-
-def _check_parts(name: object, body: object, potential: object) -> None:
-    if not printable_text("name", name, _NAME):
-        raise BadInput("name", "''", _NAME)
-    if not isinstance(body, RigidBody):
-        raise BadInput("body", describe(body), "a RigidBody")
-    if isinstance(potential, type) or not isinstance(potential, Potential | PotentialInTime | None):
-        raise BadInput("potential", describe(potential), "None or a Potential such as UniformGravity")
 
 
 def _invariants(value: object) -> tuple[Invariant, ...]:

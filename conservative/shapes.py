@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from .attitude import Array
 from .body import RigidBody
-from .check import describe, finite_array, finite_number, positive_number, rotation
+from .check import describe, finite_array, finite_number, positive_number, rotation, set_fields
 from .errors import BadInput
 from .potentials.uniform_gravity import UniformGravity
 
@@ -30,15 +30,8 @@ _SIZES = "three finite lengths (3,) above 0, m"
 _LENGTH = "a finite length above 0, m"
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    mass: float
-    com_B: Array
-    inertia_com: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class MassDistribution(_Fields):
+class MassDistribution:
     """Mass, centre of mass and inertia about it: what a shape or an engine's model file says of a body.
 
     Parameters
@@ -56,11 +49,16 @@ class MassDistribution(_Fields):
         The mass is not a finite number above 0, `com_B` not three finite numbers, or the inertia none that a `RigidBody` takes.
     """
 
+    mass: float
+    com_B: Array
+    inertia_com: Array
+
     def __init__(self, mass: float, com_B: ArrayLike, inertia_com: ArrayLike) -> None:
-        super().__init__(
-            positive_number("mass", mass, "a finite mass above 0, kg"),
-            finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
-            RigidBody(inertia_com).inertia,
+        set_fields(
+            self,
+            mass=positive_number("mass", mass, "a finite mass above 0, kg"),
+            com_B=finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
+            inertia_com=RigidBody(inertia_com).inertia,
         )
 
     @property

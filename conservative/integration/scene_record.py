@@ -65,4 +65,6 @@ def _restore(record: Any) -> Any:
     kind = getattr(import_module(module), name) if module.partition(".")[0] == PACKAGE else None
     if not (isinstance(kind, type) and is_dataclass(kind)):
         raise TypeError(f"no value of {record['type']}")
+    if record["fields"].keys() != {field.name for field in fields(kind)}:
+        raise TypeError(f"not the fields of {record['type']}")
     return build_unchecked(kind, **{field: _restore(value) for field, value in record["fields"].items()})

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
-from ..check import choice, length
+from ..check import choice, length, set_fields
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -34,13 +34,8 @@ LONGEST_SHIFT = 2 * math.acos(SMALLEST_CN)
 """Limit of nu dt of the exact step, nu being the polhode's frequency: below it cn is above SMALLEST_CN."""
 
 
-@dataclass(frozen=True)
-class _Fields:
-    order: int | None = None
-
-
 @dataclass(frozen=True, init=False)
-class MoserVeselov(_Fields, Method):
+class MoserVeselov(Method):
     """The discrete Moser-Veselov (DMV) map with a calibrated inertia, for free bodies of any inertia.
 
     With the Cayley vector c of a step h and the inertia B, where 1/B_i = css/J_i + cdd in principal axes,
@@ -67,6 +62,8 @@ class MoserVeselov(_Fields, Method):
         order is none of these; and on running: the step is too long, see `longest_step`.
     """
 
+    order: int | None = None
+
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
@@ -76,7 +73,7 @@ class MoserVeselov(_Fields, Method):
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
         if order is not None:
             choice("order", order, ORDERS)
-        super().__init__(None if order == "exact" else order)
+        set_fields(self, order=None if order == "exact" else order)
 
     @property
     def conserves(self) -> frozenset[str]:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, triple
-from ..check import describe, positive_number
+from ..check import describe, positive_number, set_fields
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -33,14 +33,8 @@ PARTS = 100
 """Parts of a step that bounds allow for where a tolerance divides it."""
 
 
-@dataclass(frozen=True)
-class _Settings(Method):
-    order: int | None = None
-    tolerance: float | None = None
-
-
 @dataclass(frozen=True, init=False)
-class Taylor(_Settings):
+class Taylor(Method):
     """The series of the motion in powers of time, each step projected onto the invariants: the cheapest accuracy in a field.
 
     The coefficients of a step follow one from another, as every product in the equations of motion is one of two series; the
@@ -81,6 +75,9 @@ class Taylor(_Settings):
         order is not an integer in that range, tolerance not a finite number above 0, or both are given.
     """
 
+    order: int | None = None
+    tolerance: float | None = None
+
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
     candidacy: ClassVar[Candidacy] = Candidacy(1, "explicit")
@@ -97,7 +94,7 @@ class Taylor(_Settings):
             order = DEFAULT
         elif isinstance(order, bool) or not isinstance(order, int) or not LOWEST <= order <= HIGHEST:
             raise BadInput("order", describe(order), f"an integer from {LOWEST} to {HIGHEST}")
-        super().__init__(order, tolerance)
+        set_fields(self, order=order, tolerance=tolerance)
 
     @property
     def conserves(self) -> frozenset[str]:

@@ -12,20 +12,13 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import build_unchecked, positive_number, power_of_two
+from ..check import build_unchecked, positive_number, power_of_two, set_fields
 from .direction import unit_vector
 from .varied import VariedGradient, fill
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    rate: float
-    inertia: Array
-    direction_W: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class GravityGradient(_Fields):
+class GravityGradient:
     """The gradient of a far centre's gravity on a body turning about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
 
     The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is 3
@@ -47,11 +40,16 @@ class GravityGradient(_Fields):
         A parameter is not finite, of another shape, not above 0, or not an inertia.
     """
 
+    rate: float
+    inertia: Array
+    direction_W: Array
+
     def __init__(self, rate: float, inertia: ArrayLike, direction_W: ArrayLike = (0, 0, 1)) -> None:
-        super().__init__(
-            positive_number("rate", rate, "a finite rate above 0, rad/s"),
-            RigidBody(inertia).inertia,
-            unit_vector("direction_W", direction_W),
+        set_fields(
+            self,
+            rate=positive_number("rate", rate, "a finite rate above 0, rad/s"),
+            inertia=RigidBody(inertia).inertia,
+            direction_W=unit_vector("direction_W", direction_W),
         )
 
     @property

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array, Triple, triple
-from ..check import build_unchecked, finite_array, finite_number, positive_number, power_of_two
+from ..check import build_unchecked, finite_array, finite_number, positive_number, power_of_two, set_fields
 from ..errors import BadInput
 from .varied import VariedPoints, fill, lengths
 
@@ -87,16 +87,8 @@ class PointPotential(ABC):
         return triple(self.point_B @ R_BP), triple(self.anchor_W)
 
 
-@dataclass(frozen=True, eq=False)
-class _SpringFields:
-    stiffness: float
-    point_B: Array
-    anchor_W: Array
-    rest_length: float
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class LinearSpring(_SpringFields, PointPotential):
+class LinearSpring(PointPotential):
     """A spring between a body point and a world point: V = stiffness/2 (distance - rest_length)^2.
 
     Parameters
@@ -116,12 +108,18 @@ class LinearSpring(_SpringFields, PointPotential):
         A parameter is not finite, of another shape or out of its range.
     """
 
+    stiffness: float
+    point_B: Array
+    anchor_W: Array
+    rest_length: float
+
     def __init__(self, stiffness: float, point_B: ArrayLike, anchor_W: ArrayLike, rest_length: float = 0.0) -> None:
-        super().__init__(
-            positive_number("stiffness", stiffness, "a finite number above 0, N/m"),
-            finite_array("point_B", point_B, ((3,),), _POINT),
-            finite_array("anchor_W", anchor_W, ((3,),), _POINT),
-            finite_number("rest_length", rest_length, _LENGTH),
+        set_fields(
+            self,
+            stiffness=positive_number("stiffness", stiffness, "a finite number above 0, N/m"),
+            point_B=finite_array("point_B", point_B, ((3,),), _POINT),
+            anchor_W=finite_array("anchor_W", anchor_W, ((3,),), _POINT),
+            rest_length=finite_number("rest_length", rest_length, _LENGTH),
         )
         if self.rest_length < 0:
             raise BadInput("rest_length", rest_length, _LENGTH)
@@ -169,15 +167,8 @@ class LinearSpring(_SpringFields, PointPotential):
         return Spring(*self._points(R_BP), self.stiffness, self.rest_length)
 
 
-@dataclass(frozen=True, eq=False)
-class _AttractionFields:
-    strength: float
-    point_B: Array
-    anchor_W: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class PointAttraction(_AttractionFields, PointPotential):
+class PointAttraction(PointPotential):
     """Gravity or electricity between a point of the body and a point of the world: V = -strength / distance.
 
     Parameters
@@ -195,11 +186,16 @@ class PointAttraction(_AttractionFields, PointPotential):
         A parameter is not finite, of another shape, or 0 where it must not be; or both points are the fixed point.
     """
 
+    strength: float
+    point_B: Array
+    anchor_W: Array
+
     def __init__(self, strength: float, point_B: ArrayLike, anchor_W: ArrayLike) -> None:
-        super().__init__(
-            finite_number("strength", strength, _STRENGTH),
-            finite_array("point_B", point_B, ((3,),), _POINT),
-            finite_array("anchor_W", anchor_W, ((3,),), _POINT),
+        set_fields(
+            self,
+            strength=finite_number("strength", strength, _STRENGTH),
+            point_B=finite_array("point_B", point_B, ((3,),), _POINT),
+            anchor_W=finite_array("anchor_W", anchor_W, ((3,),), _POINT),
         )
         if self.strength == 0:
             raise BadInput("strength", strength, _STRENGTH)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, rotation_about, triple
-from ..check import build_unchecked, describe, finite_array, positive_number
+from ..check import build_unchecked, describe, finite_array, positive_number, set_fields
 from ..errors import BadInput, PotentialFailed
 from .callback import Callback, moment
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
@@ -22,17 +22,8 @@ _AXIS = "a unit vector (3,), world axes, about which the field is symmetric"
 _ROUND_OFF = 8 * 2.0**-53
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    energy: Energy
-    gradient: Gradient
-    scale: Size
-    axis_W: Array | None
-    time_dependent: bool = False
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class FunctionPotential(_Fields):
+class FunctionPotential:
     """A user's own potential, given by its energy and its gradient as functions of the matrix R_WB, and maybe of the time.
 
     The compiled loop calls them through a pointer, dozens of times a step, so that a step costs one or two milliseconds, not a
@@ -74,6 +65,12 @@ class FunctionPotential(_Fields):
     >>> quartic = FunctionPotential(lambda R: (R[2] @ hook) ** 4, lambda R: np.outer([0, 0, 1], 4 * (R[2] @ hook) ** 3 * hook))
     """
 
+    energy: Energy
+    gradient: Gradient
+    scale: Size
+    axis_W: Array | None
+    time_dependent: bool = False
+
     def __init__(
         self,
         energy: EnergyFunction | Energy,
@@ -91,7 +88,8 @@ class FunctionPotential(_Fields):
         G = gradient if isinstance(gradient, Gradient) else Gradient(gradient, time_dependent)
         for t in _PROBED_TIMES if time_dependent else ((),):
             _check_gradient(V, G, t)
-        super().__init__(V, G, _size(scale, G), None if axis_W is None else _check_axis(axis_W, G), time_dependent)
+        axis = None if axis_W is None else _check_axis(axis_W, G)
+        set_fields(self, energy=V, gradient=G, scale=_size(scale, G), axis_W=axis, time_dependent=time_dependent)
 
     def energy_at(self, R_WB: Array, t: Array) -> Array:
         """Return V, (...), in J at attitudes (..., 3, 3) and times (...), s."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array, from_quaternion, triple
-from ..check import build_unchecked, describe, positive_number
+from ..check import build_unchecked, describe, positive_number, set_fields
 from ..errors import BadInput
 from .direction import unit_vector
 from .gravity_gradient import GravityGradient
@@ -22,14 +22,8 @@ _ACROSS = 1e-9
 """Cosine of the angle to the normal at which a direction still lies in the plane of the orbit."""
 
 
-@dataclass(frozen=True, eq=False)
-class _OrbitFields:
-    rate: float
-    normal_W: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class Orbit(_OrbitFields):
+class Orbit:
     """Axes O that turn at a constant rate, rad/s, about a normal fixed in the world, as in a circular orbit; O = W at t = 0.
 
     Parameters
@@ -45,8 +39,12 @@ class Orbit(_OrbitFields):
         rate is not a finite number above 0, or normal_W is not finite, of another shape, or 0.
     """
 
+    rate: float
+    normal_W: Array
+
     def __init__(self, rate: float, normal_W: ArrayLike) -> None:
-        super().__init__(positive_number("rate", rate, "a finite rate above 0, rad/s"), unit_vector("normal_W", normal_W))
+        speed = positive_number("rate", rate, "a finite rate above 0, rad/s")
+        set_fields(self, rate=speed, normal_W=unit_vector("normal_W", normal_W))
 
     def R_WO(self, t: ArrayLike) -> Array:
         """Return the attitudes of the axes O in the world, (..., 3, 3), at times (...), s."""
@@ -78,14 +76,8 @@ class Orbit(_OrbitFields):
         return Turning(GravityGradient(self.rate, inertia, nearest), self)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    potential: Potential
-    orbit: Orbit
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class Turning(_Fields):
+class Turning:
     """A field that is fixed in axes O which turn: V(R_WB, t) = V_0(R_OB), R_OB = R_WO(t)' R_WB.
 
     Energy is not conserved, but the Jacobi integral is: E - rate n.l, with the normal n and the world momentum l.
@@ -103,6 +95,9 @@ class Turning(_Fields):
         potential is no potential or depends on the time, or orbit is not an `Orbit`.
     """
 
+    potential: Potential
+    orbit: Orbit
+
     time_dependent: ClassVar[bool] = True
     axis_W: ClassVar[None] = None
 
@@ -112,7 +107,7 @@ class Turning(_Fields):
             raise BadInput("potential", describe(potential), allowed)
         if not isinstance(orbit, Orbit):
             raise BadInput("orbit", describe(orbit), "an Orbit")
-        super().__init__(potential, orbit)
+        set_fields(self, potential=potential, orbit=orbit)
 
     def in_orbit(self, R_WB: Array, t: Array) -> Array:
         """Return R_OB, (..., 3, 3), of attitudes (..., 3, 3) at times (...), s."""

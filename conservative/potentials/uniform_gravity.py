@@ -10,18 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import build_unchecked, finite_array, finite_number, length, power_of_two
+from ..check import build_unchecked, finite_array, finite_number, length, power_of_two, set_fields
 from .varied import VariedGravity, fill
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    weight: float
-    com_B: Array
-
-
 @dataclass(frozen=True, eq=False, init=False)
-class UniformGravity(_Fields):
+class UniformGravity:
     """A uniform field along the world's -z axis: V = weight (R_WB com_B).e_z.
 
     Parameters
@@ -37,10 +31,14 @@ class UniformGravity(_Fields):
         A parameter is not finite or of another shape.
     """
 
+    weight: float
+    com_B: Array
+
     def __init__(self, weight: float, com_B: ArrayLike) -> None:
-        super().__init__(
-            finite_number("weight", weight, "a finite number, N"),
-            finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
+        set_fields(
+            self,
+            weight=finite_number("weight", weight, "a finite number, N"),
+            com_B=finite_array("com_B", com_B, ((3,),), "three finite numbers (3,), m"),
         )
 
     @property
