@@ -1,0 +1,76 @@
+"""Write README.md from README.md.j2 and measured.csv, which lie beside this file.
+
+    python .ci/readme                    # write README.md
+    python .ci/readme --check            # exit with 1 if README.md is not current
+    python .ci/readme --measured REPORT RANDOM
+
+The last form first replaces measured.csv and the picture, from the folders of a report and of a study of random bodies.
+CONTRIBUTING.md has the commands that make them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from pathlib import Path
+
+import jinja2
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+README, PICTURE = ROOT / "README.md", ROOT / "reports" / "pictures" / "time_against_error.svg"
+ROWS = HERE / "measured.csv"
+
+
+def render() -> str:
+    """Return the text of README.md."""
+    with ROWS.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    values = {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows}
+    environment = jinja2.Environment(keep_trailing_newline=True, undefined=jinja2.StrictUndefined)
+    environment.filters |= {"two_digits": two_digits, "small": small}
+    return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
+        value=lambda *key: values[key],
+        ratios=[value for (*_, quantity), value in values.items() if quantity == "heyoka's time over ours"],
+        version={row["name"]: row["version"] for row in rows},
+        date=max(row["date"] for row in rows),
+    )
+
+
+def two_digits(value: float) -> str:
+    """Return a number to two digits, `21,000` or `0.037`: times of two reports differ in the third."""
+    return f"{float(f'{value:.2g}'):,g}"
+
+
+def small(value: float) -> str:
+    """Return an error or a drift to one digit; below 1e-15 it is round-off."""
+    return "< 1e-15" if value < 1e-15 else f"{value:.0e}".replace("e-0", "e-") if value < 0.01 else f"{value:.1g}"
+
+
+def main() -> None:
+    """Write or check README.md."""
+    parser = argparse.ArgumentParser(
+        prog="python .ci/readme", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if README.md is not current")
+    parser.add_argument("--measured", nargs=2, type=Path, metavar=("REPORT", "RANDOM"), help="folders of new measurements")
+    options = parser.parse_args()
+    if options.measured:
+        import measure  # beside this file; it needs the package
+
+        new = list(measure.rows(*options.measured))
+        with ROWS.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, measure.COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(new)
+        measure.draw(options.measured[0], PICTURE)
+    text = render()
+    if options.check and text != README.read_text(encoding="utf-8"):
+        sys.exit("README.md differs from its template and measured.csv. Run: python .ci/readme")
+    if not options.check:
+        README.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""The rows of measured.csv and the picture, from a report and from a study of random bodies."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from conservative.benchmarks.measures.cost_at_error import cost
+
+COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
+CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
+GENERAL = "taylor:order=12"
+ENGINES = {"heyoka": "heyoka", "SciPy": "scipy", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
+ERROR = 1e-6
+"""Attitude error at which times are compared, rad."""
+RANDOM_ERRORS = (1e-3, 1e-6, 1e-9, 1e-12)
+RANDOM = "conservative study random --bodies 40 --seed 1001 --methods gauss,projected,taylor,heyoka"
+PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
+
+
+def rows(report: Path, random: Path) -> Iterator[dict[str, Any]]:
+    """Yield the rows of measured.csv, as dictionaries with the keys `COLUMNS`."""
+    table = _read(report / "measurements.csv")
+    common = {"command": "conservative report", "date": _date(report / "measurements.csv")}
+    yield from (common | row for scene in CLOSED_FORMS for row in _scene(table[table["scene"] == scene], scene))
+    bodies = _read(random / "study.csv")
+    common = {"command": RANDOM, "date": _date(random / "study.csv")}
+    yield from (common | row for row in _random(bodies))
+
+
+def _scene(table: pd.DataFrame, scene: str) -> Iterator[dict[str, Any]]:
+    """Yield drift, error and time of each row of README's table, and the error of the paper's integrator.
+
+    Drift and error are those of one run at the scene's own step. The time is that of the fastest setting that reaches `ERROR`:
+    of all our methods that are not closed forms, of the closed form, or of the engine.
+    """
+    paper = table[(table["study"] == "paper") & (table["dt"] == table[table["study"] == "paper"]["dt"].max())]
+    timed = table[table["study"] == "work_precision"]
+    closed = timed["family"].isin(CLOSED_FORMS.values())
+    groups = {
+        "ours": (GENERAL, timed[(timed["role"] == "ours") & ~closed]),
+        "closed form": (CLOSED_FORMS[scene], timed[closed]),
+        **{name: (family, timed[timed["family"] == family]) for name, family in ENGINES.items()},
+    }
+    for name, (method, candidates) in groups.items():
+        run = paper[paper["method"] == method]
+        common = {"scene": scene, "name": name, "version": run["version"].iloc[0], "method": method}
+        yield common | {"quantity": "drift", "unit": "1", "value": run[run["measure"] == "drift max"]["value"].max()}
+        yield common | {"quantity": "error", "unit": "rad", "value": _error(run)}
+        time, setting = fastest(candidates, ERROR)
+        yield common | {"quantity": "time", "unit": "us per s", "value": 1e6 * time, "method": setting}
+    common = {"scene": scene, "name": "reduced", "method": "reduced", "version": ""}
+    yield common | {"quantity": "error", "unit": "rad", "value": _error(paper[paper["method"] == "reduced"])}
+
+
+def _error(run: pd.DataFrame) -> float:
+    return float(run[run["measure"] == "attitude error max"]["value"].iloc[0])
+
+
+def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """Yield heyoka's time over ours per field and error, and in how many cases heyoka is faster.
+
+    A case is a body at an error. The ratio is the geometric mean over the bodies on which both sides reach the error.
+    """
+    common = {"name": "random bodies", "unit": "1", "method": "", "version": ""}
+    lost = cases = 0
+    for field, bodies in table.groupby(table["scene"].str.extract(r"field=(\w+)")[0], sort=False):
+        for error in RANDOM_ERRORS:
+            pairs = [
+                tuple(fastest(body[body["role"] == role], error)[0] for role in ("ours", "engine"))
+                for _, body in bodies.groupby("scene")
+            ]
+            cases += len(pairs)
+            lost += sum(theirs < ours for ours, theirs in pairs)  # a side that does not reach the error takes forever
+            logs = [math.log(theirs / ours) for ours, theirs in pairs if math.isfinite(ours + theirs)]
+            mean = math.exp(math.fsum(logs) / len(logs))
+            yield common | {"scene": f"{field} {error:g} rad", "quantity": "heyoka's time over ours", "value": mean}
+    yield common | {"scene": "all fields", "quantity": "cases", "value": cases}
+    yield common | {"scene": "all fields", "quantity": "cases where heyoka is faster", "value": lost}
+
+
+def fastest(rows: pd.DataFrame, error: float) -> tuple[float, str]:
+    """Return the time, s per simulated second, of the fastest series of settings at an error, and its name; else inf and ''."""
+    measures = ["attitude error max", "time per simulated second"]
+    kept = rows[rows["measure"].isin(measures) & (rows["outcome"] == "ok")]
+    points = kept.set_index(["series", "method", "dt", "measure"])["value"].unstack(sort=False).reindex(columns=measures)
+    points = points.dropna(subset=measures[0])
+    found = [(cost(*(line[name].tolist() for name in measures), error), name) for name, line in points.groupby("series")]
+    return min((entry for entry in found if not math.isnan(entry[0])), default=(math.inf, ""))
+
+
+def _read(path: Path) -> pd.DataFrame:
+    texts = dict.fromkeys(("version", "setting", "series_setting", "quantity", "reason", "detail"), "string")
+    return pd.read_csv(path, dtype=texts).fillna(dict.fromkeys(texts, ""))
+
+
+def _date(path: Path) -> str:
+    return datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
+
+
+def draw(report: Path, picture: Path) -> None:
+    """Draw time against error on the Lagrange top, for a few methods of a report; `picture` ends in .svg."""
+    from conservative.reports import document
+    from conservative.reports.charts import figures
+    from conservative.reports.labels import with_names
+    from conservative.reports.tables import work_precision
+    from conservative.reports.tables.classes import without_solutions
+
+    table = _read(report / "measurements.csv")
+    few = table[(table["scene"] == "lagrange_top") & table["series"].isin(PICTURED)]
+    points = work_precision.points(with_names(few))
+    document.draw(
+        figures.work_precision(points, work_precision.front(without_solutions(points)), "lagrange_top"), picture, png=False
+    )
