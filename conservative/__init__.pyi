@@ -18,9 +18,9 @@ from .errors import PotentialFailed as PotentialFailed
 from .errors import Unsupported as Unsupported
 from .errors import WrongBranch as WrongBranch
 from .integration.ensemble import Ensemble as Ensemble
+from .integration.ensemble import open_ensemble as open_ensemble
 from .integration.many import integrate_many as integrate_many
 from .integration.one import integrate as integrate
-from .integration.reading import open_ensemble as open_ensemble
 from .integration.spread import spread as spread
 from .invariants import Invariant as Invariant
 from .method import Grid as Grid

@@ -1,18 +1,17 @@
-"""Blocks of bodies: one block is run from start to checked samples, many of them side by side on an executor.
+"""Blocks of bodies: one block is integrated and checked at a time, many of them side by side on an executor.
 
 The size of a block follows from the number of its samples alone, so that numbers do not depend on threads, on the order in
-which blocks end, or on where they run. Source: our own.
+which blocks end, or on where they run.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
-from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +19,6 @@ from ..attitude import Array
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..method import Grid, Method
 from ..methods.many import Block, Bodies, pause, watch
-from ..outcome import ProgressOfMany
-from ..trajectory import Bounds
 from .drifts import find_drifts, list_drifts
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
@@ -34,7 +31,7 @@ LONGEST_WAIT = 0.1
 
 @dataclass(frozen=True, eq=False)
 class BlockResult:
-    """What a block of n bodies gives, of m samples each. It can be sent to another process.
+    """The result of a block of n bodies, of m samples each. It can be sent to another process.
 
     Attributes
     ----------
@@ -43,7 +40,7 @@ class BlockResult:
     drifts
         Largest drifts (n, k), dimensionless, by the names that `conservative.integration.drifts.list_drifts` has of the bodies.
     failures
-        What ended the runs of those that did not reach their end, by their indices in the block.
+        The failures of those that did not reach their end, by their indices in the block.
     """
 
     R_WB: Array
@@ -65,18 +62,13 @@ def list_blocks(n: int, grid: Grid) -> range:
     return range(0, n, count_bodies(grid))
 
 
-def count_left(n: int, grid: Grid, done: Collection[int]) -> int:
-    """Return how many of n bodies are in blocks whose first indices are not in `done`."""
-    return sum(min(count_bodies(grid), n - first) for first in list_blocks(n, grid) if first not in done)
-
-
 def run_block(method: Method, bodies: Bodies, grid: Grid) -> BlockResult:
     """Return the samples of bodies, whose outcomes are those of `Method.solve` for each of them alone."""
     run = method.prepare_many(bodies, grid)
     n, m = len(bodies), grid.n_samples
     block = run() if run else Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool))
     found = find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B) if run else None
-    good = np.zeros(n, dtype=bool) if found is None else block.finished & is_kept(method, bodies, grid, found.bounded)
+    good = np.zeros(n, dtype=bool) if found is None else block.finished & are_conserved(method, bodies, grid, found.bounded)
     failures = {}
     for i in np.flatnonzero(~good).tolist():
         pause()
@@ -88,32 +80,32 @@ def run_block(method: Method, bodies: Bodies, grid: Grid) -> BlockResult:
     return BlockResult(block.R_WB, block.w_WB_B, found.values, failures)
 
 
-def is_kept(method: Method, bodies: Bodies, grid: Grid, bounded: Array) -> Any:
+def are_conserved(method: Method, bodies: Bodies, grid: Grid, bounded: Array) -> Any:
     """Return which of n bodies (n,) are within the bounds of a method, by their drifts (n, k), dimensionless.
 
-    Bounds grow with the ratio of a body's moments. So those of the body with the smallest ratio hold for all, and only who is
-    beyond them is asked for its own.
+    Bounds grow with the ratio of a body's moments. So those of the body with the smallest ratio hold for all, and only bodies
+    beyond them need their own.
     """
     names, kept = list_drifts(bodies), method.conserves
     own = {each.name for each in bodies.scene.extra_invariants}
     columns = [column for column, name in enumerate(names) if column > 0 and name in kept and name not in own]
     skew, drift = bounded[:, 0], np.nan_to_num(bounded[:, columns], nan=np.inf).max(axis=1, initial=0.0)
-    roundest = (
-        0 if bodies.inertia is None else int(np.argmin(bodies.principal[0].max(axis=1) / bodies.principal[0].min(axis=1)))
-    )
-    good = _within(method.bounds(bodies.take(roundest), grid), drift, skew)
-    if bodies.inertia is not None:
-        for i in np.flatnonzero(~good).tolist():
-            good[i] = _within(method.bounds(bodies.take(i), grid), drift[i], skew[i])
+
+    def are_within(i: int, part: Any) -> Any:
+        bounds = method.bounds(bodies.take(i), grid)
+        return (drift[part] <= bounds.drift) & (skew[part] <= bounds.orthonormality)
+
+    if bodies.inertia is None:
+        return are_within(0, slice(None))
+    moments = bodies.principal[0]
+    good = are_within(int(np.argmin(moments.max(axis=1) / moments.min(axis=1))), slice(None))
+    for i in np.flatnonzero(~good).tolist():
+        good[i] = are_within(i, i)
     return good
 
 
-def _within(bounds: Bounds, drift: Any, skew: Any) -> Any:
-    return (drift <= bounds.drift) & (skew <= bounds.orthonormality)
-
-
 def run_alone(method: Method, bodies: Bodies, grid: Grid, i: int, block: Block) -> IntegrationFailed | None:
-    """Put the samples of body i, run alone, into the block, and return what ended its run early, None if nothing did."""
+    """Integrate body i alone, put its samples into the block, and return its failure, if there is one."""
     block.R_WB[i], block.w_WB_B[i] = np.nan, np.nan
     scene = bodies.take(i)
     try:
@@ -129,7 +121,7 @@ def run_alone(method: Method, bodies: Bodies, grid: Grid, i: int, block: Block) 
 
 @contextmanager
 def start_threads(threads: int) -> Iterator[Executor]:
-    """Give an executor of so many threads; when it is left, be it by Ctrl-C, blocks that still run are given up."""
+    """Yield an executor of so many threads. Blocks that still run at the end, as after Ctrl-C, are given up."""
     if threads == 1:
         yield Inline()
         return
@@ -143,31 +135,30 @@ def start_threads(threads: int) -> Iterator[Executor]:
 
 
 class Inline(Executor):
-    """Runs what it is given at once, in the thread that gives it: there, Ctrl-C ends a run at any moment."""
+    """Runs each call at once, in the calling thread: in the main thread, Ctrl-C ends a run at any moment."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return the future of a call that is over already."""
+        """Return the future of a call that is already over."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
 
 
 def run_blocks(
-    method: Method, bodies: Bodies, grid: Grid, executor: Executor, in_flight: int, done: Collection[int] = ()
+    method: Method, bodies: Bodies, grid: Grid, executor: Executor, in_flight: int, firsts: Iterable[int]
 ) -> Generator[tuple[int, BlockResult], None, None]:
-    """Run all blocks, and yield the first index of each with its result, in the order in which they end.
+    """Run blocks, and yield the first index of each with its result, in the order in which they end.
 
     Parameters
     ----------
     method, bodies, grid
-        What is run. `grid` has steps in s.
+        The method, all bodies, and the steps in s.
     executor, in_flight
-        What runs blocks, and how many it has at a time: those that run, and those that wait or have not been taken yet.
-    done
-        First indices of blocks that are left out.
+        The executor, and how many blocks it has at a time: those that run, and those that wait or have not been taken yet.
+    firsts
+        First indices of the blocks to run.
     """
-    size = count_bodies(grid)
-    left = (first for first in list_blocks(len(bodies), grid) if first not in done)
+    size, left = count_bodies(grid), iter(firsts)
     pending: dict[Future[BlockResult], int] = {}
     try:
         while True:
@@ -181,31 +172,3 @@ def run_blocks(
     finally:
         for future in pending:
             future.cancel()
-
-
-Tell = Callable[[ProgressOfMany], object]
-
-
-class Sink(Protocol):
-    """What keeps the results of blocks, in the order in which they come."""
-
-    @property
-    def done(self) -> Collection[int]:
-        """First indices of the blocks that it has already."""
-
-    def write(self, first: int, result: BlockResult) -> None:
-        """Keep the result of the block that begins with body number `first`."""
-
-
-def fill(
-    sink: Sink, results: Generator[tuple[int, BlockResult], None, None], counts: tuple[int, int], progress: Tell | None
-) -> None:
-    """Hand all results to a sink, and tell after each of them how many bodies are done; counts are those left, and all."""
-    begun, (left, total) = perf_counter(), counts
-    done = total - left
-    with closing(results):
-        for first, result in results:
-            sink.write(first, result)
-            done += len(result)
-            if progress is not None:
-                progress(ProgressOfMany(perf_counter() - begun, done, total, total - counts[0]))

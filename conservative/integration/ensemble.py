@@ -1,10 +1,12 @@
-"""What `integrate_many` gives: samples, drifts and outcomes of many bodies. Source: our own."""
+"""`Ensemble`, the result of `integrate_many`: samples, drifts and outcomes of many bodies."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -13,20 +15,26 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import choice as require_choice
-from ..errors import IntegrationFailed
+from ..errors import IntegrationFailed, require_extra
 from ..method import Grid
 from ..methods.many import Bodies
 from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
+from ..presentation import COLUMNS
+from ..presentation import samples as sample_rows
+from ..scene import Scene
 from ..trajectory import Trajectory
-from . import pictures, tables
+from . import pictures
 from .blocks import BlockResult
 from .drifts import find_drifts, list_drifts
-from .store import open_store
+from .store import read_store, write_store
 
 if TYPE_CHECKING:
     import altair
     import pandas
+
+MOST_LISTED = 5
+"""Failed bodies that are named at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +108,22 @@ class Ensemble:
             pandas, of the extra `report`, is not installed.
         """
         require_choice("rows", rows, ("samples", "bodies"))
-        return tables.sample_table(self) if rows == "samples" else tables.body_table(self)
+        require_extra("Ensemble.to_pandas", "report", "pandas")
+        import pandas as pd
+
+        if rows == "samples":
+            samples = [sample_rows(each) for each in self]
+            frame = pd.DataFrame(np.concatenate(samples), columns=list(COLUMNS))
+            frame.insert(0, "body", np.repeat(np.arange(len(samples)), [len(each) for each in samples]))
+        else:
+            outcomes, reached = np.full(len(self), "ok", dtype=object), np.full(len(self), self.t[-1])
+            for i, failure in self.failures.items():
+                outcomes[i], reached[i] = str(failure.outcome), max(self[i].t, default=0.0)
+            drifts = {f"drift of {name}": values for name, values in self.drifts.items()}
+            frame = pd.DataFrame({"outcome": outcomes, "t": reached, **drifts})
+            frame.index.name = "body"
+        frame.attrs = {"scene": self.bodies.scene.name, "method": self.label}
+        return frame
 
     def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
         """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
@@ -117,7 +140,27 @@ class Ensemble:
         return pictures.draw_ensemble(self, axis_B)
 
     def _repr_html_(self) -> str:
-        return tables.card(self)
+        rows = [
+            ("scene", self.bodies.scene.name),
+            ("method", self.label),
+            ("bodies", str(len(self))),
+            ("samples", f"{len(self.t)} of each, to {self.t[-1]:g} s"),
+            ("outcomes", self._describe_outcomes()),
+        ]
+        for name, values in self.drifts.items():
+            worst = -1 if np.isnan(values).all() else int(np.nanargmax(values))
+            rows.append((f"drift of {name}", "none" if worst < 0 else f"{values[worst]:.2e} at most (relative, body {worst})"))
+        cell = '<tr><th scope="row" style="text-align:left">'
+        body = "".join(f"{cell}{escape(key)}</th><td>{escape(value)}</td></tr>" for key, value in rows)
+        return f"<table><caption>Ensemble</caption>{body}</table>"
+
+    def _describe_outcomes(self) -> str:
+        """Return how many runs ended in which way, and the numbers of some bodies that failed."""
+        failed = sorted(self.failures)
+        kinds = Counter(self.failures[i].outcome.kind.value for i in failed)
+        counts = [f"{len(self) - len(failed)} ok", *(f"{count} {kind}" for kind, count in kinds.most_common())]
+        named = ", ".join(map(str, failed[:MOST_LISTED])) + (", ..." if len(failed) > MOST_LISTED else "")
+        return ", ".join(counts) + (f" (body {named})" if failed else "")
 
     @overload
     def __getitem__(self, i: int) -> Trajectory: ...
@@ -157,14 +200,11 @@ class Ensemble:
         MissingExtra
             Zarr, of the extra `ensembles`, is not installed.
         """
-        with open_store(path, self.label, self.bodies, self.grid) as store:
-            for first in range(0, len(self), store.block):
-                store.write(first, self._take_block(slice(first, first + store.block)))
-
-    def _take_block(self, part: slice) -> BlockResult:
-        drifts = np.stack([values[part] for values in self.drifts.values()], axis=1)
-        failures = {i - part.start: failure for i, failure in self.failures.items() if part.start <= i < part.stop}
-        return BlockResult(self.R_WB[part], self.w_WB_B[part], drifts, failures)
+        with write_store(path, self.label, self.bodies, self.grid) as store:
+            for first in store.blocks:
+                part = self[first : first + store.blocks.step]
+                drifts = np.stack(list(part.drifts.values()), axis=1)
+                store.write(first, part.bodies, BlockResult(part.R_WB, part.w_WB_B, drifts, dict(part.failures)))
 
     def __len__(self) -> int:
         return len(self.bodies)
@@ -174,7 +214,31 @@ class Ensemble:
 
     def __repr__(self) -> str:
         name, samples = self.bodies.scene.name, f"{len(self.t)} samples to {self.t[-1]:g} s"
-        return f"Ensemble({name!r}, {self.label!r}, {len(self)} bodies, {samples}, {tables.describe_outcomes(self)})"
+        return f"Ensemble({name!r}, {self.label!r}, {len(self)} bodies, {samples}, {self._describe_outcomes()})"
+
+
+def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
+    """Return the ensemble that `integrate_many(..., path=...)` or `Ensemble.to_zarr` has written.
+
+    Samples stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, and `ensemble.R_WB[:1000, -1]` reads
+    only the blocks of the first 1000 bodies. Initial states stay there as well. Drifts and outcomes are read at once. Missing
+    and truncated blocks are noticed here, other damage when Zarr reads it (`ValueError`).
+
+    Parameters
+    ----------
+    path
+        The folder.
+    scene
+        The scene of the run, needed only if it has functions of its own, as with `FunctionPotential` or `extra_invariants`.
+
+    Raises
+    ------
+    BadInput
+        The folder is not an ensemble, or some of its blocks are missing or damaged; or the scene is missing, or another one.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed.
+    """
+    return Ensemble(**read_store(path, scene))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,29 +276,3 @@ def ensemble_of_one(bodies: Bodies, grid: Grid, found: Trajectory, choice: Choic
     samples = {"bodies": bodies, "grid": grid, "R_WB": R_WB, "w_WB_B": w_WB_B}
     drifts, rest = build_whole(DriftsOnDemand, samples), {"label": found.label, "failures": failures, "choice": choice}
     return build_whole(Ensemble, {**samples, "drifts": drifts, **rest})
-
-
-class Memory:
-    """Keeps what blocks give in memory."""
-
-    def __init__(self, bodies: Bodies, grid: Grid, names: tuple[str, ...]) -> None:
-        n, m = len(bodies), grid.n_samples
-        self.names = names
-        self.R_WB, self.w_WB_B, self.drifts = np.empty((n, m, 3, 3)), np.empty((n, m, 3)), np.empty((n, len(names)))
-        self.failures: dict[int, IntegrationFailed] = {}
-
-    @property
-    def done(self) -> frozenset[int]:
-        """First indices of the blocks that are here already: none at first."""
-        return frozenset()
-
-    @property
-    def drifts_by_name(self) -> dict[str, Array]:
-        """Largest drifts (n,), dimensionless, of all bodies by the names of what drifts."""
-        return dict(zip(self.names, self.drifts.T, strict=True))
-
-    def write(self, first: int, result: Any) -> None:
-        """Keep the result of the block that begins with body number `first`."""
-        part = slice(first, first + len(result))
-        self.R_WB[part], self.w_WB_B[part], self.drifts[part] = result.R_WB, result.w_WB_B, result.drifts
-        self.failures.update((first + i, failure) for i, failure in result.failures.items())

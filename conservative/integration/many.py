@@ -1,29 +1,41 @@
-"""`integrate_many`: thousands of starts, and of bodies, of one kind of scene. Source: our own."""
+"""`integrate_many`: thousands of initial states, and of bodies, of one kind of scene."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, positive_number
-from ..errors import BadInput
+from ..errors import BadInput, IntegrationFailed
 from ..method import Grid, Method, grid_for
 from ..methods.between import Samples
 from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
-from .blocks import Tell, count_left, fill, list_blocks, run_blocks
-from .ensemble import Ensemble, ensemble_of_one
+from .blocks import BlockResult, list_blocks, run_blocks, start_threads
+from .cluster import start_executor
+from .drifts import list_drifts
+from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import only_body, read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
-from .places import Place
 from .shared_choice import Goal, choose_for_all, pick_hardest
+from .store import Store, write_store
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+MOST_WAITING = 16
+"""Blocks at most that wait for a worker of a cluster, or for being written, beside those that run."""
 
 
 def integrate_many(
@@ -39,17 +51,17 @@ def integrate_many(
     sample_every: int = 1,
     error: float | None = None,
     threads: int | None = None,
-    progress: Tell | None = None,
+    progress: Callable[[ProgressOfMany], object] | None = None,
     path: str | Path | None = None,
     resume: bool = False,
-    client: Any = None,
+    client: Client | None = None,
 ) -> Ensemble:
-    """Integrate n bodies, each by itself, from n starts.
+    """Integrate n bodies, each by itself, from n initial states.
 
     Parameters
     ----------
     scene
-        What all of them share: all that is not given here.
+        The scene of all bodies: it provides everything that is not given here.
     R_WB0
         Attitudes at t = 0 (n, 3, 3), body to world, or n rotations of SciPy.
     w_WB_B0
@@ -59,37 +71,37 @@ def integrate_many(
     parameters
         Numbers (n, ...) of the scene's potential by the names of its fields, such as {"weight": ..., "com_B": ...}.
     dt, t_end
-        Step and duration, s, as `integrate` has them. All bodies have the same steps.
+        Step size and duration, s, as in `integrate`. All bodies have the same steps.
     method
-        A method, or its name, as `integrate` has it.
+        A method, or its name, as in `integrate`.
     sample_every
         Keep every so many steps (and the first and last state).
     error
-        Attitude error of every body over the run, rad, instead of a method and a step; dt then is the distance of samples.
+        Attitude error of every body over the run, rad, instead of a method and a step size; dt then is the distance of samples.
         `conservative.integration.shared_choice` chooses both for the bodies that turn fastest and for some others, and verifies
         them on further ones: `ensemble.choice` has them, the largest estimated error, and on how many bodies it was estimated.
-        A warning `AccuracyNotReached` where one of those is not near enough. Bodies that are not looked at may be further off:
-        those near a separatrix, say, which amplify errors.
+        A warning `AccuracyNotReached` says that one of these is not accurate enough. Errors of the other bodies may be larger,
+        for example near a separatrix, which amplifies errors.
     threads
-        How many blocks of bodies run side by side; default: as many as there are processors for this process. Numbers do not
-        depend on it.
+        How many blocks of bodies run side by side; default: the number of processors of this process. Numbers do not depend on
+        it.
     progress
-        Called with a `ProgressOfMany`, whose text is a line, after each block. `print` will do.
-
+        Called with a `ProgressOfMany`, whose text is a line, after each block, for example `print`.
     path
-        A new folder, to which samples go block by block (`conservative.integration.store` says how), so that they need no
-        memory; the ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
+        A new folder, to which samples are written block by block (see `conservative.integration.store`), so that they need no
+        memory. The ensemble that is returned reads them from there, as `open_ensemble(path)` does later.
     resume
-        Whether the folder may have some blocks of the same run, which was interrupted: the others are added. The folder is then
-        the same, byte for byte, as that of a run without a break.
+        Whether the folder may have some blocks of the same run. Blocks that are missing or damaged are computed. The folder is
+        then the same, byte for byte, as after a run without a break.
     client
         A `dask.distributed.Client`: blocks run on its workers, instead of threads of this process.
 
     Raises
     ------
     BadInput
-        An argument cannot be used: shapes do not match, or a body cannot be; the message has its number. Or the folder is there
-        without `resume`, or is something else or of another run; or the cluster has no workers, or some of another version.
+        An argument cannot be used: shapes do not match, or a body is not possible (the message has its number). Or the folder
+        is there without `resume`, or is something else or of another run. Or the cluster has no workers, or some of another
+        version.
     NotWritten
         The folder cannot be written, or the disk is full; blocks that are done are kept.
     MissingExtra
@@ -101,66 +113,66 @@ def integrate_many(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    if progress is not None and not callable(progress):
-        raise BadInput("progress", describe(progress), "a function of a ProgressOfMany, such as print, or None")
-    place = Place(_read_threads(threads), client, path, resume)
+    for name, value, good, allowed in (
+        (
+            "progress",
+            progress,
+            progress is None or callable(progress),
+            "a function of a ProgressOfMany, such as print, or None",
+        ),
+        ("path", path, path is None or isinstance(path, str | Path), "the path of a folder, or None"),
+        ("resume", resume, isinstance(resume, bool), "True or False"),
+        ("resume", resume, path is not None or not resume, "False without a path, as there is nothing to go on from"),
+    ):
+        if not good:
+            raise BadInput(name, describe(value), allowed)
+    if threads is not None:
+        positive_integer("threads", threads, "a number of threads, 1 or more, or None for one a processor")
     alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
     bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
+    choice: ChoiceForMany | None = None
     try:
-        found, grid, choice = make_plan(bodies, dt, t_end, method, sample_every, error)
-        if len(bodies) == 1 and place.here:
-            return run_one(found, bodies, grid, choice, progress)
-        if place.path is None:
-            _require_memory(bodies, grid)
-        return replace(run_all(found, bodies, grid, place, progress), choice=choice)
+        if error is not None:
+            choice = _choose(bodies, error, method, dt, t_end, sample_every)
+            made, grid = choice.method, choice.grid
+        else:
+            made = read_method(method, bodies.first)
+            grid = grid_for(bodies.first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
+            require_support(made, bodies.first)
+            if len(bodies) > 1:  # a single body's run reports it itself
+                _require_steps(made, bodies, grid)
+        if len(bodies) == 1 and path is None and client is None:
+            ensemble = ensemble_of_one(bodies, grid, made.solve(bodies.first, grid), choice)
+            if progress is not None:
+                progress(ProgressOfMany(0.0, 1, 1))
+            return ensemble
+        start = _start(client, threads, len(list_blocks(len(bodies), grid)))
+        if path is not None:
+            with start as (executor, in_flight), write_store(path, made.label, bodies, grid, resume) as store:
+                _run_all(made, bodies, grid, executor, in_flight, store, progress)
+            return replace(open_ensemble(path, bodies.scene), choice=choice)
+        memory = Memory(bodies, grid)
+        with start as (executor, in_flight):
+            _run_all(made, bodies, grid, executor, in_flight, memory, progress)
+        drifts = dict(zip(list_drifts(bodies), memory.drifts.T, strict=True))
+        return Ensemble(bodies, grid, memory.R_WB, memory.w_WB_B, drifts, made.label, memory.failures, choice)
     except SystemError as failure:
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
 
-def _read_threads(value: object) -> int:
-    if value is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return positive_integer("threads", value, "a number of threads, 1 or more, or None for one a processor")
+def _choose(bodies: Bodies, error: object, method: object, dt: Any, t_end: Any, sample_every: int) -> ChoiceForMany:
+    wanted = positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
+    end = bodies.first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    spacing = None if dt is None else grid_for(bodies.first, dt, end).dt
+    return choose_for_all(bodies, Goal(wanted, end, Samples(spacing, positive_integer("sample_every", sample_every))))
 
 
-def make_plan(
-    bodies: Bodies,
-    dt: float | None,
-    t_end: float | None,
-    method: Method | str | None,
-    sample_every: int,
-    error: float | None,
-) -> tuple[Method, Grid, ChoiceForMany | None]:
-    """Return the method and the grid of steps, s, as they are given, or as they were chosen for an error.
+def _require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
+    """Raise `BadInput` if the method has no step of that length for one of the bodies that turn fastest.
 
-    Raises
-    ------
-    BadInput
-        An argument cannot be used, or the method has no step of that length for a body.
-    Unsupported
-        The method cannot do the scene.
-    """
-    first = bodies.first
-    if error is not None:
-        wanted = positive_number("error", error, "a finite attitude error above 0, rad")
-        if method is not None:
-            raise BadInput("method", describe(method), "None together with error, which chooses the method")
-        end = first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-        samples = Samples(None if dt is None else grid_for(first, dt, end).dt, positive_integer("sample_every", sample_every))
-        choice = choose_for_all(bodies, Goal(wanted, end, samples))
-        return choice.method, choice.grid, choice
-    found = read_method(method, first)
-    grid = grid_for(first, DEFAULT_DT if dt is None else dt, t_end, sample_every)
-    require_support(found, first)
-    if len(bodies) > 1:  # of one, the run says the same
-        require_steps(found, bodies, grid)
-    return found, grid, None
-
-
-def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
-    """Raise `BadInput` where the method has no step of that length for one of the bodies that turn fastest.
-
-    A body of which only its own run shows it is `NotRun`.
+    Other bodies for which the step is too long become `NotRun` when they are integrated.
     """
     for i in pick_hardest(bodies):
         scene = bodies.take(i)
@@ -171,26 +183,62 @@ def require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
             raise BadInput(refusal.argument, f"{refusal.got} (body {i})", refusal.allowed) from None
 
 
-def _require_memory(bodies: Bodies, grid: Grid) -> None:
-    """Raise `BadInput` if the samples of all bodies do not fit in memory."""
-    most, samples = most_samples() * SAMPLE_BYTES // KEPT_BYTES, len(bodies) * grid.n_samples
-    if samples > most:
-        got = f"{grid.every}, for {samples} samples of {len(bodies)} bodies"
-        raise BadInput("sample_every", got, f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory")
+class Memory:
+    """Keeps the results of blocks in memory."""
+
+    def __init__(self, bodies: Bodies, grid: Grid) -> None:
+        n, m = len(bodies), grid.n_samples
+        most = most_samples() * SAMPLE_BYTES // KEPT_BYTES
+        if n * m > most:
+            got = f"{grid.every}, for {n * m} samples of {n} bodies"
+            allowed = f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory"
+            raise BadInput("sample_every", got, allowed)
+        self.R_WB, self.w_WB_B = np.empty((n, m, 3, 3)), np.empty((n, m, 3))
+        self.drifts = np.empty((n, len(list_drifts(bodies))))
+        self.failures: dict[int, IntegrationFailed] = {}
+
+    def is_whole(self, first: int) -> bool:
+        """Return False, as a run in memory begins with no block."""
+        return False
+
+    def write(self, first: int, bodies: Bodies, result: BlockResult) -> None:
+        """Keep the result for `bodies`, the block that begins with body number `first`."""
+        part = slice(first, first + len(bodies))
+        self.R_WB[part], self.w_WB_B[part], self.drifts[part] = result.R_WB, result.w_WB_B, result.drifts
+        self.failures.update((first + i, failure) for i, failure in result.failures.items())
 
 
-def run_one(method: Method, bodies: Bodies, grid: Grid, choice: ChoiceForMany | None, progress: Tell | None) -> Ensemble:
-    """Return what a single body gives, at next to no cost beside that of `integrate`."""
-    found = ensemble_of_one(bodies, grid, method.solve(bodies.first, grid), choice)
-    if progress is not None:
-        progress(ProgressOfMany(0.0, 1, 1))
-    return found
+@contextmanager
+def _start(client: Client | None, threads: int | None, blocks: int) -> Iterator[tuple[Executor, int]]:
+    """Yield an executor for so many blocks, and how many to submit to it at a time."""
+    if client is not None:
+        with start_executor(client) as cluster:
+            yield cluster, cluster.places + min(cluster.places, MOST_WAITING)
+        return
+    if threads is None:
+        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = min(threads, blocks)
+    with start_threads(threads) as executor:
+        yield executor, 2 * threads
 
 
-def run_all(method: Method, bodies: Bodies, grid: Grid, place: Place, progress: Tell | None) -> Ensemble:
-    """Return what all blocks give, in memory or in a folder. Steps of the grid are in s."""
-    what, blocks = (method.label, bodies, grid), len(list_blocks(len(bodies), grid))
-    with place.start(blocks) as (executor, in_flight), place.open_sink(*what) as sink:
-        results = run_blocks(method, bodies, grid, executor, in_flight, sink.done)
-        fill(sink, results, (count_left(len(bodies), grid, sink.done), len(bodies)), progress)
-    return place.read(sink, *what)
+def _run_all(
+    method: Method,
+    bodies: Bodies,
+    grid: Grid,
+    executor: Executor,
+    in_flight: int,
+    sink: Memory | Store,
+    progress: Callable[[ProgressOfMany], object] | None,
+) -> None:
+    """Integrate the blocks that the sink does not have yet, and write each of them to it as soon as it is done."""
+    total, blocks = len(bodies), list_blocks(len(bodies), grid)
+    left = [first for first in blocks if not sink.is_whole(first)]
+    done = found = total - sum(min(blocks.step, total - first) for first in left)
+    begun = perf_counter()
+    with closing(run_blocks(method, bodies, grid, executor, in_flight, left)) as results:
+        for first, result in results:
+            sink.write(first, bodies[first : first + blocks.step], result)
+            done += len(result)
+            if progress is not None:
+                progress(ProgressOfMany(perf_counter() - begun, done, total, found))

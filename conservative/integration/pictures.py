@@ -1,28 +1,36 @@
-"""How an ensemble looks: where a body axis points, how far attitudes are apart over time, what drifted. Altair when asked for.
+"""Pictures of an ensemble: where a body axis points, how far attitudes are apart over time, and the drifts.
 
-Charts have a few thousand rows at most, of any number of bodies: counts and quantiles, block by block. Source: our own.
+Charts have a few thousand rows at most, for any number of bodies: counts and quantiles, found block by block. Directions are
+drawn on a disc by J. H. Lambert's equal-area projection (1772), so that equal areas are equal parts of the sphere. Altair is
+imported when a picture is drawn.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import finite_array
-from ..errors import BadInput, IntegrationFailed, require_extra
-from ..methods.many import Bodies
-from .discs import BLUE, draw_pointing, frame
-from .distributions import angle_quantiles, directions, mean_attitudes
+from ..errors import BadInput, require_extra
+from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 if TYPE_CHECKING:
     import altair
     import pandas
 
+BLUE = "#0072B2"
+MOST_POINTS = 1000
+"""Bodies up to which each is a point; more are counted in cells."""
+_CELLS, _SIDE = 41, 230
+_RINGS = (*(m * 10.0**k for k in range(-9, 1) for m in (1, 2, 5)), 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
+"""Angles between rings, degrees."""
+_LEAST_EXTENT = 1e-7
+"""Half the side of a disc at least, rad: what is nearer is one point."""
 LEAST_DRAWN = 1e-17
 """Relative drift at which smaller ones are drawn, 0 too: a tenth of the round-off of one number."""
 MOST_TIMES = 200
@@ -33,37 +41,7 @@ _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
 """Those of Okabe and Ito, which colour-blind readers tell apart."""
 
 
-class Distributed(Protocol):
-    """What is drawn: an `Ensemble`, whose file imports this one, so that naming the class would close a circle."""
-
-    @property
-    def bodies(self) -> Bodies:
-        """What was integrated."""
-
-    @property
-    def t(self) -> Array:
-        """Times (m,) of the samples, s."""
-
-    @property
-    def R_WB(self) -> Any:
-        """Attitudes (n, m, 3, 3), body to world, in memory or on a disk."""
-
-    @property
-    def drifts(self) -> Mapping[str, Array]:
-        """Largest drift (n,) of each body by the name of what drifts, dimensionless."""
-
-    @property
-    def label(self) -> str:
-        """Who made it."""
-
-    @property
-    def failures(self) -> Mapping[int, IntegrationFailed]:
-        """What ended runs early, by the number of the body."""
-
-    def __len__(self) -> int: ...
-
-
-def draw_ensemble(ensemble: Distributed, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
+def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
     """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
 
     Parameters
@@ -102,12 +80,12 @@ def choose_samples(m: int) -> list[int]:
     return np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
 
 
-def ends(ensemble: Distributed) -> list[int]:
+def ends(ensemble: Any) -> list[int]:
     """Return the numbers of the first and of the last sample."""
     return sorted({0, len(ensemble.t) - 1})
 
 
-def _read_axis(ensemble: Distributed, axis_B: ArrayLike | None) -> Array:
+def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
     if axis_B is None:
         found = ensemble.bodies.take(0).symmetry_axis_B
         return np.array([0.0, 0.0, 1.0]) if found is None else found
@@ -191,3 +169,74 @@ def _drift_rows(name: str, values: Array, edges: Array) -> pandas.DataFrame:
     finite = np.clip(values[np.isfinite(values)], edges[0], edges[-1])
     counts, _ = np.histogram(finite, edges)
     return frame(of=np.full(len(edges), name), drift=edges, bodies=np.maximum([*counts, 0], 0.5))
+
+
+def draw_pointing(directions_W: Array, title: str) -> Any:
+    """Return where n bodies point, unit vectors (n, 3), world axes: as points, or counted in cells of a disc, with rings."""
+    import altair as alt
+
+    points, mean = project(directions_W)
+    extent = _extent(points)
+    shown = f"mean ({', '.join(f'{each:.3f}' for each in mean)}), world axes"
+    scale = alt.Scale(domain=[-extent, extent], nice=False)
+    x, y = alt.X("x:Q", axis=None, scale=scale), alt.Y("y:Q", axis=None, scale=scale)
+    layers = [_points(points) if len(points) <= MOST_POINTS else _cells(points, extent), *_rings(extent)]
+    drawn = alt.layer(*(layer.encode(x=x, y=y) for layer in layers))
+    return drawn.properties(width=_SIDE, height=_SIDE, title=alt.Title(title, subtitle=shown))
+
+
+def _extent(points: Array) -> float:
+    """Return half the side of the square that is drawn: all points (n, 2) are in it."""
+    return max(float(np.linalg.norm(points, axis=1).max(initial=0.0)) * 1.06, _LEAST_EXTENT)
+
+
+def _points(points: Array) -> Any:
+    import altair as alt
+
+    return alt.Chart(frame(x=points[:, 0], y=points[:, 1])).mark_point(filled=True, size=14, opacity=0.6, color=BLUE)
+
+
+def _cells(points: Array, extent: float) -> Any:
+    """Return the numbers of bodies in the cells of a square; empty ones are not drawn."""
+    import altair as alt
+
+    counts, edges, _ = np.histogram2d(points[:, 0], points[:, 1], bins=_CELLS, range=[[-extent, extent]] * 2)
+    middle = (edges[1:] + edges[:-1]) / 2
+    i, j = np.nonzero(counts)
+    data = frame(x=middle[i], y=middle[j], bodies=counts[i, j].astype(int))
+    colour = alt.Color("bodies:Q", scale=alt.Scale(scheme="yellowgreenblue"), legend=None)
+    cells = alt.Chart(data).mark_square(size=(_SIDE / _CELLS + 0.6) ** 2, opacity=1)
+    return cells.encode(color=colour, tooltip="bodies:Q")
+
+
+def _rings(extent: float) -> list[Any]:
+    """Return circles about the centre at round angles, and their labels in degrees."""
+    import altair as alt
+
+    reach = math.degrees(2 * math.asin(min(extent / 2, 1.0)))
+    step = next((angle for angle in _RINGS if reach / angle < 4), _RINGS[-1])
+    angles = np.arange(1, math.floor(reach / step) + 1) * step
+    turn = np.linspace(0, 2 * math.pi, 61)
+    radii = 2 * np.sin(np.radians(angles) / 2)
+    n, many = len(turn), len(radii)
+    lines = frame(
+        x=np.outer(radii, np.sin(turn)).ravel(),
+        y=np.outer(radii, np.cos(turn)).ravel(),
+        order=np.tile(np.arange(n), many),
+        ring=np.repeat(angles, n),
+    )
+    apart = np.append(np.diff(radii) > 0.15 * extent, True)[:many]
+    angles, radii = angles[apart], radii[apart]
+    labels = frame(x=0 * radii, y=radii, label=[f"{angle:g}°" for angle in angles])
+    halo, text = ({"stroke": "white", "strokeWidth": 3}, {"color": "#404040"})
+    return [
+        alt.Chart(lines).mark_line(color="#7F7F7F", strokeWidth=0.7).encode(order="order:Q", detail="ring:N"),
+        *(alt.Chart(labels).mark_text(dy=-5, fontSize=10, **look).encode(text="label:N") for look in (halo, text)),
+    ]
+
+
+def frame(**columns: Any) -> pandas.DataFrame:
+    """Return a table with the columns given."""
+    import pandas as pd
+
+    return pd.DataFrame(columns)

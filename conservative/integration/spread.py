@@ -1,14 +1,15 @@
-"""Random starts and bodies about those of a scene, for `integrate_many`.
+"""Random initial states and bodies near those of a scene, for `integrate_many`.
 
-Every quantity has a stream of random numbers of its own, drawn body by body: the first bodies of many are those of few, and the
-spread of one quantity changes no other. Source: definitions; turns of any kind are evenly distributed as K. Shoemake, Uniform
-random rotations (1992), draws them.
+Every quantity has its own stream of random numbers, drawn body by body. So the first bodies of a large ensemble are those of a
+small one, and the spread of one quantity changes no other. Attitudes distributed evenly over all rotations are drawn as in
+K. Shoemake, Uniform random rotations (1992).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Integral
 from typing import Any, TypedDict
@@ -16,12 +17,11 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ..attitude import Array, from_quaternion
-from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer
+from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, real_number
 from ..errors import BadInput, nearest
 from ..potentials.turning import static_part
 from ..scene import Scene
 from . import inputs
-from .deviation import Deviation, read_angle, read_number, read_rate, read_share
 
 START_BYTES = 400
 """Memory that a body takes with its inertia, bytes, where its start is drawn and then read."""
@@ -29,6 +29,16 @@ _PIECE = 1 << 16
 """Bodies whose attitudes are computed at once: what that takes besides stays below 50 MB."""
 _ROUND_OFF = 1e-12
 """What a second moment of mass may be below 0, relative to the largest moment of inertia: a plate's is 0."""
+
+_ANY = "any"
+"""Text for directions or attitudes that are evenly distributed instead."""
+_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s]\S*)?\s*")
+_ANGLES = {"": 1.0, "rad": 1.0, "deg": math.pi / 180}
+_RATES = {"": 1.0, "rad/s": 1.0, "deg/s": math.pi / 180, "%": 0.01}
+_ANGLE = f"a standard deviation above 0 such as 0.1 (rad) or 5deg, or {_ANY}"
+_RATE = f"a standard deviation above 0 such as 0.1 (rad/s), 5deg/s or 10% (of its size), or {_ANY}"
+_NUMBER = "a standard deviation above 0 such as 2% (of its size) or 0.1 (its own SI unit)"
+_SHARE = "a standard deviation above 0% and up to 100%, such as 1%"
 
 
 class Starts(TypedDict, total=False):
@@ -90,11 +100,16 @@ def spread(
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
-    count, seed = _read_count(n), _read_seed(seed)
+    count, most = positive_integer("n", n), most_samples() * SAMPLE_BYTES // START_BYTES
+    if count > most:
+        raise BadInput("n", describe(n), f"up to {most:.3g}, which fit in memory, {START_BYTES} bytes each")
+    checked: object = seed
+    if isinstance(checked, bool) or not isinstance(checked, Integral) or checked < 0:
+        raise BadInput("seed", describe(seed), "an integer of 0 or more")
     found = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
-        found["inertia"] = _draw_inertia(scene, count, read_share("inertia", inertia), seed)
+        found["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
         varied |= _follow_inertia(scene, found["inertia"])
     if varied:
         found["parameters"] = varied
@@ -106,26 +121,38 @@ def list_parameters(scene: Scene) -> list[str]:
     return [name for name, shape in inputs.list_parameters(scene.potential).items() if shape in ((), (3,))]
 
 
-def _read_count(n: object) -> int:
-    count, most = positive_integer("n", n), most_samples() * SAMPLE_BYTES // START_BYTES
-    if count > most:
-        raise BadInput("n", describe(n), f"up to {most:.3g}, which fit in memory, {START_BYTES} bytes each")
-    return count
+def _read(argument: str, value: object, units: Mapping[str, float], allowed: str) -> tuple[float, bool]:
+    """Return a standard deviation, given as a number or a text with one of the units, and whether it is relative."""
+    match = _TEXT.fullmatch(value) if isinstance(value, str) else None
+    number, unit = (float(match[1]), match[2] or "") if match else (real_number(value), "")
+    if number is None or unit not in units or not 0 < number * units[unit] < math.inf:
+        raise BadInput(argument, describe(value), allowed)
+    return number * units[unit], unit == "%"
 
 
-def _read_seed(seed: object) -> int:
-    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
-        raise BadInput("seed", describe(seed), "an integer of 0 or more")
-    return int(seed)
+def _read_share(argument: str, value: object) -> float:
+    """Return a relative standard deviation of a quantity that stays above 0."""
+    share, _ = _read(argument, value, {"%": 0.01}, _SHARE)
+    if share > 1:
+        raise BadInput(argument, describe(value), _SHARE)
+    return share
+
+
+def _find_size(argument: str, value: object, centre: Array, unit: str) -> float:
+    """Return the size of a number () or a vector (3,) in `unit`, to which `value` is relative. Raise `BadInput` if it is 0."""
+    size = float(np.linalg.norm(centre))
+    if size == 0:
+        raise BadInput(argument, f"{describe(value)} of 0", f"a standard deviation in {unit}, such as 0.1")
+    return size
+
+
+def _is_any(value: object) -> bool:
+    return isinstance(value, str) and value.strip() == _ANY
 
 
 def _stream(seed: int, name: str, again: int = 0) -> np.random.Generator:
     """Return the random numbers of one quantity; `again` says how often some were drawn before."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(*name.encode(), again)))
-
-
-def _pieces(n: int) -> Iterator[slice]:
-    yield from (slice(start, min(start + _PIECE, n)) for start in range(0, n, _PIECE))
 
 
 def _draw_attitudes(scene: Scene, n: int, value: object, seed: int) -> Array:
@@ -134,14 +161,15 @@ def _draw_attitudes(scene: Scene, n: int, value: object, seed: int) -> Array:
     found[:] = scene.R_WB0
     if value is None:
         return found
-    deviation, stream = read_angle("attitude", value), _stream(seed, "attitude")
-    for part in _pieces(n):
-        many = part.stop - part.start
-        if deviation is None:
-            q = stream.standard_normal((many, 4))
-            found[part] = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
+    even, stream = _is_any(value), _stream(seed, "attitude")
+    deviation = 0.0 if even else _read("attitude", value, _ANGLES, _ANGLE)[0]
+    for start in range(0, n, _PIECE):
+        part = found[start : start + _PIECE]
+        if even:
+            q = stream.standard_normal((len(part), 4))
+            part[:] = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
         else:
-            found[part] = scene.R_WB0 @ _turns(deviation.size * stream.standard_normal((many, 3)))
+            part[:] = scene.R_WB0 @ _turns(deviation * stream.standard_normal((len(part), 3)))
     return found
 
 
@@ -155,23 +183,26 @@ def _draw_rates(scene: Scene, n: int, value: object, seed: int) -> Array:
     """Return angular velocities (n, 3), rad/s, body axes."""
     if value is None:
         return np.tile(scene.w_WB_B0, (n, 1))
-    deviation, drawn = read_rate("rate", value), _stream(seed, "rate").standard_normal((n, 3))
-    if deviation is None:
-        size = Deviation(1.0, True).of("rate", value, scene.w_WB_B0, "rad/s")
+    drawn = _stream(seed, "rate").standard_normal((n, 3))
+    if _is_any(value):
+        size = _find_size("rate", value, scene.w_WB_B0, "rad/s")
         return drawn * (size / np.linalg.norm(drawn, axis=1, keepdims=True))
-    return scene.w_WB_B0 + deviation.of("rate", value, scene.w_WB_B0, "rad/s") * drawn
+    deviation, relative = _read("rate", value, _RATES, _RATE)
+    if relative:
+        deviation *= _find_size("rate", value, scene.w_WB_B0, "rad/s")
+    return scene.w_WB_B0 + deviation * drawn
 
 
-def _draw_shares(seed: int, name: str, shape: tuple[int, ...], deviation: Deviation) -> Array:
+def _draw_shares(seed: int, name: str, shape: tuple[int, ...], deviation: float) -> Array:
     """Return shares (n, ...), normally distributed about 1; those that are not above 0 are drawn again."""
-    found, again = 1 + deviation.size * _stream(seed, name).standard_normal(shape), 0
+    found, again = 1 + deviation * _stream(seed, name).standard_normal(shape), 0
     while (wrong := found <= 0).any():
         again += 1
-        found[wrong] = 1 + deviation.size * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
+        found[wrong] = 1 + deviation * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
     return found
 
 
-def _draw_inertia(scene: Scene, n: int, deviation: Deviation, seed: int) -> Array:
+def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
     """Return principal moments (n, 3), where the body axes are the principal ones, or tensors (n, 3, 3), kg m^2."""
     moments, R_BP = scene.body.moments, scene.body.R_BP
     planes = moments.sum() / 2 - moments
@@ -200,13 +231,12 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
         allowed = nearest(name, known) if known else "none: the scene has no potential with numbers to spread"
         raise BadInput("parameters", repr(name), allowed)
     centre = np.asarray(getattr(scene.potential, name))
-    deviation = read_number(argument, value)
-    if deviation.relative and not centre.ndim:
-        deviation.of(argument, value, centre, "its unit")  # 0 has no shares
-        share = read_share(argument, value)
-        return np.asarray(centre * _draw_shares(seed, argument, (n,), share))
-    drawn = _stream(seed, argument).standard_normal((n, *centre.shape))
-    found = centre + deviation.of(argument, value, centre, "its unit") * drawn
+    deviation, relative = _read(argument, value, {"": 1.0, "%": 0.01}, _NUMBER)
+    if relative:
+        deviation *= _find_size(argument, value, centre, "its unit")
+        if not centre.ndim:
+            return np.asarray(centre * _draw_shares(seed, argument, (n,), _read_share(argument, value)))
+    found = centre + deviation * _stream(seed, argument).standard_normal((n, *centre.shape))
     return found / np.linalg.norm(found, axis=1, keepdims=True) if _is_direction(scene, name) else found
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.integration import discs, pictures
+from conservative.integration import pictures
 from conservative.integration.distributions import angle_quantiles, mean_attitudes
 from conservative.method import Grid
 from conservative.methods.many import Bodies
@@ -42,8 +42,8 @@ def drawn(found, **options):
 
 
 def test_few_bodies_are_points_and_many_are_counted():
-    few, many = ensemble(discs.MOST_POINTS, Grid(0.1, 3)), ensemble(3000, Grid(0.1, 3))
-    assert len(drawn(few)[1]["discs"][0]) == discs.MOST_POINTS
+    few, many = ensemble(pictures.MOST_POINTS, Grid(0.1, 3)), ensemble(3000, Grid(0.1, 3))
+    assert len(drawn(few)[1]["discs"][0]) == pictures.MOST_POINTS
     cells = drawn(many)[1]["discs"][0]
     assert sum(row["bodies"] for row in cells) == 3000
     assert len(cells) < 1700  # 41 by 41

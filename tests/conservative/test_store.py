@@ -1,6 +1,7 @@
 """Ensembles on disk: what is read is what was run, whatever was in the way; and what is something else stays as it is."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 import conservative as cv
 from conservative.integration import blocks, store
+from conservative.integration.inputs import read_bodies
 
 zarr = pytest.importorskip("zarr")
 
@@ -41,7 +43,7 @@ def run(path=None, **changes):
         "threads": 1,
         "method": "convected",
     }
-    return cv.integrate_many(cv.scenes.lagrange_top(), **(given | changes), path=path)
+    return cv.integrate_many(**({"scene": cv.scenes.lagrange_top()} | given | changes), path=path)
 
 
 def digest(folder):
@@ -120,7 +122,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path, threads):
     with pytest.raises(KeyboardInterrupt):
         run(place, progress=stop_after(1), threads=threads)
     assert digest(place) != digest(whole)
-    with pytest.raises(cv.BadInput, match=r"22 bodies of which 14 have not been run; .*resume=True"):
+    with pytest.raises(cv.BadInput, match=r"22 bodies of which 14 were not integrated, .*resume=True"):
         cv.open_ensemble(place)
     seen = []
     run(place, resume=True, progress=seen.append, threads=threads)
@@ -132,23 +134,21 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path, threads):
 
 KILLED = """
 import os, signal, sys
-from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from conservative.integration import blocks, store
+import zarr
+from conservative.integration import blocks
 from test_store import run
 blocks.MOST_BODIES = 8
-write, calls = store._write_columns, []
+put = zarr.storage._local._put
 
-def write_and_die(group, first, columns):
-    calls.append(first)
-    if len(calls) == 3:
-        columns = dict(list(columns.items())[:2])
-    write(group, first, columns)
-    if len(calls) == 3:
-        Path(sys.argv[2], "w_WB_B/c/1/0/.0123456789abcdef.partial").write_bytes(b"part of a chunk")
+def put_and_die(path, value, exclusive=False):
+    if path.match("w_WB_B/c/1/0/0"):
+        path.parent.mkdir(parents=True)
+        path.with_name(".0123456789abcdef.partial").write_bytes(b"part of a chunk")
         os.kill(os.getpid(), signal.SIGKILL)
+    return put(path, value, exclusive)
 
-store._write_columns = write_and_die
+zarr.storage._local._put = put_and_die
 run(sys.argv[2])
 """
 
@@ -159,7 +159,6 @@ def test_a_killed_run_goes_on_to_the_same_bytes(whole, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
     assert (place / "R_WB/c/1/0/0/0").exists()  # of a block that is not done
-    assert not (place / "outcome/c/1").exists()
     seen = []
     run(place, resume=True, progress=seen.append)
     assert len(seen) == 2
@@ -181,18 +180,106 @@ def test_a_full_disk_keeps_what_is_done(whole, tmp_path, monkeypatch):
         run(place)
     monkeypatch.undo()
     monkeypatch.setattr(blocks, "MOST_BODIES", 8)
-    assert (place / "outcome/c/0").exists()
-    assert not (place / "outcome/c/1").exists()
+    assert (place / "R_WB/c/1/0/0/0").exists()
+    with pytest.raises(cv.BadInput, match="22 bodies of which 14 were not integrated"):
+        cv.open_ensemble(place)
     run(place, resume=True)
     assert digest(place) == digest(whole)
+
+
+def truncate(file):
+    file.write_bytes(file.read_bytes()[:-9])
+
+
+def empty(file):
+    file.write_bytes(b"")
+
+
+def flip_a_bit(file):
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+CHUNKS = {
+    "R_WB/c/1/0/0/0": [Path.unlink, truncate, empty, flip_a_bit],
+    "w_WB_B/c/2/0/0": [Path.unlink, truncate],
+    "drifts/c/0/0": [Path.unlink, flip_a_bit],
+    "outcome/c/1": [Path.unlink, flip_a_bit],
+    "failure/c/0": [Path.unlink, truncate],
+    "start/w_WB_B0/c/2/0": [Path.unlink],
+    "parameters/weight/c/1": [flip_a_bit],
+}
+
+
+@pytest.mark.parametrize(("chunk", "damage"), [(chunk, damage) for chunk, each in CHUNKS.items() for damage in each])
+def test_a_damaged_block_is_not_opened_and_is_computed_again(whole, tmp_path, chunk, damage):
+    place = tmp_path / "a.zarr"
+    shutil.copytree(whole, place)
+    damage(place / chunk)
+    if damage is flip_a_bit and chunk.startswith(("R_WB", "parameters")):  # what stays on the disk is checked when it is read
+        found = cv.open_ensemble(place)
+        with pytest.raises(ValueError, match="checksum"):
+            np.asarray((found.R_WB if chunk.startswith("R_WB") else found.bodies.parameters["weight"])[:])
+    else:
+        with pytest.raises(cv.BadInput, match=r"^path: got .* damaged.*resume=True computes the rest"):
+            cv.open_ensemble(place)
+    seen = []
+    run(place, resume=True, progress=seen.append)
+    assert len(seen) == 1
+    assert digest(place) == digest(whole)
+
+
+@pytest.mark.parametrize("lost", ["R_WB/zarr.json", "zarr.json"])
+def test_an_ensemble_without_its_metadata_is_refused(whole, tmp_path, lost):
+    place = tmp_path / "a.zarr"
+    shutil.copytree(whole, place)
+    (place / lost).unlink()
+    for use in (cv.open_ensemble, lambda path: run(path, resume=True)):
+        with pytest.raises(cv.BadInput, match=r"^path: got"):
+            use(place)
+
+
+def test_every_row_counts_when_inputs_are_compared():
+    w = np.random.default_rng(1).normal(size=(70_000, 3))
+    scene, other = cv.scenes.brick_flip(), w.copy()
+    other[-1, 2] *= 1 + 1e-15
+    bodies = [read_bodies(scene, None, each, None, None) for each in (w, w.copy(), other)]
+    one, same, changed = (store.describe_run("a method", each, cv.Grid(0.1, 5)) for each in bodies)
+    assert one == same
+    assert one["digests"] != changed["digests"]
+
+
+def stiff(k):
+    """A field that pulls a point of the body upwards with a constant force."""
+    return cv.FunctionPotential(lambda R: -k * R[2, 0], lambda R: np.array([[0, 0, 0], [0, 0, 0], [-k, 0, 0]]))
+
+
+def test_scenes_with_functions_are_known_by_their_code(tmp_path):
+    def scene(k):
+        return cv.scenes.brick_flip().rename("pulled", potential=stiff(k))
+
+    place, given = tmp_path / "a.zarr", {"w_WB_B0": np.eye(3), "dt": 0.05, "t_end": 0.1, "method": "convected"}
+    made = cv.integrate_many(scene(0.5), **given, path=place)
+    with pytest.raises(cv.BadInput, match="scene: got None; allowed: the scene of the run"):
+        cv.open_ensemble(place)
+    with pytest.raises(cv.BadInput, match="allowed: the scene of the run, 'pulled'"):
+        cv.open_ensemble(place, scene(0.25))
+    with pytest.raises(cv.BadInput, match="another run: another scene"):
+        cv.integrate_many(scene(0.25), **given, path=place, resume=True)
+    assert np.array_equal(cv.open_ensemble(place, scene(0.5)).R_WB[:], made.R_WB[:])
+    assert len(cv.integrate_many(scene(0.5), **given, path=place, resume=True)) == 3
 
 
 CHANGES = {
     "dt": ({"dt": 0.02}, "dt 0.05 there, 0.02 here; n_steps 10 there, 25 here"),
     "method": ({"method": "reduced"}, "method 'conservative==0.2.0/convected' there, 'conservative==0.2.0/reduced"),
     "start": ({"w_WB_B0": starts() * (1 + 1e-15)}, "another w_WB_B0;"),
-    "parameters": ({"parameters": {"weight": np.linspace(1.0, 2.1, N)}}, "another parameters;"),
+    "parameters": ({"parameters": {"weight": np.linspace(1.0, 2.1, N)}}, "another weight;"),
     "inertia": ({"inertia": np.ones((N, 3))}, "another inertia;"),
+    "samples": ({"sample_every": 2}, "sample_every 1 there, 2 here"),
+    "duration": ({"t_end": 0.6}, "n_steps 10 there, 12 here"),
+    "field": ({"scene": cv.scenes.lagrange_top(height=0.2)}, "another scene"),
     "number": ({"w_WB_B0": starts(4), "parameters": None}, "bodies 22 there, 4 here"),
 }
 
@@ -214,7 +301,7 @@ def test_a_folder_that_is_there_is_left_alone(whole, tmp_path):
     (tmp_path / "file").write_text("mine")
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder/file").write_text("mine")
-    for name, said in (("file", "a file"), ("folder", "which is no ensemble"), ("file/below", "a file")):
+    for name, said in (("file", "a file"), ("folder", "which is not an ensemble"), ("file/below", "a file")):
         with pytest.raises(cv.BadInput, match=said):
             run(tmp_path / name, resume=True)
     assert [path.read_text() for path in sorted(tmp_path.rglob("file"))] == ["mine", "mine"]
@@ -234,14 +321,14 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path):
 
 def test_two_do_not_write_to_one_folder(whole, in_memory):
     what = in_memory.label, in_memory.bodies, in_memory.grid, True
-    with store.open_store(whole, *what), pytest.raises(cv.BadInput, match="which another process writes to"):  # noqa: SIM117
-        with store.open_store(whole, *what):
+    with store.write_store(whole, *what), pytest.raises(cv.BadInput, match="which another process writes to"):  # noqa: SIM117
+        with store.write_store(whole, *what):
             pass
 
 
 def test_what_is_no_ensemble_is_not_opened(tmp_path):
     for place in (tmp_path, tmp_path / "missing", Path(__file__)):
-        with pytest.raises(cv.BadInput, match="no ensemble"):
+        with pytest.raises(cv.BadInput, match="not an ensemble"):
             cv.open_ensemble(place)
     zarr.create_group(tmp_path / "a.zarr", attributes={"format": "conservative ensemble", "format_version": 99})
     with pytest.raises(cv.BadInput, match="version 99 of its format; allowed: version 1"):
