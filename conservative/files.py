@@ -13,7 +13,6 @@ import os
 import re
 import shutil
 import stat
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
@@ -26,9 +25,6 @@ try:
     fcntl: Any = import_module("fcntl")
 except ImportError:  # not POSIX: no locks, and nothing is known to be left over
     fcntl = None
-
-_PLACES: Counter[Path] = Counter()
-_OBSERVERS: list[Callable[[list[Path]], None]] = []
 
 
 @contextmanager
@@ -74,36 +70,25 @@ def make_folder(folder: Path, argument: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
 
 
-def add_observer(observer: Callable[[list[Path]], None]) -> None:
-    """Have a function called with the places that are being written, whenever these change."""
-    if observer not in _OBSERVERS:
-        _OBSERVERS.append(observer)
-
-
 @contextmanager
 def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, int]]:
     """Yield the name of a temporary beside a place, and its handle; `make` creates and opens it. It is gone after the block.
 
     Leftovers of the place go first. An `OSError` stays one: the caller knows what to make of it.
     """
-    _count_writers(place, 1)
+    remove_leftovers(place)
+    fresh, handle = _make_locked(place, make)
     try:
-        remove_leftovers(place)
-        fresh, handle = _make_locked(place, make)
-        try:
-            yield fresh, handle
-        finally:
-            remove(fresh)
-            release(handle)
+        yield fresh, handle
     finally:
-        _count_writers(place, -1)
+        remove(fresh)
+        release(handle)
 
 
-def remove_leftovers(place: Path) -> bool:
-    """Remove the temporaries of a place whose makers are gone; return whether there are no others."""
+def remove_leftovers(place: Path) -> None:
+    """Remove the temporaries of a place whose makers are gone."""
     for path in leftovers(place):
         remove(path)
-    return not _temporaries(place)
 
 
 def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
@@ -212,12 +197,6 @@ def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
         if place.exists():
             fresh.chmod(stat.S_IMODE(place.stat().st_mode))
         yield fresh, handle
-
-
-def _count_writers(place: Path, change: int) -> None:
-    _PLACES[place] += change
-    for observer in _OBSERVERS:
-        observer(sorted(+_PLACES))
 
 
 def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:

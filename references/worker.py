@@ -149,11 +149,13 @@ class Worker:
     def __init__(self) -> None:
         self.parent = os.getpid()
         ours, theirs = socket.socketpair()
-        with ours, theirs:
+        life, self._life = os.pipe()
+        with ours, theirs, open(life):  # noqa: PTH123  # a descriptor
+            descriptors = [theirs.fileno(), life]
             with _block_interrupts():
                 self.process = subprocess.Popen(
-                    python_command(f"from {__name__} import serve; serve(int(sys.argv[2]))", str(theirs.fileno())),
-                    pass_fds=[theirs.fileno()],
+                    python_command(f"from {__name__} import serve; serve(*map(int, sys.argv[2:]))", *map(str, descriptors)),
+                    pass_fds=descriptors,
                     stdin=subprocess.DEVNULL,
                 )
             self.connection = Connection(ours.detach())
@@ -185,6 +187,7 @@ class Worker:
     def end(self) -> None:
         """End the process, whatever it does, and wait until it is gone."""
         self.connection.close()
+        os.close(self._life)
         if self.parent == os.getpid():
             self.process.kill()
             self.process.wait()
@@ -203,8 +206,17 @@ def _block_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def serve(descriptor: int) -> None:
-    """Do one piece of work after the other, as messages from the parent say, until the parent is gone."""
+def serve(descriptor: int, life: int) -> None:
+    """Do one piece of work after the other, as messages from the parent say, until the parent is gone.
+
+    The parent holds the other end of the pipe `life`. When it ends, the system sends SIGIO, which ends this process in the middle
+    of anything.
+    """
+    with suppress(ImportError, OSError, AttributeError):  # not every system has it
+        import fcntl
+
+        fcntl.fcntl(life, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(life, fcntl.F_SETFL, os.O_ASYNC)
     connection = Connection(descriptor)
     # A stream with a descriptor: that of stderr where this is closed.
     with open(os.devnull, "w") as nowhere, suppress(EOFError, ConnectionError):  # noqa: PTH123

@@ -18,7 +18,6 @@ from .run.plan import Plan
 from .run.provenance import provenance
 from .terminal.progress import Step
 from .terminal.report_folder import MANIFEST, report_folder
-from .terminal.supervision import tell
 from .view import View, build
 
 SCHEMA = 2
@@ -39,7 +38,6 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     source = provenance()  # before any work: files, and the commit, can change while that goes on
     progress = checkpoint.begin(plan, out, source, resume)
     source = replace(source, resumed=progress.describe_earlier(), environments=plan.locks)
-    tell(progress.summary)
     spans = plan.spans(name for name in plan.names if name not in progress.results)
     try:
         with report_folder(out) as folder:
@@ -51,7 +49,6 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
             error.add_note(progress.summary)
         raise
     progress.remove()
-    tell("")
     return view
 
 

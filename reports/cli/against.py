@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
@@ -12,8 +11,6 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from conservative.errors import require_extra
-
-from ..terminal.interrupts import interruptible
 
 if TYPE_CHECKING:
     from ..tables.comparison import Answer
@@ -62,12 +59,11 @@ def _compare(options: dict[str, Any]) -> Answer:
     project = Path(head) if Path(head).is_dir() else Path()
     asked = {name: options[name] for name in ("scenes", "methods", "processes") if options[name]}
     versions = []
-    with interruptible(signal.SIGTERM):
-        for name in (options["against"], head):
-            click.echo(f"preparing {name}", err=True)
-            versions.append(install_version(name, project, source, options["requirements"]))
-        with progress() as step:
-            found = compare_versions(versions[0], versions[1], Question(**asked), step)
+    for name in (options["against"], head):
+        click.echo(f"preparing {name}", err=True)
+        versions.append(install_version(name, project, source, options["requirements"]))
+    with progress() as step:
+        found = compare_versions(versions[0], versions[1], Question(**asked), step)
     return Answer(found, made)
 
 

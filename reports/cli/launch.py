@@ -1,44 +1,38 @@
-"""What the script `conservative` runs: the command line, or one line that says what to install for it.
+"""The script `conservative`, and `python -m conservative`: prepare signals and streams, then run the command line."""
 
-Nothing is imported at the top: until signals wait, Ctrl-C ends Python as it ends all of its programs, by a traceback.
-"""
+from __future__ import annotations
+
+import io
+import os
+import sys
+
+from conservative.errors import MissingExtra, require_extra
+
+from ..terminal.interrupts import handle_signals, received
 
 
 def launch() -> None:
-    """Run the command line; exit with 2 where click, which it is made with, is not installed."""
-    _let_signals_wait()
+    """Run the command line. The exit code is 2 where click, which the command line is made with, is not installed."""
+    handle_signals()
     _open_streams()
-    import sys
-
-    from ..terminal.supervision import supervise
-
-    supervise(_tidy)
-    _buffer_output()
-    from conservative.errors import MissingExtra, require_extra
-
+    _separate_stdout()
     try:
         require_extra("conservative", "report", "click")
+        from .main import main
+
+        main()
     except MissingExtra as missing:
         print(f"Error: {missing}", file=sys.stderr)
         sys.exit(2)
-    from .main import main
-
-    main()
-
-
-def _let_signals_wait() -> None:
-    """Keep signals for the process that supervises this one. Of `_signal`, which is built in, `signal` takes 5 ms to import."""
-    import _signal  # type: ignore[import-not-found]
-
-    if hasattr(_signal, "pthread_sigmask"):
-        _signal.pthread_sigmask(_signal.SIG_BLOCK, (_signal.SIGINT, _signal.SIGTERM))
+    except (KeyboardInterrupt, Exception):
+        if not received:
+            raise
+        print("Interrupted", file=sys.stderr)
+        sys.exit(received[0].exit_code)
 
 
 def _open_streams() -> None:
-    """Open those of stdin, stdout and stderr that are closed, or what is opened next would be taken for them."""
-    import os
-    import sys
-
+    """Open those of stdin, stdout and stderr that are closed, or the next file that is opened would be taken for them."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
@@ -48,25 +42,14 @@ def _open_streams() -> None:
     )
 
 
-def _tidy(place: str) -> bool:
-    """Remove leftovers beside a place, and return whether all are gone."""
-    from pathlib import Path
+def _separate_stdout() -> None:
+    """Keep stdout for what the command prints.
 
-    from ..terminal.report_folder import recover
-
-    return recover(Path(place))
-
-
-def _buffer_output() -> None:
-    """Put a buffer on stdout where PYTHONUNBUFFERED takes it away: without, Python loses what a full disk has no room for."""
-    import io
-    import sys
-
-    raw = getattr(sys.stdout, "buffer", None)
-    if isinstance(raw, io.RawIOBase):
-        sys.stdout = io.TextIOWrapper(
-            io.BufferedWriter(raw),
-            encoding=sys.stdout.encoding,
-            errors=sys.stdout.errors,
-            line_buffering=sys.stdout.isatty(),
-        )
+    Compiled code of engines writes to the descriptor of stdout, as heyoka's log does: that goes to stderr, and leaves --json
+    whole. The new stream has a buffer also under PYTHONUNBUFFERED, without which Python loses what a full disk has no room for,
+    and escapes characters that its encoding does not have.
+    """
+    own = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    encoding = sys.stdout.encoding
+    sys.stdout = io.TextIOWrapper(own, encoding, errors="backslashreplace", line_buffering=own.isatty())

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import errno
 import io
-import signal
 import sys
+from contextlib import suppress
 from typing import Any
 
 import click
 
-from ..terminal.interrupts import Terminated, interruptible, notes
+from ..terminal.interrupts import notes, received
 from .engines import engines
 from .gate import gate
 from .list import list_all
@@ -29,16 +29,17 @@ class _UserError(click.ClickException):
     exit_code = 2
 
 
-class _Interrupted(click.ClickException):
-    exit_code = 130
+class _Stopped(click.ClickException):
+    """A command that a signal ended."""
+
+    def __init__(self, error: BaseException) -> None:
+        super().__init__("; ".join(["Interrupted", *notes(error)]))
+        self.exit_code = received[0].exit_code if received else 130  # type: ignore[misc]  # click declares it for the class
 
     def show(self, file: Any = None) -> None:
         """Print the message on a line of its own, below the ^C that a terminal shows."""
-        click.echo("\n" * sys.stderr.isatty() + self.message, err=True)
-
-
-class _Terminated(_Interrupted):
-    exit_code = 143
+        with suppress(OSError):  # a terminal that was closed
+            click.echo("\n" * sys.stderr.isatty() + self.message, err=True)
 
 
 class Commands(click.Group):
@@ -46,14 +47,11 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with interruptible(signal.SIGINT):
-                return super().invoke(ctx)
-        except KeyboardInterrupt as stop:
-            kind = _Terminated if isinstance(stop, Terminated) else _Interrupted
-            raise kind("; ".join(["Interrupted", *notes(stop)])) from None
-        except OSError as error:
-            raise _as_full(error) from None
-        except (ValueError, ImportError, ArithmeticError) as error:
+            return super().invoke(ctx)
+        except (KeyboardInterrupt, Exception) as error:
+            # A signal can end in another exception: compiled code that is interrupted while it is loaded raises SystemError.
+            if received or isinstance(error, KeyboardInterrupt):
+                raise _Stopped(error) from None
             raise _as_click(error) from None
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
@@ -61,21 +59,16 @@ class Commands(click.Group):
         return super().main(*args, **kwargs)
 
 
-def _as_full(error: OSError) -> Exception:
-    """Return the click exception for output that the disk has no room for; what else the system refuses is a bug, or a pipe."""
-    if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return error
-    sys.stdout = io.StringIO()  # what could not be written is not tried again at the end of the process
-    return _UserError(f"stdout: got {error.strerror!r}; allowed: a file, a pipe or a terminal that takes all of the output")
-
-
 def _as_click(error: Exception) -> Exception:
-    """Return the click exception for what a user can act on; anything else is a bug and keeps its traceback."""
+    """Return the click exception for an error that a user can act on; anything else is a bug and keeps its traceback."""
     from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra
 
     text = "; ".join([str(error), *notes(error)])
     if isinstance(error, BadInput | MissingEngine | MissingExtra):
         return _UserError(text)
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        sys.stdout = io.StringIO()  # or Python tries again to write the rest at its end
+        return _UserError(f"stdout: got {error.strerror!r}; allowed: a file, a pipe or a terminal that takes all of the output")
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 
 

@@ -52,7 +52,7 @@ class OutputFile(FilePath):
 
 
 class OutputFolder(OutputFile):
-    """A folder that the command writes files into. Parameters: the names of the files, each with its mark (see `OutputFile`)."""
+    """A folder that the command writes files into. Parameters: the names of the files and the mark of each."""
 
     def __init__(self, files: Mapping[str, str]) -> None:
         super().__init__("")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,6 @@ import click
 
 from conservative.errors import require_extra
 
-from ..terminal.interrupts import interruptible
 from . import completion
 from .options import FilePath, epilog, split_names
 
@@ -51,7 +49,7 @@ def recommend(scene: str, engine: tuple[str, ...], as_json: bool, out: Path | No
     from ..tables.recommendation import json_text
     from ..terminal.progress import progress
 
-    with interruptible(signal.SIGTERM), progress() as step:
+    with progress() as step:
         recommendation = _answer(scene, split_names("engine", engine), limits, out, step)
     if as_json:
         click.echo(json_text(recommendation))

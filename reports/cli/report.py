@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import click
 
 from conservative.errors import require_extra
 
-from ..terminal.interrupts import interruptible
 from . import completion
 from .options import FilePath, epilog, split_list, split_names
 
@@ -70,7 +68,7 @@ def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], meth
     extent["engines"] = split_list("engines", extent["engines"])
     plan = plan_report(split_names("scenes", scenes), split_names("methods", methods), **extent)
     _announce(out, resume)
-    with interruptible(signal.SIGTERM), progress() as step:
+    with progress() as step:
         view = document.write(plan, out, step, resume)
     click.echo((out / MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
     for statement in view.random.statements if view.random else ():

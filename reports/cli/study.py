@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -11,7 +10,6 @@ import click
 
 from conservative.errors import require_extra
 
-from ..terminal.interrupts import interruptible
 from . import completion
 from .options import OutputCommand, OutputFile, OutputFolder, epilog, split_list, split_names
 
@@ -105,7 +103,7 @@ def _measure(name: str, options: dict[str, Any]) -> StudyRows:
     scheduler = options.pop("scheduler")
     planned, source = plan_study(name, Extent(scenes, methods, engines, sizes, **options)), provenance()
     made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
-    with interruptible(signal.SIGTERM), progress() as step:
+    with progress() as step:
         found = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
     return StudyRows(name, found.table, found.samples, made)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -11,7 +10,6 @@ import click
 
 from conservative.errors import require_extra
 
-from ..terminal.interrupts import interruptible
 from . import completion
 from .options import Count, FilePath, epilog, split_list
 
@@ -97,7 +95,7 @@ def _run(planned: Sweep, picture: IO[str] | None) -> dict[str, Any]:
     from ..run.sweep import run_sweep, summarize
     from ..terminal.progress import progress
 
-    with interruptible(signal.SIGTERM), progress() as step:
+    with progress() as step:
         result = run_sweep(planned, step)
         step(1.0, "summary and picture")
         if picture is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import signal
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -12,7 +11,6 @@ import click
 
 from conservative.errors import require_extra
 
-from ..terminal.interrupts import interruptible
 from . import completion
 from .options import FilePath, allow_build_option, epilog, find_links_option, split_names
 
@@ -110,10 +108,9 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
     from ..terminal.progress import progress
 
     made = describe_origin()
-    with interruptible(signal.SIGTERM):
-        plan = _plan(engine, versions, scenes, settings, options)
-        with progress() as step:
-            history = track(plan, lambda done, total, what: step(done / total, what))
+    plan = _plan(engine, versions, scenes, settings, options)
+    with progress() as step:
+        history = track(plan, lambda done, total, what: step(done / total, what))
     return Answer(history, options["against"] is not None, made)
 
 

@@ -21,7 +21,6 @@ from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
 from conservative.files import remove_leftovers, write_text
 
-from ..terminal.supervision import tell
 from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms
@@ -70,7 +69,6 @@ class Checkpoint:
         result = StudyResult(rows, lines, self.process)
         write_text(self.path, _content(replace(self, results={**self.results, name: result})), "out")
         self.results[name] = result
-        tell(self.summary)
 
     def remove(self) -> None:
         """Remove the file: the report is written."""

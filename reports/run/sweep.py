@@ -27,7 +27,6 @@ from conservative.scene import Scene
 
 from ..tables.cells import finite_or_none, outcome_record
 from ..tables.sweep import rate_text
-from ..terminal.supervision import tell
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
@@ -121,7 +120,6 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
 
     def hear(progress: ProgressOfMany) -> None:
         heard[:] = [progress]
-        tell(_kept_text(sweep, progress))
         step(progress.done / progress.total, _progress_text(sweep, progress))
 
     step(0.0, "preparing: a first run compiles")

@@ -1,4 +1,8 @@
-"""Interrupts: what they turn into, and where they have to wait."""
+"""Ctrl-C, SIGTERM and SIGHUP end a command by an exception, so that its temporary files and its processes go with it.
+
+Kernels call handlers of signals between blocks of steps (`kernels/signals.py`). During a call of an engine's compiled code a
+signal waits until that call returns.
+"""
 
 from __future__ import annotations
 
@@ -10,83 +14,65 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from . import supervision
-
+_NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _AGAIN = 0.01
-"""Time, s, after which a signal is sent again."""
+"""Time, s, after which a lost signal is sent again."""
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, which `kill`, `timeout` and a CI that cancels a job send: the same as Ctrl-C but for the exit code."""
+class Interrupted(KeyboardInterrupt):
+    """A signal ended the command. Attributes: `number` of the signal, and the `exit_code` of the command."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number, self.exit_code = number, 128 + number
 
 
-@contextmanager
-def interruptible(number: signal.Signals) -> Iterator[None]:
-    """Turn SIGINT into `KeyboardInterrupt`, SIGTERM into `Terminated`, also where another exception is made of it on the way.
+received: list[Interrupted] = []
+"""The interrupt of this process, once a signal has come."""
 
-    Compiled code that is interrupted while it is loaded raises `SystemError`, for one. A process that is supervised leaves its
-    signals to the one that does it.
+
+def handle_signals() -> None:
+    """Have signals raise `Interrupted` from now on, except those that are ignored, as under nohup.
+
+    A second Ctrl-C ends the process at once. Other signals after the first are ignored, so that tidying up can finish.
     """
-    if supervision.list_places():
-        yield
-        return
-    stops: list[KeyboardInterrupt] = []
-
-    def stop(number: int, frame: object) -> None:
-        stops.append(Terminated() if number == signal.SIGTERM else KeyboardInterrupt())
-        raise stops[0]
-
-    with _handle(stop, number), _repeat_ignored(stops, number):
-        try:
-            yield
-        except Exception as error:
-            if not stops:
-                raise
-            for note in notes(error):
-                stops[0].add_note(note)
-            raise stops[0] from error
+    for number in _NUMBERS:
+        if signal.getsignal(number) not in (None, signal.SIG_IGN):
+            signal.signal(number, _interrupt)
+    sys.unraisablehook = _send_again
 
 
-@contextmanager
-def _repeat_ignored(stops: list[KeyboardInterrupt], number: signal.Signals) -> Iterator[None]:
-    """Send a signal again whose exception is ignored: the callback of a weak reference, as imports have them, cannot raise."""
-    before = sys.unraisablehook
+def _interrupt(number: int, frame: object) -> None:
+    if not received:
+        received.append(Interrupted(number))
+        raise received[0]
+    if number == signal.SIGINT:
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
 
-    def ignored(what: Any) -> None:
-        if what.exc_value in stops:
-            threading.Timer(_AGAIN, os.kill, (os.getpid(), number)).start()  # when this callback, too, is over
-        else:
-            before(what)
 
-    sys.unraisablehook = ignored
-    try:
-        yield
-    finally:
-        sys.unraisablehook = before
+def _send_again(unraisable: Any) -> None:
+    """Send a signal again whose exception was ignored: the callback of a weak reference, as imports have them, cannot raise."""
+    if unraisable.exc_value in received:
+        received.clear()
+        threading.Timer(_AGAIN, os.kill, (os.getpid(), unraisable.exc_value.number)).start()
+    else:
+        sys.__unraisablehook__(unraisable)
 
 
 @contextmanager
 def unstoppable() -> Iterator[None]:
-    """Ignore interrupts for the moment that a few renames take, which make sense only together."""
-    with _handle(signal.SIG_IGN, signal.SIGINT, signal.SIGTERM):
+    """Make signals wait until the end of the block: for a few renames that belong together."""
+    if not hasattr(signal, "pthread_sigmask"):
         yield
-
-
-def notes(error: BaseException) -> list[str]:
-    """Return the notes of an exception: what has become of the work that it ended."""
-    return list(getattr(error, "__notes__", ()))
-
-
-@contextmanager
-def _handle(handler: Any, *numbers: signal.Signals) -> Iterator[None]:
-    """Handle signals that are not ignored already, as under nohup; only the main thread can."""
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    before = {number: signal.getsignal(number) for number in numbers} if in_main_thread else {}
-    ours = [number for number, was in before.items() if was not in (None, signal.SIG_IGN)]
-    for number in ours:
-        signal.signal(number, handler)
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _NUMBERS)
     try:
         yield
     finally:
-        for number in ours:
-            signal.signal(number, before[number])
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def notes(error: BaseException) -> list[str]:
+    """Return the notes of an exception, such as where the finished part of the work is."""
+    return list(getattr(error, "__notes__", ()))

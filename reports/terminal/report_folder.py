@@ -2,7 +2,7 @@
 
 Of an earlier report the files that its manifest lists go; anything a person put beside them stays. A swap takes three steps:
 the earlier folder steps aside, the new one takes its place, what is a person's moves over. Where a kill ends it in between, the
-next report, or the process that supervises this one, puts back what is missing, and removes the rest.
+next report puts back what is missing, and removes the rest.
 """
 
 from __future__ import annotations
@@ -58,15 +58,15 @@ def report_folder(target: Path) -> Iterator[Path]:
             _swap(fresh, target)
 
 
-def recover(target: Path) -> bool:
-    """Put back what a kill in the middle of a swap left beside a folder, and remove leftovers; return whether all are gone."""
+def recover(target: Path) -> None:
+    """Put back what a kill in the middle of a swap left beside a folder, and remove leftovers."""
     for old in files.leftovers(target, _ASIDE):
         with suppress(OSError):
             if target.exists():
                 _move_foreign(old, target)
             else:
                 old.rename(target)
-    return files.remove_leftovers(target)
+    files.remove_leftovers(target)
 
 
 def _require_place(target: Path) -> None:

@@ -1,55 +1,152 @@
-"""What a signal becomes where a process handles its signals itself, as in a notebook; for commands see test_supervision.py."""
+"""Signals end commands: nothing half-written and no process is left, and the exit code tells which signal it was."""
 
+import json
+import os
 import signal
+import subprocess
 import sys
 import time
 import weakref
 
+import psutil
 import pytest
 from click.testing import CliRunner
 
 from conservative.reports.cli.main import main
-from conservative.reports.terminal.interrupts import Terminated, interruptible, unstoppable
+from conservative.reports.terminal import interrupts
+from conservative.reports.terminal.interrupts import Interrupted, handle_signals, unstoppable
+
+from ..environments import ROOT, programs, variables
+
+HANG = 300
+"""Time, s, after which a command hangs for sure."""
+CLI = [sys.executable, "-m", "conservative"]
+SWEEP = ["sweep", "brick_flip", "--spread", "rate=1%", "--starts", "1e5", "--t-end", "600", "--dt", "1e-3", "--out", "s.zarr"]
+COMMANDS = {
+    "run": ["run", "brick_flip", "--t-end", "1e6", "--dt", "1e-4", "-m", "reduced", "--csv", "r.csv"],
+    "sweep": SWEEP,
+    "report": ["report", "--quick", "--scenes", "brick_flip", "--methods", "moser_veselov:order=2", "--out", "r"],
+}
 
 
-@pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt, 130), (Terminated, 143)])
-def test_every_command_says_that_it_was_interrupted(stop, code, monkeypatch):
-    def stopping(*arguments):
-        raise stop
+def start(popen, arguments, folder, code=None):
+    """Return a command that is at work: it has made a temporary file or folder."""
+    process = popen(
+        [sys.executable, "-c", code] if code else [*CLI, *arguments],
+        cwd=folder,
+        env=variables(PYTHONPATH=str(ROOT)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    end = time.monotonic() + HANG
+    while not temporaries(folder) and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.01)
+    time.sleep(0.5)
+    return process
 
-    monkeypatch.setattr("conservative.reports.cli.recommend._answer", stopping)
-    done = CliRunner().invoke(main, ["recommend", "brick_flip"])
-    assert (done.exit_code, done.stdout, done.stderr) == (code, "", "Interrupted\n")
+
+def temporaries(folder):
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
 
 
-def test_sigterm_is_an_interrupt_only_inside():
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(Terminated), interruptible(signal.SIGTERM):
-        signal.raise_signal(signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) == before
+@pytest.mark.parametrize(
+    ("command", "number"),
+    [
+        ("run", signal.SIGINT),
+        ("run", signal.SIGTERM),
+        ("run", signal.SIGHUP),
+        ("sweep", signal.SIGINT),
+        ("report", signal.SIGTERM),
+    ],
+)
+def test_a_signal_ends_a_command_and_leaves_nothing(command, number, tmp_path):
+    with programs() as popen:
+        process = start(popen, COMMANDS[command], tmp_path)
+        children = psutil.Process(process.pid).children(recursive=True)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=HANG)
+        assert psutil.wait_procs(children, timeout=10)[1] == []
+    assert (process.returncode, out) == (128 + number, "")
+    assert err.startswith("Interrupted")
+    assert "Traceback" not in err
+    assert temporaries(tmp_path) == []
+    assert not any((tmp_path / name).exists() for name in ("r", "r.csv", "s.svg"))
 
 
-def lost(number):
+def test_a_second_ctrl_c_ends_at_once(tmp_path):
+    code = (
+        "import time, pathlib\nfrom conservative.reports.terminal.interrupts import handle_signals\nhandle_signals()\n"
+        "pathlib.Path('.busy').touch()\ntry: time.sleep(600)\nexcept KeyboardInterrupt:\n"
+        "    pathlib.Path('tidying').touch()\n    time.sleep(600)"
+    )
+    with programs() as popen:
+        process = start(popen, [], tmp_path, code)
+        for name in (".busy", "tidying"):
+            while not (tmp_path / name).exists() and process.poll() is None:
+                time.sleep(0.01)
+            process.send_signal(signal.SIGTERM)  # the second one of these is ignored
+            time.sleep(0.1)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=HANG)
+    assert process.returncode == -signal.SIGINT
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_work_in_another_process_ends_with_its_command(number, tmp_path):
+    code = (
+        "import os, pathlib\nfrom conservative.references.worker import run_within\n"
+        "pathlib.Path('pid').write_text(str(run_within(60, os.getpid)))\npathlib.Path('.busy').touch()\n"
+        "run_within(600, lambda: [None for _ in iter(int, 1)])"
+    )
+    with programs() as popen:
+        process = start(popen, [], tmp_path, code)
+        worker = psutil.Process(int((tmp_path / "pid").read_text()))
+        process.send_signal(number)
+        process.communicate(timeout=HANG)
+        assert psutil.wait_procs([worker], timeout=10)[1] == []
+
+
+@pytest.mark.parametrize("closed", ["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
+def test_a_command_whose_streams_are_closed_ends_as_any_other(closed, tmp_path):
+    shell = ["sh", "-c", f'exec "$0" -m conservative run nonsense {closed}', sys.executable]
+    assert subprocess.run(shell, cwd=tmp_path, env=variables(PYTHONPATH=str(ROOT)), timeout=HANG).returncode == 2
+
+
+@pytest.fixture
+def handled():
+    """Signals that are handled as in a command."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    hook = sys.unraisablehook
+    handle_signals()
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    sys.unraisablehook = hook
+    interrupts.received.clear()
+
+
+def lost(*arguments):
     try:
-        signal.raise_signal(number)
+        signal.raise_signal(signal.SIGTERM)
     except BaseException as error:
-        other = SystemError("what numba makes of it while it loads compiled code")
+        other = SystemError("what numba raises where it is interrupted while it loads compiled code")
         other.add_note("kept")
         raise other from error
 
 
-@pytest.mark.parametrize(("number", "kind"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated)])
-def test_an_interrupt_is_not_lost_in_another_exception(number, kind):
-    with pytest.raises(kind) as caught, interruptible(number):
-        lost(number)
-    assert caught.value.__notes__ == ["kept"]
+def test_an_interrupt_is_not_lost_in_another_exception(handled, monkeypatch):
+    monkeypatch.setattr("conservative.reports.tables.catalogue.tables", lost)
+    done = CliRunner().invoke(main, ["list"])
+    assert (done.exit_code, done.stdout, done.stderr) == (143, "", "Interrupted; kept\n")
 
 
 class Name:
     pass
 
 
-def test_an_interrupt_is_not_lost_where_no_exception_can_be_raised():
+def test_an_interrupt_is_not_lost_where_no_exception_can_be_raised(handled):
     name = Name()
     kept = weakref.ref(name, lambda gone: signal.raise_signal(signal.SIGINT))  # an import has such a callback for its lock
 
@@ -61,35 +158,51 @@ def test_an_interrupt_is_not_lost_where_no_exception_can_be_raised():
 
     names = [name]
     del name
-    with pytest.raises(KeyboardInterrupt), interruptible(signal.SIGINT):
+    with pytest.raises(Interrupted):
         work(names)
 
 
-def test_what_others_ignore_is_told_as_before(monkeypatch):
-    told = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
-    name, error = Name(), ZeroDivisionError()
-
-    def fail(gone):
-        raise error
-
-    kept = weakref.ref(name, fail)
-    with interruptible(signal.SIGINT):
-        del name
-    assert kept() is None
-    assert told == [error]
-
-
-def test_what_is_ignored_stays_ignored():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def test_an_ignored_signal_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        with interruptible(signal.SIGINT):
-            signal.raise_signal(signal.SIGINT)
+        handle_signals()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in {signal.SIGHUP: before, **handlers}.items():
+            signal.signal(number, handler)
+        sys.unraisablehook = sys.__unraisablehook__
 
 
-def test_interrupts_wait_outside_of_what_belongs_together():
-    with unstoppable():
-        signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+def test_a_signal_waits_until_the_end_of_what_belongs_together(handled):
+    done = []
+
+    def rename():
+        with unstoppable():
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("first")
+            done.append("second")
+
+    with pytest.raises(Interrupted):
+        rename()
+    assert done == ["first", "second"]
+
+
+def test_compiled_code_that_writes_to_stdout_leaves_json_whole():
+    code = (
+        "import os\nfrom conservative.reports.tables import catalogue\nbefore = catalogue.json_text\n"
+        "def noisy():\n    os.write(1, b'a log of an engine')\n    return before()\ncatalogue.json_text = noisy\n"
+        "import sys; sys.argv = ['conservative', 'list', '--json']\n"
+        "from conservative.reports.cli.launch import launch\nlaunch()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=variables(PYTHONPATH=str(ROOT)), capture_output=True, timeout=HANG)
+    assert json.loads(done.stdout)["scenes"]
+    assert b"a log of an engine" in done.stderr
+
+
+def test_an_encoding_without_our_signs_is_no_error():
+    for command in (["list"], ["run", "brick_flip"]):
+        environment = variables(PYTHONPATH=str(ROOT), PYTHONIOENCODING="ascii")
+        done = subprocess.run([*CLI, *command], env=environment, capture_output=True, timeout=HANG)
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert done.stdout
