@@ -149,9 +149,9 @@ class Worker:
     def __init__(self) -> None:
         self.parent = os.getpid()
         ours, theirs = socket.socketpair()
-        life, self._life = os.pipe()
-        with ours, theirs, open(life):  # noqa: PTH123  # a descriptor
-            descriptors = [theirs.fileno(), life]
+        life, self._life = map(os.fdopen, os.pipe(), "rw")
+        with ours, theirs, life:
+            descriptors = [theirs.fileno(), life.fileno()]
             with _block_interrupts():
                 self.process = subprocess.Popen(
                     python_command(f"from {__name__} import serve; serve(*map(int, sys.argv[2:]))", *map(str, descriptors)),
@@ -187,7 +187,7 @@ class Worker:
     def end(self) -> None:
         """End the process, whatever it does, and wait until it is gone."""
         self.connection.close()
-        os.close(self._life)
+        self._life.close()
         if self.parent == os.getpid():
             self.process.kill()
             self.process.wait()
@@ -209,8 +209,8 @@ def _block_interrupts() -> Iterator[None]:
 def serve(descriptor: int, life: int) -> None:
     """Do one piece of work after the other, as messages from the parent say, until the parent is gone.
 
-    The parent holds the other end of the pipe `life`. When it ends, the system sends SIGIO, which ends this process in the middle
-    of anything.
+    The parent holds the other end of the pipe `life`. When that closes, the system sends SIGIO, which ends this process whatever
+    it does.
     """
     with suppress(ImportError, OSError, AttributeError):  # not every system has it
         import fcntl
