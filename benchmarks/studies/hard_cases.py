@@ -13,7 +13,6 @@ import numpy as np
 from conservative import registry
 from conservative.method import Grid, Method, Role, grid_for
 from conservative.scene import Scene
-from conservative.scenes.slow_motions import SLOW
 
 from ..measures.measurement import Measurement
 from .case import Case
@@ -29,9 +28,8 @@ LIMIT = 20.0
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return every registered scene with its default parameters, by group; of a motion that is there twice, the fast one."""
-    found = (scene for scene in map(registry.scene, registry.list_scenes()) if scene.group != SLOW)
-    return tuple(sorted(found, key=lambda scene: scene.group))
+    """Return every registered scene with its default parameters, by group."""
+    return tuple(sorted(map(registry.scene, registry.list_scenes()), key=lambda scene: scene.group))
 
 
 def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:

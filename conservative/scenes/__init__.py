@@ -32,16 +32,7 @@ from .separatrix import unstable_spin as unstable_spin
 from .sleeping_tops import falling_top as falling_top
 from .sleeping_tops import simo_wong_top as simo_wong_top
 from .sleeping_tops import sleeping_top as sleeping_top
-from .slow_motions import slow_cusped_top as slow_cusped_top
-from .slow_motions import slow_falling_top as slow_falling_top
-from .slow_motions import slow_lagrange_top as slow_lagrange_top
-from .slow_motions import slow_lie_group_top as slow_lie_group_top
-from .slow_motions import slow_looping_top as slow_looping_top
-from .slow_motions import slow_motion as slow_motion
-from .slow_motions import slow_needle as slow_needle
-from .slow_motions import slow_nutating_top as slow_nutating_top
-from .slow_motions import slow_sleeping_top as slow_sleeping_top
-from .slow_motions import slow_unduloid_top as slow_unduloid_top
+from .slow_motion import slow_motion as slow_motion
 from .stable_spin import stable_spin as stable_spin
 from .steady_free import axis_spin as axis_spin
 from .steady_free import planar_body as planar_body

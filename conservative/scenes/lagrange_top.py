@@ -13,6 +13,7 @@ from ..check import finite_number, positive_number
 from ..errors import BadInput
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from .slow_motion import slow_motion
 
 DEFAULT_HEIGHT = 0.1
 DEFAULT_DENSITY = 2700.0
@@ -30,6 +31,7 @@ def lagrange_top(
     density: float = DEFAULT_DENSITY,
     gravity: float = DEFAULT_GRAVITY,
     t_end: float | None = None,
+    slow: float = 1.0,
 ) -> Scene:
     """Return the paper's cone (radius half the height) in steady precession without nutation.
 
@@ -45,6 +47,8 @@ def lagrange_top(
         Of the cone, in m, its material, in kg/m^3, and the field, in m/s^2.
     t_end
         Duration, s; default one period of precession.
+    slow
+        How many times slower the motion is, its duration and step longer; dimensionless.
 
     Raises
     ------
@@ -63,7 +67,7 @@ def lagrange_top(
     body = RigidBody((J1, J1, J3))  # first, as it refuses what has become too small to divide by
     spin = mass * gravity * lever / (J3 * precession) - (J3 - J1) / J3 * math.cos(tilt) * precession
     rates = (0.0, precession * math.sin(tilt), spin + precession * math.cos(tilt))
-    return Scene(
+    top = Scene(
         "lagrange_top",
         body,
         rotation_about((1, 0, 0), tilt),
@@ -74,6 +78,7 @@ def lagrange_top(
         group="top",
         source="Krenk & Nielsen, 5.2",
     )
+    return slow_motion(top, slow)
 
 
 def cone(height: float, density: float) -> tuple[float, float, float, float]:

@@ -12,6 +12,7 @@ from ..body import RigidBody
 from ..check import finite_number
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
+from .slow_motion import slow_motion
 
 DEFAULT_CENTRAL_INERTIA = (0.234375, 0.46875, 0.234375)
 DEFAULT_MASS = 15.0
@@ -23,17 +24,17 @@ DEFAULT_T_END = 2.0
 DEFAULT_DT = 0.001
 
 
-def lie_group_top(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> Scene:
-    """Return the heavy top with rates (0, spin, -4.61538), rad/s.
+def lie_group_top(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END, slow: float = 1.0) -> Scene:
+    """Return the heavy top with rates (0, spin, -4.61538), rad/s; all of it `slow` times slower (see `slow_motion`).
 
     Raises
     ------
     BadInput
-        An argument is not finite, or t_end, s, is not above 0.
+        An argument is not finite, or t_end, s, or slow is not above 0.
     """
     com = np.array(DEFAULT_COM)
     offset = DEFAULT_MASS * (com @ com * np.eye(3) - np.outer(com, com))  # parallel axes
-    return Scene(
+    top = Scene(
         "lie_group_top",
         RigidBody(np.diag(DEFAULT_CENTRAL_INERTIA) + offset),
         np.eye(3),
@@ -44,3 +45,4 @@ def lie_group_top(spin: float = DEFAULT_SPIN, t_end: float = DEFAULT_T_END) -> S
         group="top",
         source="Bruels, Cardona & Arnold 2012",
     )
+    return slow_motion(top, slow)

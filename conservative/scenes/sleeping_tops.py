@@ -15,6 +15,7 @@ from ..errors import BadInput
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from .lagrange_top import DEFAULT_DENSITY, DEFAULT_GRAVITY, DEFAULT_HEIGHT, cone
+from .slow_motion import slow_motion
 
 DEFAULT_ABOVE = 1.05
 DEFAULT_BELOW = 0.95
@@ -30,30 +31,38 @@ SIMO_WONG_DT = 0.01
 LIMIT = "Routh; Arnold, Mathematical Methods of Classical Mechanics, 30"
 
 
-def sleeping_top(stability: float = DEFAULT_ABOVE, tilt: float = DEFAULT_TILT, t_end: float = DEFAULT_T_END) -> Scene:
+def sleeping_top(
+    stability: float = DEFAULT_ABOVE, tilt: float = DEFAULT_TILT, t_end: float = DEFAULT_T_END, slow: float = 1.0
+) -> Scene:
     """Return the paper's cone upright but for a tilt, rad, spinning fast enough to stay so.
+
+    All of it is `slow` times slower; see `slow_motion`.
 
     Raises
     ------
     BadInput
-        stability is not above 1, tilt is not finite, or t_end, s, is not above 0.
+        stability is not above 1, tilt is not finite, or t_end, s, or slow is not above 0.
     """
     if positive_number("stability", stability, "a finite number above 1") <= 1:
         raise BadInput("stability", stability, "a finite number above 1")
-    return _upright("sleeping_top", stability, tilt, t_end)
+    return slow_motion(_upright("sleeping_top", stability, tilt, t_end), slow)
 
 
-def falling_top(stability: float = DEFAULT_BELOW, tilt: float = DEFAULT_TILT, t_end: float = DEFAULT_T_END) -> Scene:
+def falling_top(
+    stability: float = DEFAULT_BELOW, tilt: float = DEFAULT_TILT, t_end: float = DEFAULT_T_END, slow: float = 1.0
+) -> Scene:
     """Return the paper's cone upright but for a tilt, rad, spinning too slowly to stay so.
+
+    All of it is `slow` times slower; see `slow_motion`.
 
     Raises
     ------
     BadInput
-        stability is not in (0, 1), tilt is not finite, or t_end, s, is not above 0.
+        stability is not in (0, 1), tilt is not finite, or t_end, s, or slow is not above 0.
     """
     if positive_number("stability", stability, "a number in (0, 1)") >= 1:
         raise BadInput("stability", stability, "a number in (0, 1)")
-    return _upright("falling_top", stability, tilt, t_end)
+    return slow_motion(_upright("falling_top", stability, tilt, t_end), slow)
 
 
 def simo_wong_top(tilt: float = SIMO_WONG_TILT, t_end: float = SIMO_WONG_T_END) -> Scene:

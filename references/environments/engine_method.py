@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 
 from conservative import registry
-from conservative.errors import IntegrationFailed, Unsupported
+from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.many import Bodies, RunMany
 from conservative.scene import Scene
@@ -165,8 +165,13 @@ def rate_limit_reason(scene: Scene, limit: float) -> str | None:
     rate = float(np.linalg.norm(scene.w_WB_B0))
     if rate <= limit:
         return None
-    slower = f"slow_{scene.name}"
-    advice = f"; {slower} is a slower one" if slower in registry.list_scenes() else ""
+    slower = f"{scene.name}:slow=4"
+    try:
+        registry.scene(slower)
+    except BadInput:  # not a registered scene, or one without that parameter
+        advice = ""
+    else:
+        advice = f"; {slower} is a slower one"
     return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
 
 

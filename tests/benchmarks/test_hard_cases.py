@@ -66,8 +66,7 @@ def test_a_long_motion_is_cut_by_its_turn():
 def test_every_scene_and_every_engine_takes_part():
     methods = selection.methods()
     study = studies.list_hard_studies(methods)[1]
-    slow = {name for name in registry.list_scenes() if name.startswith("slow_")}  # the motions of other scenes
-    assert {scene.name for scene in study.scenes} == set(registry.list_scenes()) - slow
+    assert {scene.name for scene in study.scenes} == set(registry.list_scenes())
     chosen = study.methods
     families = {method.family for method in methods if method.role != Role.TRUTH}
     assert {method.family for method in chosen} == families

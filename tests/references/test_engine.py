@@ -58,7 +58,7 @@ def test_a_mass_model_gives_back_inertia_and_weight(heavy, top):
 def test_the_paper_s_cone_has_its_own_mass_and_so_has_its_slow_motion():
     """With another mass it would be another body to engines whose joints are constraints between free bodies."""
     mass, lever, J1, _ = cone(0.1, 2700.0)
-    for scene in (cv.scenes.lagrange_top(), cv.scenes.slow_lagrange_top()):
+    for scene in (cv.scenes.lagrange_top(), cv.scenes.lagrange_top(slow=4)):
         found = engine.mass_model(engine.principal_axes(scene))
         assert np.isclose(found.mass, mass, rtol=1e-12)
         ball = (J1 - mass * lever**2) * np.eye(3)

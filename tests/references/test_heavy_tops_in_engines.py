@@ -100,6 +100,6 @@ def test_drake_says_where_its_angles_end(setting):
 def test_an_engine_refuses_a_scene_beyond_its_limit_of_rates():
     install("sapien")
     method = registry.method("sapien:as_installed=true")
-    assert "slow_lagrange_top" in method.unsupported(cv.scenes.lagrange_top())
-    assert method.unsupported(cv.scenes.slow_lagrange_top()) is None
+    assert "lagrange_top:slow=4" in method.unsupported(cv.scenes.lagrange_top())
+    assert method.unsupported(cv.scenes.lagrange_top(slow=4)) is None
     assert registry.method("sapien").unsupported(cv.scenes.lagrange_top()) is None
