@@ -16,7 +16,6 @@ from .gate import gate
 from .list import list_all
 from .new import new
 from .options import epilog
-from .published import published
 from .recommend import recommend
 from .report import report
 from .run import run
@@ -89,5 +88,5 @@ def main() -> None:
     """
 
 
-for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, published, study):
+for command in (report, run, sweep, list_all, recommend, gate, new, engines, track, study):
     main.add_command(command)

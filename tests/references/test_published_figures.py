@@ -1,0 +1,257 @@
+"""Figures that others have printed, measured again; sources and results: benchmarks/published.md.
+
+A row of tests/data/published_figures.csv has the body and its start (`motion`, one of `MOTIONS`), what is run (`method`, or
+`truth` for a figure of the motion itself), its step `dt` in seconds, what is measured (`quantity`, a function of this file) and
+the printed numbers. A measured number agrees with a printed one if they differ by at most a unit of the last printed digit,
+because programs round digits or cut them off, or by at most `tolerance`. A known difference is expected; `note` has its reason.
+"""
+
+import csv
+from decimal import Decimal
+from functools import lru_cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import angle_between, rotation_about, to_quaternion
+from conservative.method import Grid, grid_for
+from conservative.references.truth import reference
+
+from ..environments import ROOT
+
+with (ROOT / "tests" / "data" / "published_figures.csv").open(encoding="utf-8", newline="") as stream:
+    FIGURES = [SimpleNamespace(**row) for row in csv.DictReader(stream)]
+START = np.eye(3)
+HEAVY_TOP = cv.RigidBody((15.234375, 0.46875, 15.234375)), cv.UniformGravity(147.15, (0, 1, 0)), (0, 150, -4.61538)
+MUJOCO_BOX = (0.13 / 3, 0.1 / 3, 0.05 / 3)  # half sides 0.1, 0.2, 0.3 m, mass 1 kg
+# The third world axis against the angular momentum h, the second along (0.1 h_2, -0.1 h_1, 0) in body axes.
+SPACECRAFT_TURNED = [
+    [-0.5949911016440638, 0.19039715252610037, 0.7808549886338284],
+    [0.3047757271037837, 0.9524241471993241, 0.0],
+    [-0.743705146635912, 0.23798564692349183, -0.624712323174166],
+]
+
+
+def free(moments, rates, t_end, start=START):
+    return cv.Scene("published", cv.RigidBody(moments), start, rates, t_end)
+
+
+def heavy_top(t_end):
+    body, gravity, rates = HEAVY_TOP
+    return cv.Scene("published", body, START, rates, t_end, gravity)
+
+
+MOTIONS = {
+    "brick": free((13, 5, 10), (0, 0.05, 10), 6),
+    "cone": cv.scenes.lagrange_top(),
+    "hairer": free((0.6, 0.8, 1), (3, 0.5, -0.9), 10),
+    "simo": cv.Scene(
+        "published", cv.RigidBody((5, 5, 1)), rotation_about((1, 0, 0), 0.05), (0, 0, 50), 10, cv.UniformGravity(20, (0, 0, 1))
+    ),
+    "heavy-top": heavy_top(2),
+    "heavy-top-10-ms": heavy_top(0.01),
+    "heavy-top-200-ms": heavy_top(0.2),
+    "spacecraft": free((500, 200, 300), (0.5, -0.4, 0.7), 10),
+    "spacecraft-turned": free((500, 200, 300), (0.5, -0.4, 0.7), 10, SPACECRAFT_TURNED),
+    "gazebo-box": free((0.80833333, 0.68333333, 0.14166667), (0.1, 5, 0.1), 10),
+    "mujoco-box": free(MUJOCO_BOX, (1, 2, 3), 5),
+    "mujoco-box-1-s": free(MUJOCO_BOX, (1, 2, 3), 1),
+    "mujoco-box-middle": free(MUJOCO_BOX, (0.05, 5, 0.05), 100),
+    "mujoco-box-fast": free(MUJOCO_BOX, (20, 0.05, 0.05), 100),
+    "drake-cylinder": free((0.04, 0.04, 0.02), (1, 1, 1), 5),
+    "drake-benchmark": free((0.04, 0.04, 0.02), (2, 4, 6), 10),
+    "newton-body": free((0.2, 0.5, 0.4), (0.7, -0.5, 0.9), 0.2),
+    "jsbsim-top": free((10, 20, 26), (1, 15, 1), 10),
+    "jsbsim-start": free((10, 20, 26), (1, 15, 1), 0.1),  # before the first-order methods have lost the motion
+}
+
+
+def solve(motion, method, grid):
+    """Return the trajectory by a method, or by the truth."""
+    if method == "truth":
+        return reference(MOTIONS[motion], grid).trajectory
+    trajectory = registry.method(method).solve(MOTIONS[motion], grid)
+    assert trajectory.ok, trajectory.failure
+    return trajectory
+
+
+def every_step(figure, method=None):
+    return solve(figure.motion, method or figure.method, grid_for(MOTIONS[figure.motion], float(figure.dt)))
+
+
+@lru_cache(maxsize=100)
+def _end(motion, method, dt):
+    return solve(motion, method, grid_for(MOTIONS[motion], dt, sample_every=2**50))
+
+
+def end(figure, method=None, part=1):
+    """Return the start and the end of the run, with a part of its step."""
+    return _end(figure.motion, method or figure.method, float(figure.dt) / part)
+
+
+def true_end(figure, part=1):
+    return end(figure, "truth", part)
+
+
+def spin(figure):  # the second world component of the angular velocity, rad/s
+    return world_rates(end(figure))[1]
+
+
+def world_rates(found):
+    return found.R_WB[-1] @ found.w_WB_B[-1]
+
+
+def quaternion(figure):
+    q = to_quaternion(end(figure).R_WB[-1])
+    return q * np.sign(q[0])
+
+
+def modified_rodrigues(figure):
+    q = quaternion(figure)
+    return q[1:] / (1 + q[0])
+
+
+def displacement(figure):  # of the centre of mass, m, world axes
+    return np.diff(end(figure).R_WB @ MOTIONS[figure.motion].potential.com_B, axis=0)[0]
+
+
+def turn_of_a_step(figure):  # degrees
+    R = solve(figure.motion, figure.method, Grid(float(figure.dt), 1)).R_WB
+    return np.degrees(angle_between(R[1], R[0]))
+
+
+def energy(figure):
+    return end(figure).energy[-1]
+
+
+def energy_ratio(figure):
+    return end(figure).energy[-1] / end(figure).energy[0]
+
+
+def largest_energy_ratio(figure):
+    E = every_step(figure).energy
+    return E.max() / E[0]
+
+
+def energy_drift(figure):
+    return drift(every_step(figure).energy)
+
+
+def momentum_length_drift(figure):
+    return drift(np.linalg.norm(every_step(figure).momentum_W, axis=1))
+
+
+def vertical_momentum_drift(figure):
+    return drift(every_step(figure).momentum_W[:, 2])
+
+
+def drift(values):
+    return np.abs(values / values[0] - 1).max()
+
+
+def momentum_drift(figure):
+    L = every_step(figure).momentum_W
+    return np.linalg.norm(L - L[0], axis=1).max() / np.linalg.norm(L[0])
+
+
+def momentum_change(figure):  # kg m^2/s
+    return np.linalg.norm(np.diff(end(figure).momentum_W, axis=0))
+
+
+def relative_momentum_change(figure):
+    return momentum_change(figure) / np.linalg.norm(end(figure).momentum_W[0])
+
+
+def element_error(figure):
+    return np.abs(end(figure).R_WB[-1] - true_end(figure).R_WB[-1]).max()
+
+
+def world_rate_error(figure):
+    return np.abs(world_rates(end(figure)) - world_rates(true_end(figure))).max()
+
+
+def attitude_error(figure):
+    return angle_between(every_step(figure).R_WB, every_step(figure, "truth").R_WB).max()
+
+
+def order_of_attitude(figure):
+    errors = [angle_between(end(figure, part=k).R_WB[-1], true_end(figure, k).R_WB[-1]).item() for k in (1, 2)]
+    return np.log2(errors[0] / errors[1])
+
+
+def rates_error(figure, method=None, part=1):
+    return np.linalg.norm(end(figure, method, part).w_WB_B[-1] - true_end(figure, part).w_WB_B[-1])
+
+
+def order_of_rates(figure):
+    return np.log2(rates_error(figure) / rates_error(figure, part=2))
+
+
+def rates_error_over_that_of_euler(figure):
+    return rates_error(figure) / rates_error(figure, "jsbsim:RectEuler")
+
+
+def halving_ratio(figure):  # of the quaternion's error against a step 16 times shorter, as MuJoCo's test has it
+    coarse, fine, best = (to_quaternion(end(figure, part=k).R_WB[-1]) for k in (1, 2, 16))
+    return np.divide(*(min(np.linalg.norm(q - best), np.linalg.norm(q + best)) for q in (coarse, fine)))
+
+
+def position_ratio(figure):  # of the centre of mass's error
+    com = MOTIONS[figure.motion].potential.com_B
+    return np.divide(*(np.linalg.norm((end(figure, part=k).R_WB[-1] - true_end(figure, k).R_WB[-1]) @ com) for k in (1, 2)))
+
+
+def agrees(figure, measured):
+    printed = np.array([float(text) for text in figure.printed.split()])
+    if figure.relation == "<":
+        return (measured < printed).all()
+    if figure.relation == ">":
+        return (measured > printed).all()
+    digit = max(10.0 ** Decimal(text).as_tuple().exponent for text in figure.printed.split())
+    return np.abs(measured - printed).max() <= float(figure.tolerance or digit)
+
+
+def cases():
+    """Return a parameter for each figure that can be measured; one of an engine in an environment is marked with the engine."""
+    inside = registry.list_engines()
+    for figure in FIGURES:
+        family, _, version = figure.method.partition(":")[0].partition("@")
+        engine = f"{family}=={version}" if version else family
+        marks = [pytest.mark.engine(engine)] if version or family in inside else []
+        if figure.expected != "not measured":
+            yield pytest.param(figure, id=f"{figure.source}-{figure.name}", marks=marks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("figure", list(cases()))
+def test_a_published_figure(figure):
+    measured = np.atleast_1d(globals()[figure.quantity](figure))
+    assert agrees(figure, measured) == (figure.expected == "agrees"), measured
+
+
+@pytest.mark.parametrize(
+    ("relation", "printed", "tolerance", "expected"),
+    [
+        ("=", "0.6", "", True),  # a unit of the last digit
+        ("=", "0.60", "", False),
+        ("=", "0.60", "0.2", True),
+        ("=", "0.50 0.52", "", False),
+        ("=", "5e-1", "", True),
+        ("<", "0.5", "", False),
+        ("<", "0.51", "", True),
+        (">", "0.51", "", False),
+    ],
+)
+def test_a_half_against_what_is_printed(relation, printed, tolerance, expected):
+    figure = SimpleNamespace(relation=relation, printed=printed, tolerance=tolerance)
+    assert agrees(figure, np.array([0.5])) == expected
+
+
+def test_every_figure_is_on_the_page():
+    lines = (ROOT / "benchmarks" / "published.md").read_text(encoding="utf-8").replace("\\", "").splitlines()
+    for figure in FIGURES:
+        assert any(figure.name in line and figure.printed.split()[0] in line for line in lines), figure.name
+        assert figure.expected == "agrees" or figure.note, figure.name
