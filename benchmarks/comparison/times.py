@@ -1,34 +1,33 @@
 """Times of two versions against each other: sampled in turn, in several processes of each, with an interval for their ratio.
 
-Three things move a time that is not the code. Other processes come in between: samples are short and many, both versions take
-theirs in turn, and the shortest of each counts. Where machine code and data happen to lie makes a loop some per cent slower for
-as long as a process lives: both versions are started anew again and again, data is laid out several times in each process, and
-of the processes the faster half counts. And the machine has slow spells of seconds: what is found slower is measured again.
+Three things besides the code change a time. Other processes interrupt: so samples are short and many, both versions take
+theirs in turn, and the shortest of each counts. The place of machine code and data in memory can make a loop several percent
+slower for the life of a process: so both versions are started again and again, data is laid out several times in each process,
+and the faster half of the processes counts. The machine has slow spells of seconds: so a slower row is measured again.
 
 The interval is a bootstrap of whole processes, those of one time together (Efron and Tibshirani, An Introduction to the
-Bootstrap, 1993, chapter 13); samples of one process would say nothing of where another one lies.
+Bootstrap, 1993, chapter 13); samples of one process would say nothing about another process.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 
-from ..gate.yardstick import SAMPLE, last_a_sample
 from ..measures.timing import wall_time
-from .rows import Place
 from .side import Side, TimedRun
 
 SLOWER = 0.05
 """Part by which a row may become slower."""
 CONFIDENCE = 0.99
-"""That of each end of an interval: so sure it is that a ratio above it, or below it, is none by chance."""
+"""Confidence of each end of an interval: how surely the true ratio is above the lower end, and how surely below the upper."""
 PROCESSES = 7
 """Processes of each version in a measurement."""
 ROUNDS = 50
@@ -36,22 +35,22 @@ ROUNDS = 50
 LAYOUTS = 3
 """Runs of each version in a process, each with its data elsewhere."""
 MOST_TURNS = 6
-"""How often at most so many processes are measured until it is no longer open whether a row is slower."""
+"""Most measurements of so many processes each, until it is no longer open whether a row is slower."""
+SAMPLE = 0.0004
+"""Duration of a sample, s: most fit between two interruptions."""
+MOST_STEPS, MOST_CALLS = 2**20, 10_000
+"""Most steps of a run and most calls of it in a sample, if they take no time."""
 RESAMPLES = 4999
-MOST_CALLS = 10_000
 
 
 @dataclass(frozen=True)
 class Timed:
-    """What is timed: a method on a scene."""
+    """What is timed: the id of the row, the scene and the method by their registered names, and the step dt, s."""
 
-    place: Place
+    id: str
+    scene: str
     method: str
-
-    @property
-    def id(self) -> str:
-        """Of its row."""
-        return self.place.row_id(self.method)
+    dt: float
 
 
 @dataclass(frozen=True)
@@ -70,13 +69,13 @@ class Ratio:
 
     @property
     def open(self) -> bool:
-        """Whether it may be slower than allowed, or not: the interval holds the limit."""
+        """Whether the interval contains the limit, so that more processes are needed."""
         return self.low <= 1 + SLOWER < self.high
 
 
 @dataclass(frozen=True)
 class TimeRow:
-    """What was found of one row: time of a step, s, in both versions, the ratio, and that of a repetition, if there was one."""
+    """Times of one row: of a step in both versions, s, their ratio, and the ratio of a repetition, if there was one."""
 
     was: float
     now: float
@@ -91,11 +90,11 @@ class TimeRow:
 
 
 Times = dict[str, list[tuple[float, float]]]
-"""Shortest times of a step, s, of both versions, of each process of a row, by the row's id; no more where it failed."""
+"""Shortest times of a step, s, in both versions, for each pair of processes, by the id of the row."""
 
 
 def compare_times(base: Side, head: Side, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[str, TimeRow]:
-    """Return what the times of two versions say, by the id of each row; what is slower beyond doubt is measured again."""
+    """Return the times of two versions by the id of each row; rows that are slower beyond doubt are measured again."""
     clock = Clock(base, head)
     first = settle(clock, rows, processes)
     found = {row.id: ratio_of(first[row.id]) for row in rows}
@@ -103,11 +102,15 @@ def compare_times(base: Side, head: Side, rows: Sequence[Timed], processes: int 
     again = settle(clock, slower, processes)
     repeated = {row.id: ratio_of(again[row.id]) for row in slower}
     every = {row.id: [*first[row.id], *again.get(row.id, [])] for row in rows}
-    return {id: _row(every[id], found[id], repeated.get(id), clock.failures.get(id, "")) for id in every}
+    rows_found = {}
+    for id, times in every.items():
+        was, now = np.min(times, axis=0) if times else (math.nan, math.nan)
+        rows_found[id] = TimeRow(float(was), float(now), found[id], repeated.get(id), clock.failures.get(id, ""))
+    return rows_found
 
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
-    """Return the times of rows from so many processes, and of rows of which it is open whether they are slower from more."""
+    """Return the times of rows from so many processes, and from more for rows whose interval contains the limit."""
     found: Times = {row.id: [] for row in rows}
     for _ in range(MOST_TURNS):
         for id, times in clock.measure(rows, processes).items():
@@ -116,13 +119,8 @@ def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
     return found
 
 
-def _row(times: Sequence[tuple[float, float]], first: Ratio, again: Ratio | None, reason: str) -> TimeRow:
-    was, now = np.min(times, axis=0) if times else (math.nan, math.nan)
-    return TimeRow(float(was), float(now), first, again, reason)
-
-
 class Clock:
-    """Measures rows in processes that it starts anew each time. Attribute: `failures`, why rows have no times, by their id."""
+    """Measures rows in new processes each time. Attribute: `failures`, why rows have no times, by their id."""
 
     def __init__(self, base: Side, head: Side) -> None:
         self._sides = base, head
@@ -136,36 +134,41 @@ class Clock:
             for side in self._sides:
                 side.close()
             for row in rows:
-                if row.id not in self.failures:
-                    self._measure(row, turn, found[row.id])
+                if row.id in self.failures:
+                    continue
+                try:
+                    found[row.id].append(self._shortest(row, turn))
+                except IntegrationFailed as failure:
+                    self.failures[row.id] = str(failure.outcome)
         return found
-
-    def _measure(self, row: Timed, turn: int, found: list[tuple[float, float]]) -> None:
-        try:
-            found.append(self._shortest(row, turn))
-        except IntegrationFailed as failure:
-            self.failures[row.id] = str(failure.outcome)
 
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
-        scene, dt = row.place.name, row.place.scene.dt
         if row.id not in self._work:
-            self._work[row.id] = _plan(self._sides[0], row)
+            base = self._sides[0]
+            n, run = last_a_sample(lambda n: base.timed(row.scene, row.method, row.dt, n))
+            spent = min(wall_time(run) for _ in range(5))
+            self._work[row.id] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
         steps, calls = self._work[row.id]
-        runs = [[side.timed(scene, row.method, dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
+        runs = [[side.timed(row.scene, row.method, row.dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
         was, now = _sample(runs, calls, turn)
         return was / steps, now / steps
 
 
-def _plan(side: Side, row: Timed) -> tuple[int, int]:
-    """Return the steps of a run, and the calls of it, that make a sample."""
-    steps, run = last_a_sample(lambda n: side.timed(row.place.name, row.method, row.place.scene.dt, n))
-    spent = min(wall_time(run) for _ in range(5))
-    return steps, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
+def last_a_sample(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
+    """Return the number of steps that take as long as a sample, to several percent, and the run that takes them."""
+    n = 16
+    while True:
+        run = prepare(n)
+        run()
+        spent = min(wall_time(run) for _ in range(5))
+        if spent >= 0.9 * SAMPLE or n >= MOST_STEPS:
+            return n, run
+        n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / max(spent, 1e-9))))
 
 
 def _sample(runs: Sequence[Sequence[TimedRun]], calls: int, turn: int) -> tuple[float, float]:
-    """Return the shortest time, s, of a call in each version; who begins changes from round to round."""
+    """Return the shortest time, s, of a call in each version; the version that begins changes from round to round."""
     shortest = [math.inf, math.inf]
     for each in runs:
         for run in each:
@@ -178,7 +181,7 @@ def _sample(runs: Sequence[Sequence[TimedRun]], calls: int, turn: int) -> tuple[
 
 
 def ratio_of(times: Sequence[tuple[float, float]], seed: int = 0) -> Ratio:
-    """Return the ratio that times (n, 2), s, of n processes say, with its interval; nan where there are fewer than two."""
+    """Return the ratio of times (n, 2), s, of n processes, with its interval; NaN for fewer than two processes."""
     from scipy.stats import bootstrap
 
     if len(times) < 2:

@@ -7,7 +7,7 @@ import json
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from .results import Results, Row, Status, find_runaway
 
 PATH = Path("benchmarks") / "baseline.json"
 """Where a project keeps its baseline, relative to its root."""
-FORMAT = 1
+FORMAT, WITH_TIMES = 2, 1
+"""Format of the file, and the format of baselines that also held times."""
 ORDER = Measure.ORDER.text
 COUNTS = tuple(field.name for field in fields(Counters))
 """Measures that are whole numbers: the work that a method counts."""
@@ -31,22 +32,15 @@ ROUND_OFF = 8 * 2.0**-52
 """How far any error or drift may move: a change of the last digits is none."""
 ORDER_MARGIN = 0.05
 """How far an observed order may fall."""
-FALSE_ALARMS = 0.01
-"""Share of the runs of an unchanged commit that may fail because of a time, all rows together."""
-REPEATS = 5
-"""With fewer repeats the spread is unknown, and the threshold is the widest."""
-NARROWEST, WIDEST = 0.05, 0.10
-"""Limits of the threshold of a time ratio, as a part: below the first, another build differs as much; above the second, a
-slow-down of 20 % would not be seen 95 times in 100."""
 
 
 class NoBaseline(BadInput):
-    """There is no baseline that can be used: exit code 2, never a pass."""
+    """There is no usable baseline: exit code 2, never a pass."""
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """A value as it was, the spread measured about it, in how many runs, and the limit that follows."""
+    """A value, its measured spread, the number of runs, and the limit that follows from them."""
 
     value: float
     spread: float
@@ -56,14 +50,13 @@ class Allowed:
 
 @dataclass(frozen=True)
 class BaselineRow:
-    """A row of a baseline: what it is of, its measures, and its time ratio on each machine."""
+    """A row of a baseline: scene, method, version of a foreign engine, hash of the definition, and measures by name."""
 
     scene: str
     method: str
     engine: str
     definition: str
     measures: Mapping[str, Allowed]
-    time_ratios: Mapping[str, Allowed] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -81,32 +74,10 @@ def limit(measure: str, value: float, spread: float) -> float:
     return value + (SPREADS * spread if measure in COUNTS else max(SPREADS * spread, 1e-6 * abs(value), ROUND_OFF))
 
 
-def time_limit(ratios: Sequence[float], rows: int) -> Allowed:
-    """Return the largest time ratio that passes, from repeats of the same commit on the same machine.
-
-    The next logarithm exceeds their middle by t s sqrt(1 + 1/n) with a probability that a quantile t of Student's distribution
-    gives: `FALSE_ALARMS` for all rows together, divided among them. Middle and spread s are the median and the median distance
-    from it, scaled to a standard deviation, as a repeat in a slow spell of the machine says nothing about the others. The
-    result is kept between `NARROWEST` and `WIDEST`.
-    """
-    from scipy.stats import t
-
-    logarithms = [math.log(ratio) for ratio in ratios]
-    n = len(logarithms)
-    middle = statistics.median(logarithms)
-    spread = 1.4826 * statistics.median(abs(logarithm - middle) for logarithm in logarithms)
-    margin = WIDEST
-    if n >= REPEATS:
-        quantile = float(t.ppf(1 - FALSE_ALARMS / rows, n - 1))
-        margin = min(max(quantile * spread * math.sqrt(1 + 1 / n), NARROWEST), WIDEST)
-    value = math.exp(middle)
-    return Allowed(value, spread * value, n, value * (1 + margin))
-
-
 def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) -> Baseline:
     """Return the baseline that accepts runs of one commit, with the reason in its history.
 
-    Time ratios of machines that took no part stay. Rows that were not run, or skipped, are dropped, which the history says.
+    Rows that were not run, or skipped, are dropped; the history lists them.
 
     Raises
     ------
@@ -119,8 +90,7 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
     failed = [row.id for run in runs for row in run.rows.values() if row.status in (Status.FAILED, Status.ERROR)]
     if failed:
         raise BadInput("results", f"rows that failed: {', '.join(failed)}", "runs without failures: a failure is not accepted")
-    timed = sum(row.time_ratio is not None for row in runs[0].rows.values())
-    rows = {row.id: _row(row, runs, before.get(row.id), timed) for row in runs[0].rows.values() if row.status is Status.PASSED}
+    rows = {row.id: _row(row, runs) for row in runs[0].rows.values() if row.status is Status.PASSED}
     entry = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "reason": reason.strip(),
@@ -134,20 +104,13 @@ def update_baseline(old: Baseline | None, runs: Sequence[Results], reason: str) 
     return Baseline(rows, [*(old.history if old else ()), entry])
 
 
-def _row(first: Row, runs: Sequence[Results], before: BaselineRow | None, timed: int) -> BaselineRow:
+def _row(first: Row, runs: Sequence[Results]) -> BaselineRow:
     same = [run.rows[first.id] for run in runs if first.id in run.rows]
     kinds = {(row.status, row.definition, row.engine) for row in same}
     if len(same) < len(runs) or len(kinds) > 1:
         raise BadInput("results", f"runs that disagree about {first.id}", "runs of the same benchmarks with the same engines")
-    keep = before is not None and before.definition == first.definition
-    ratios = dict(before.time_ratios) if before and keep and first.time_ratio is not None else {}
-    for machine in dict.fromkeys(run.machine for run in runs):
-        found = [run.rows[first.id].time_ratio for run in runs if run.machine == machine]
-        if first.time_ratio is not None:
-            ratios[machine] = time_limit([ratio for ratio in found if ratio is not None], timed)
-    return BaselineRow(
-        first.scene, first.method, first.engine, first.definition, {name: _measure(name, same) for name in first.values}, ratios
-    )
+    measures = {name: _measure(name, same) for name in first.values}
+    return BaselineRow(first.scene, first.method, first.engine, first.definition, measures)
 
 
 def _measure(name: str, rows: Sequence[Row]) -> Allowed:
@@ -162,13 +125,13 @@ def _measure(name: str, rows: Sequence[Row]) -> Allowed:
     return Allowed(value, spread, len(values), limit(name, value, spread))
 
 
-def read(path: Path) -> Baseline:
-    """Return the baseline in a file.
+def read(path: Path, also_with_times: bool = False) -> Baseline:
+    """Return the baseline in a file; with `also_with_times` also from the format that held times, without them.
 
     Raises
     ------
     NoBaseline
-        There is no file, it is cut off, it was edited by hand, or its format is another.
+        There is no file, it is cut off, it was edited by hand, or it has another format.
     """
     allowed = 'a baseline, which `conservative gate --update "REASON"` writes'
     try:
@@ -177,17 +140,27 @@ def read(path: Path) -> Baseline:
         raise NoBaseline("baseline", f"no baseline: {path} ({error.strerror})", allowed) from None
     except ValueError as error:
         raise NoBaseline("baseline", f"truncated or damaged: {path} ({error})", allowed) from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
+    found = content.get("format") if isinstance(content, dict) else None
+    if found == WITH_TIMES and not also_with_times:
+        again = f"{allowed}; run the benchmarks, then that command. Times are compared by `conservative gate --against REF`"
+        raise NoBaseline("baseline", f"a baseline of an earlier version, with times: {path}", again)
+    if found not in (FORMAT, WITH_TIMES):
         raise NoBaseline("baseline", f"another format: {path}", f"{allowed}, of format {FORMAT}")
     if content.pop("sha256", None) != _digest(content):
         raise NoBaseline("baseline", f"edited by hand: {path}, whose content does not have its own sha256", allowed)
-    rows = {id: _row_from(row) for id, row in content["rows"].items()}
+    rows = {}
+    for id, row in content["rows"].items():
+        row.pop("time_ratios", None)
+        rows[id] = BaselineRow(**{**row, "measures": {name: Allowed(**each) for name, each in row["measures"].items()}})
     return Baseline(rows, content["history"])
 
 
 def write(baseline: Baseline, path: Path) -> None:
-    """Write a baseline, with the hash that tells a hand's edit or a merge from an update. Raise `NotWritten` if that fails."""
-    rows = {id: _row_as_json(row) for id, row in sorted(baseline.rows.items())}
+    """Write a baseline and a hash of it, which shows edits by hand and merges. Raise `NotWritten` if that fails."""
+    rows = {
+        id: {**vars(row), "measures": {name: vars(allowed) for name, allowed in row.measures.items()}}
+        for id, row in sorted(baseline.rows.items())
+    }
     content = {"format": FORMAT, "rows": rows, "history": list(baseline.history)}
     make_folder(path.parent, "baseline")
     write_text(path, json.dumps({**content, "sha256": _digest(content)}, indent=1) + "\n", "baseline")
@@ -195,15 +168,3 @@ def write(baseline: Baseline, path: Path) -> None:
 
 def _digest(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _row_as_json(row: BaselineRow) -> dict[str, Any]:
-    measures = {name: vars(allowed) for name, allowed in row.measures.items()}
-    ratios = {machine: vars(allowed) for machine, allowed in row.time_ratios.items()}
-    return {**vars(row), "measures": measures, "time_ratios": ratios}
-
-
-def _row_from(row: Mapping[str, Any]) -> BaselineRow:
-    measures = {name: Allowed(**allowed) for name, allowed in row["measures"].items()}
-    ratios = {machine: Allowed(**allowed) for machine, allowed in row["time_ratios"].items()}
-    return BaselineRow(**{**row, "measures": measures, "time_ratios": ratios})

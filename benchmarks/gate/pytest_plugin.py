@@ -1,10 +1,11 @@
-"""The pytest plugin behind `pytest --benchmark`; without the option it only keeps the suite from running.
+"""The pytest plugin of `pytest --benchmark`; without the option it only keeps the suite from running.
 
-It is an entry point, so every pytest run of the environment imports this file: nothing of ours is imported at the top.
+It is an entry point that every pytest run of the environment imports, so it imports nothing of the package at the top.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ SUITE = ROOM / "suite"
 TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
 MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
-"""The suite has many points, and times 0.1 s or two calls of each unless pytest-benchmark's option says otherwise."""
+"""The suite has many points, so it times each for 0.1 s or two calls unless the option of pytest-benchmark is given."""
+MEASURED = pytest.StashKey[list[dict[str, Any]]]()
+"""On the configuration: the rows that pytest-benchmark shows."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,13 +44,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="FILE",
         dest="conservative_gate_baseline",
         help="The baseline, relative to the root of the project (default: %(default)s).",
-    )
-    group.addoption(
-        "--gate-times",
-        choices=("required", "known"),  # those of `compare.Times`, which is not imported here
-        default="known",
-        dest="conservative_gate_times",
-        help="known (default): where the baseline has no times of this machine, gate all but time, and say so; required: fail.",
     )
 
 
@@ -121,26 +117,38 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[str, Any]]) -> None:
-    """Keep what pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
-    from .stash import MEASURED
-
+    """Keep the rows that pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
     config.stash[MEASURED] = list(benchmarks)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Show accuracy beside the times, after pytest-benchmark's own table; or say why nothing was timed."""
+    """Show accuracy next to the times, after the table of pytest-benchmark, or the reason why nothing was timed."""
     config = terminalreporter.config
     if not benchmarks_requested(config):
         return
     if getattr(config.option, "dist", "no") != "no":
         terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")
-    from .accuracy_columns import lines
-    from .stash import MEASURED
-
     measured = config.stash.get(MEASURED, [])
     if measured:
         terminalreporter.section("accuracy beside time")
         for group in dict.fromkeys(row["group"] for row in measured):
-            for line in (*lines([row for row in measured if row["group"] == group]), ""):
+            for line in (*table_lines([row for row in measured if row["group"] == group]), ""):
                 terminalreporter.write_line(line)
+
+
+def table_lines(benchmarks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a text table of pytest-benchmark's flat rows: name, times in s, and every number in `extra_info`."""
+    names: dict[str, None] = {}
+    for row in benchmarks:
+        names.update({key: None for key, value in row["extra_info"].items() if isinstance(value, int | float)})
+    table = [["benchmark", "min, s", "median, s", *names]]
+    for row in sorted(benchmarks, key=lambda row: (row["group"] or "", row["min"])):
+        values = [row["min"], row["median"], *(row["extra_info"].get(name) for name in names)]
+        table.append([row["param"] or row["name"], *("" if value is None else f"{value:.3g}" for value in values)])
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    found = []
+    for first, *rest in table:
+        numbers = (cell.rjust(width) for cell, width in zip(rest, widths[1:], strict=True))
+        found.append("  ".join([first.ljust(widths[0]), *numbers]).rstrip())
+    return found

@@ -1,4 +1,4 @@
-"""What one run of benchmarks found, as rows, and the file it is kept in."""
+"""The rows of one run of benchmarks, and the file that they are kept in."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
 
 from conservative.errors import BadInput
 from conservative.files import make_folder, write_text
@@ -17,9 +16,8 @@ from ..measures.measure import Measure, key
 FOLDER = Path(".benchmarks") / "gate"
 """Where a gated run leaves its results, relative to the root of the project."""
 FILE = "results.json"
-TIME_RATIO = "time ratio"
 RUNAWAY = 1.0
-"""Energy drift, relative, above which a run has failed, whatever it says of itself: its energy is not that of its start."""
+"""Relative energy drift above which a run has failed, even if it ended without an error."""
 ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
 
 
@@ -40,19 +38,15 @@ class Row:
     Attributes
     ----------
     id, scene, method
-        What tells it apart: the test's name with its parameters; and what a reader looks for.
+        Name of the test with its parameters, and names for readers.
     status
         How it ended.
     engine
-        Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for what is itself under test.
+        Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for the project under test.
     definition
         Hash of what is measured.
     values, spreads
-        Measures that must not get worse, and how much round-off alone changes each.
-    time_ratio
-        Time in units of the yardstick (`conservative.benchmarks.gate.yardstick`); None where time is not gated.
-    seconds
-        Shortest time of a call, s, for dashboards; not gated.
+        Measures that must not get worse, and the change of each by round-off alone.
     """
 
     id: str
@@ -63,8 +57,6 @@ class Row:
     definition: str = ""
     values: Mapping[str, float] = field(default_factory=dict)
     spreads: Mapping[str, float] = field(default_factory=dict)
-    time_ratio: float | None = None
-    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,34 +69,29 @@ class Results:
 
 
 def find_runaway(values: Mapping[str, float]) -> str:
-    """Return what says that a run ran away, empty if nothing does."""
+    """Return why a run counts as a runaway; empty if it does not."""
     drift = values.get(ENERGY_DRIFT, 0.0)
     return "" if drift <= RUNAWAY else f"{ENERGY_DRIFT} is {drift:.2g}, more than {RUNAWAY:g}: the run failed"
 
 
 def write(results: Results, path: Path) -> None:
-    """Write results as JSON; floats come back as they are, nan as nan. Raise `NotWritten` where that cannot be."""
+    """Write results as JSON, with NaN as NaN. Raise `NotWritten` if that fails."""
+    content = {**vars(results), "rows": [vars(row) for row in results.rows.values()]}
     make_folder(path.parent, "results")
-    write_text(path, json.dumps(as_json(results), indent=1) + "\n", "results")
-
-
-def as_json(results: Results) -> dict[str, Any]:
-    """Return results as what JSON knows."""
-    return {**vars(results), "rows": [vars(row) for row in results.rows.values()]}
+    write_text(path, json.dumps(content, indent=1) + "\n", "results")
 
 
 def read(path: Path) -> Results:
-    """Return the results in a file: one that a gated run left, or that `pytest --benchmark --benchmark-json=FILE` wrote.
+    """Return the results that a gated run left in a file.
 
     Raises
     ------
     BadInput
-        There is no such file, or it holds no results.
+        There is no such file, or it holds no results of this version.
     """
     allowed = "a file of results, which `pytest --benchmark --gate` leaves"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        content = content.get("conservative", content)
         rows = [Row(**{**row, "status": Status(row["status"])}) for row in content["rows"]]
         return Results(content["machine"], {row.id: row for row in rows}, content["commit"])
     except OSError as error:

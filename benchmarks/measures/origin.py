@@ -34,8 +34,8 @@ class Machine:
     system: str
 
     @property
-    def times_key(self) -> str:
-        """What ratios of times depend on, as far as it is known: processor and compiler."""
+    def title(self) -> str:
+        """Processor, architecture and numba's version, on which round-off depends."""
         processor = " ".join(filter(None, (self.processor, self.model)))
         return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
 

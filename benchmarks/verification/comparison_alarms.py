@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from conservative import registry
 from conservative.references.environments.lock import Source
 
-from ..comparison.rows import Place
 from ..comparison.side import Side, TimedRun
 from ..comparison.times import PROCESSES, Timed, TimeRow, compare_times
 from ..comparison.version import Version, install_version
@@ -86,8 +86,9 @@ def main() -> None:
     parser.add_argument("--methods", nargs="+", default=METHODS)
     parser.add_argument("--factors", nargs="+", type=float, default=FACTORS, help="of the work of rows")
     options = parser.parse_args()
-    version, place = install_version(options.version, Path(), Source()), Place.of(options.scene)
-    rows = [Timed(place, f"{method}{_MARK}{factor}") for method in options.methods for factor in options.factors]
+    version, dt = install_version(options.version, Path(), Source()), registry.scene(options.scene).dt
+    names = [f"{method}{_MARK}{factor}" for method in options.methods for factor in options.factors]
+    rows = [Timed(f"{options.scene} / {name}", options.scene, name, dt) for name in names]
     records = []
     for _ in range(options.runs):
         records.append(as_record(compare_once(version, rows, options.processes)))

@@ -1,22 +1,34 @@
-"""`conservative gate`."""
+"""`conservative gate`: results of benchmarks against a baseline, or two versions of a project against each other."""
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import against as two_versions
-from . import completion
-from .options import FilePath, allow_build_option, epilog, find_links_option, split_names
+from conservative.errors import require_extra
 
-TIMES = "known: where the baseline has no times of this machine, compare all but times, and say so; required: fail."
+from . import completion
+from .options import FilePath, OutputCommand, OutputFile, allow_build_option, epilog, find_links_option, split_names
+
+if TYPE_CHECKING:
+    from ..tables.comparison import Answer
+
+FILES = ("junit", "markdown", "html")
+OF_BASELINE = ("results", "baseline", "update")
+OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "find_links", "allow_build", *FILES)
 
 
 @click.command(
+    cls=OutputCommand,
     short_help="Compare benchmarks with a baseline, or two versions with each other.",
     epilog=epilog(
-        "conservative gate --against main              the files in this folder against a branch: no baseline, any machine",
+        "conservative gate --against main              the files in this folder against a branch, on any machine",
         "conservative gate --against v1.2 --methods my_method --html gate.html",
         "pytest --benchmark --gate                     run and compare with the baseline; leaves the results for this command",
         "conservative gate                             compare them again",
@@ -26,7 +38,6 @@ TIMES = "known: where the baseline has no times of this machine, compare all but
 )
 @click.argument("results", nargs=-1, type=FilePath())
 @click.option("--baseline", type=FilePath(), help="The baseline.  [default: benchmarks/baseline.json]")
-@click.option("--times", type=click.Choice(["required", "known"]), help=f"{TIMES}  [default: known]")
 @click.option(
     "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."
 )
@@ -35,22 +46,28 @@ TIMES = "known: where the baseline has no times of this machine, compare all but
     metavar="REF|FOLDER|WHEEL",
     help="Run two versions of a project in turn, each in its environment, and compare this one with the other.",
 )
-@click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: what is compared with it.  [default: this folder]")
+@click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: the newer version.  [default: this folder]")
 @click.option(
     "--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="With --against. [default: the suite's]"
 )
-@click.option("--methods", multiple=True, metavar="A,B", help="With --against. [default: all that are nobody else's engine]")
+@click.option("--methods", multiple=True, metavar="A,B", help="With --against. [default: all with the role `ours`]")
 @click.option(
-    "--with", "requirements", multiple=True, metavar="PACKAGE|WHEEL", help="With --against: what both environments have, too."
+    "--with",
+    "requirements",
+    multiple=True,
+    metavar="PACKAGE|WHEEL",
+    help="With --against: more packages for both environments.",
 )
 @click.option(
     "--processes", type=click.IntRange(2), metavar="N", help="With --against: processes of each version.  [default: 7]"
 )
 @find_links_option
 @allow_build_option
-@click.option("--junit", type=FilePath(), help="With --against: write a report as JUnit has them.")
-@click.option("--markdown", type=FilePath(), help="With --against: write verdict and table as Markdown.")
-@click.option("--html", type=FilePath(), help="With --against: write a page with rows, ratios and filters.")
+@click.option("--junit", type=OutputFile('name="conservative gate"'), help="With --against: write a JUnit report.")
+@click.option("--markdown", type=OutputFile("**gate: "), help="With --against: write verdict and table as Markdown.")
+@click.option(
+    "--html", type=OutputFile("<title>conservative gate: "), help="With --against: write a page with rows, ratios and filters."
+)
 @click.option("--json", "as_json", is_flag=True, help="Violations and notes, or the new entry of the history, as JSON.")
 @click.pass_context
 def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
@@ -59,47 +76,103 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
     With --against, compare two versions instead: errors, drifts, orders, counts and times of both, measured now. A row that is
     5 % slower with 99 % confidence is measured again in new processes, and fails if it still is.
 
-    Exits with 1 and a line for each violation, or with 2 where there is nothing to compare with.
+    Exits with 1 and a line for each violation, or with 2 if the comparison cannot be made.
     """
-    _check(context, options)
-    answer = _judge(options) if options["against"] is None else two_versions.compare(_question(options))
-    click.echo(answer.json_text() if as_json else answer)
-    if not answer.passed:
+    two_versions = options["against"] is not None
+    for name in OF_BASELINE if two_versions else OF_VERSIONS:
+        if options[name]:
+            parameter = next(each for each in context.command.params if each.name == name)
+            problem = "cannot be used with --against" if two_versions else "needs --against"
+            raise click.UsageError(f"{parameter.get_error_hint(context)} {problem}")
+    if two_versions:
+        answer = _compare_and_write(options)
+        passed, text, json_text = answer.passed, str(answer), answer.json_text
+    else:
+        passed, text, content = _judge(options)
+        json_text = lambda: json.dumps({"passed": passed, **content}, indent=2, ensure_ascii=False)  # noqa: E731
+    click.echo(json_text() if as_json else text)
+    if not passed:
         raise click.exceptions.Exit(1)
 
 
-OF_BASELINE = ("results", "baseline", "times", "update")
-OF_VERSIONS = (
-    "project",
-    "scenes",
-    "methods",
-    "requirements",
-    "processes",
-    "find_links",
-    "allow_build",
-    "junit",
-    "markdown",
-    "html",
-)
+def _judge(options: dict[str, Any]) -> tuple[bool, str, dict[str, Any]]:
+    """Compare results with the baseline, or accept them; return whether they pass, and the answer as text and for JSON.
+
+    Raises
+    ------
+    BadInput
+        A file holds no results, there is no baseline, or the results cannot be accepted.
+    """
+    from conservative.benchmarks.gate import baseline, results
+    from conservative.benchmarks.gate.compare import judge
+
+    path = options["baseline"] or baseline.PATH
+    runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
+    if options["update"] is None:
+        before = baseline.read(path)
+        verdicts = [judge(before, run) for run in runs]
+        records = [{"passed": each.passed, **asdict(each)} for each in verdicts]
+        return all(each.passed for each in verdicts), "\n".join(map(str, verdicts)), {"verdicts": records}
+    old = baseline.read(path, also_with_times=True) if path.exists() else None
+    new = baseline.update_baseline(old, runs, options["update"])
+    baseline.write(new, path)
+    entry = new.history[-1]
+    changes = ", ".join(f"{len(entry[kind])} {kind}" for kind in ("added", "changed", "removed"))
+    text = f"{path}: {len(new.rows)} rows from {entry['runs']} runs; {changes}"
+    return True, text, {"baseline": str(path), "rows": len(new.rows), "entry": dict(entry)}
 
 
-def _check(context: click.Context, options: dict[str, Any]) -> None:
-    """Refuse options of the one comparison together with the other."""
-    with_versions = options["against"] is not None
-    for name in OF_BASELINE if with_versions else OF_VERSIONS:
-        if options[name]:
-            parameter = next(each for each in context.command.params if each.name == name)
-            said = "cannot be used with --against" if with_versions else "can be used with --against alone"
-            raise click.UsageError(f"{parameter.get_error_hint(context)} {said}")
+def _compare_and_write(options: dict[str, Any]) -> Answer:
+    """Compare two versions and write the files that are asked for; missing packages and bad paths end it before any work."""
+    from conservative.files import text_file
+
+    require_extra("conservative gate --against", "environments")
+    require_extra("conservative gate --against", "gate", "heyoka")
+    if options["html"]:
+        require_extra("conservative gate --html", "report", "jinja2")
+    with ExitStack() as files:
+        streams = {name: files.enter_context(text_file(options[name], name)) for name in FILES if options[name] is not None}
+        answer = _compare(options)
+        for name, stream in streams.items():
+            stream.write(_text_of(answer, name))
+    return answer
 
 
-def _judge(options: dict[str, Any]) -> Any:
-    from ..tables.gate import accept, compare
+def _text_of(answer: Answer, name: str) -> str:
+    """Return the answer as `FILES` names it."""
+    if name == "html":  # which needs jinja2, the others do not
+        from ..page.comparison import render
 
-    results, baseline, update = (options[name] for name in ("results", "baseline", "update"))
-    return compare(results, baseline, options["times"] or "known") if update is None else accept(results, baseline, update)
+        return render(answer)
+    texts: dict[str, Callable[[], str]] = {"junit": answer.junit_text, "markdown": answer.markdown_text}
+    return texts[name]()
 
 
-def _question(options: dict[str, Any]) -> dict[str, Any]:
-    names = {name: split_names(name, options[name]) for name in ("scenes", "methods")}
-    return {name: options[name] for name in (*OF_VERSIONS, "against")} | names
+def _compare(options: dict[str, Any]) -> Answer:
+    """Install both versions and compare them.
+
+    Raises
+    ------
+    BadInput
+        A version or a scene cannot be used, or neither version has a method.
+    """
+    from conservative.benchmarks.comparison.compare import compare_versions
+    from conservative.benchmarks.comparison.version import install_version
+    from conservative.references.environments.lock import Source
+
+    from ..run.provenance import describe_origin
+    from ..tables.comparison import Answer
+    from ..terminal.progress import progress
+
+    made = describe_origin()
+    source, head = Source(options["find_links"], options["allow_build"]), options["project"] or "."
+    project = Path(head) if Path(head).is_dir() else Path()
+    asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}
+    if options["processes"]:
+        asked["processes"] = options["processes"]
+    versions = []
+    for name in (options["against"], head):
+        click.echo(f"preparing {name}", err=True)
+        versions.append(install_version(name, project, source, options["requirements"]))
+    with progress() as step:
+        return Answer(compare_versions(versions[0], versions[1], tell=step, **asked), made)

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from conservative.errors import require_extra
 
 from . import completion
-from .options import FilePath, allow_build_option, epilog, find_links_option, split_names
+from .options import (
+    FilePath,
+    OutputCommand,
+    OutputFile,
+    OutputFolder,
+    allow_build_option,
+    epilog,
+    find_links_option,
+    split_names,
+)
 
 if TYPE_CHECKING:
-    from conservative.benchmarks.tracking.track import Plan
-
     from ..tables.cells import Row
     from ..tables.track import Answer
 
-PAGE = ("track.html", "track.md", "track.json")
-"""The files of `--out`."""
+PAGE = {"track.html": "<title>conservative track: ", "track.md": "## Versions of ", "track.json": '{\n  "made": {'}
+"""The files of `--out`, and how each is recognized."""
 SHORT = {
     "order of rates": "rates",
     " drift": "",
@@ -30,11 +37,11 @@ SHORT = {
     "✓ done": "✓",
     "time ratio": "time",
 }
-"""What tables have, and what stands for it on a terminal."""
-Texts = dict[str, IO[str]]
+"""Words of the tables, and their short forms on a terminal."""
 
 
 @click.command(
+    cls=OutputCommand,
     short_help="Compare versions of an engine.",
     epilog=epilog(
         "conservative track mujoco 3.6.0 3.7.0 4.0.0",
@@ -45,7 +52,7 @@ Texts = dict[str, IO[str]]
 )
 @click.argument("engine", shell_complete=completion.engines)
 @click.argument("versions", nargs=-1)
-@click.option("--last", type=click.IntRange(1), metavar="N", help="The newest N versions that there are, beside VERSIONS.")
+@click.option("--last", type=click.IntRange(1), metavar="N", help="The newest N versions, in addition to VERSIONS.")
 @click.option(
     "--against",
     type=FilePath(),
@@ -53,25 +60,41 @@ Texts = dict[str, IO[str]]
     help="Compare a build of your own with the last version, by default the newest; exit code 1 if it lost something.",
 )
 @click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: a report's]")
-@click.option("--settings", multiple=True, metavar="A,B", help="Such as RK4, or all that tables show.  [default: these]")
+@click.option("--settings", multiple=True, metavar="A,B", help="Such as RK4.  [default: all that tables show]")
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-@click.option("--junit", type=FilePath(), help="Write a report as JUnit has them.")
-@click.option("--markdown", type=FilePath(), help="Write tables and changes as Markdown.")
-@click.option("--out", type=FilePath(), help=f"Folder for {', '.join(PAGE)}.")
+@click.option("--junit", type=OutputFile('name="conservative track '), help="Write a JUnit report.")
+@click.option("--markdown", type=OutputFile(PAGE["track.md"]), help="Write tables and changes as Markdown.")
+@click.option("--out", type=OutputFolder(PAGE), help=f"Folder for {', '.join(PAGE)}.")
 @find_links_option
 @allow_build_option
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
-    """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and say what changed from one to the next.
+    """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
     Versions that are not installed get an environment of their own.
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
+    from conservative.files import make_folder, text_file
+
     scenes, settings = (split_names(name, options.pop(name)) for name in ("scenes", "settings"))
-    with ExitStack() as files:
-        streams = _open(files, options)
+    paths = {name: (options[name], name) for name in ("junit", "markdown") if options[name] is not None}
+    if (out := options["out"]) is not None:
+        make_folder(out, "out")
+        paths |= {name: (out / name, "out") for name in PAGE}
+    with ExitStack() as files:  # a place that cannot be written is an error before any work
+        streams = {name: files.enter_context(text_file(*place)) for name, place in paths.items()}
         answer = _answer(engine, versions, scenes, settings, options)
-        _write(answer, streams)
+        from ..page.track import render
+
+        contents: dict[str, Callable[[], str]] = {
+            "junit": answer.junit_text,
+            "markdown": answer.markdown_text,
+            "track.html": lambda: render(answer),
+            "track.md": answer.markdown_text,
+            "track.json": answer.json_text,
+        }
+        for name, stream in streams.items():
+            stream.write(contents[name]())
     if as_json:
         click.echo(answer.json_text())
     else:
@@ -80,78 +103,44 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
         raise click.exceptions.Exit(1)
 
 
-def _open(files: ExitStack, options: dict[str, Any]) -> Texts:
-    """Return the files to write, by what is written: a place that cannot be written is an error before any work."""
-    from conservative.files import make_folder, text_file
-
-    out: Path | None = options["out"]
-    paths = {name: options[name] for name in ("junit", "markdown") if options[name] is not None}
-    arguments = {name: name for name in paths}
-    if out is not None:
-        make_folder(out, "out")
-        paths |= {name: out / name for name in PAGE}
-    return {name: files.enter_context(text_file(path, arguments.get(name, "out"))) for name, path in paths.items()}
-
-
 def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Answer:
-    """Return what the history of the versions says.
+    """Install the versions that are missing, and compare all of them.
 
     Raises
     ------
     BadInput
         The engine, a version, a scene, a setting or the build cannot be used, or there are fewer than two versions.
     """
-    from conservative.benchmarks.tracking.track import track
+    from conservative.benchmarks.tracking.track import make_plan, require_several, track
+    from conservative.references.environments.builds import install_build
+    from conservative.references.environments.lock import Source
+    from conservative.references.environments.releases import install_releases, newest_releases
 
     from ..run.provenance import describe_origin
     from ..tables.track import Answer
     from ..terminal.progress import progress
 
+    def tell(what: str) -> None:
+        click.echo(what, err=True)
+
     made = describe_origin()
-    plan = _plan(engine, versions, scenes, settings, options)
-    with progress() as step:
-        history = track(plan, lambda done, total, what: step(done / total, what))
-    return Answer(history, options["against"] is not None, made)
-
-
-def _plan(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Plan:
-    from conservative.benchmarks.tracking.track import make_plan, require_several
-    from conservative.references.environments.builds import install_build
-    from conservative.references.environments.lock import Source
-    from conservative.references.environments.releases import install_releases, newest_releases
-
     source, against = Source(options["find_links"], options["allow_build"]), options["against"]
     last = options["last"] or (1 if against is not None and not versions else 0)
     newest = newest_releases(engine, last, source) if last else ()
     wanted = [*versions, *(version for version in newest if version not in versions)]
     require_several([*wanted, *([str(against)] if against is not None else [])])
-    environments = install_releases(engine, wanted, source, _tell)
+    environments = install_releases(engine, wanted, source, tell)
     if against is not None:
-        _tell(f"installing {against}")
+        tell(f"installing {against}")
         environments += (install_build(engine, against, source).environment,)
-    return make_plan(environments, settings, scenes)
-
-
-def _tell(what: str) -> None:
-    click.echo(what, err=True)
-
-
-def _write(answer: Answer, streams: Texts) -> None:
-    from ..page.track import render
-
-    contents = {
-        "junit": answer.junit_text,
-        "markdown": answer.markdown_text,
-        "track.html": lambda: render(answer),
-        "track.md": answer.markdown_text,
-        "track.json": answer.json_text,
-    }
-    for name, stream in streams.items():
-        stream.write(contents[name]())
+    plan = make_plan(environments, settings, scenes)
+    with progress() as step:
+        history = track(plan, lambda done, total, what: step(done / total, what))
+    return Answer(history, against is not None, made)
 
 
 def _show(answer: Answer) -> None:
-    """Print tables, what changed, and the verdict."""
+    """Print tables, changes, and the verdict."""
     from ..tables.track import NOTHING_CHANGED, UNFINISHED
     from ..terminal.tables import TerminalTable, print_tables
 
@@ -164,7 +153,7 @@ def _show(answer: Answer) -> None:
 
 
 def _narrow(row: Row) -> list[str]:
-    """Return a row, or the header, as a terminal has room for it: without the time in seconds, and in short words."""
+    """Return a row, or the header, for the width of a terminal: without the time in seconds, and in short words."""
     setting, version, *others, _, ratio = map(str, row)
     texts = [f"{setting} {version}", *others, ratio.partition(" (")[0]]
     return [re.sub("|".join(SHORT), lambda found: SHORT[found[0]], text) for text in texts]

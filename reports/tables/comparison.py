@@ -9,8 +9,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from conservative.benchmarks.comparison.compare import ComparedRow, Comparison
-from conservative.benchmarks.comparison.rows import Found
+from conservative.benchmarks.comparison.compare import ComparedRow, Comparison, Found
 from conservative.benchmarks.comparison.times import CONFIDENCE, SLOWER, Ratio, TimeRow
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.measure import Measure

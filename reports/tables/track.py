@@ -114,7 +114,7 @@ class Answer:
         made = (
             ["", "### How this was made", "", *(f"- {name}: {value}" for name, value in self.made.items())] if self.made else []
         )
-        head = [f"## {self.title}", *verdict, "", "### What changed", "", changes]
+        head = [f"## Versions of {self.title}", *verdict, "", "### What changed", "", changes]
         if self.unfinished:
             tables += ["", f"### {UNFINISHED}", "", *(f"- {text}" for text in self.unfinished)]
         return "\n".join([*head, *tables, "", "### Versions", "", markdown(self.environments), *made]) + "\n"

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from conservative.benchmarks.gate import pytest_gate, pytest_plugin
-from conservative.benchmarks.gate.stash import MEASURED
 
 
 class Options(SimpleNamespace):
@@ -23,7 +22,7 @@ def configuration(*arguments, source=pytest.Config.ArgsSource.ARGS, timer=True, 
     )
     known = []
     wanted = {"conservative_benchmark": True, "conservative_gate": False, "args": list(arguments), "args_source": source}
-    wanted |= {"conservative_gate_baseline": "b", "conservative_gate_times": "known", "rootpath": Path("root")}
+    wanted |= {"conservative_gate_baseline": "b", "rootpath": Path("root")}
     held = SimpleNamespace(benchmark_max_time=1.0, benchmark_min_rounds=5, dist=options.pop("dist", "no"))
     return Options(invocation_params=given, pluginmanager=plugins, option=held, known=known, stash={}, **{**wanted, **options})
 
@@ -56,7 +55,7 @@ def test_the_gate_needs_benchmarks_the_timer_and_no_workers():
     gated = configuration(conservative_gate=True)
     pytest_plugin.pytest_configure(gated)
     ((plugin, name),) = gated.known
-    assert (type(plugin), name, plugin.times) == (pytest_gate.Gate, "conservative_gate", "known")
+    assert (type(plugin), name) == (pytest_gate.Gate, "conservative_gate")
     assert pytest_plugin.pytest_xdist_auto_num_workers(gated) == 0
     assert pytest_plugin.pytest_xdist_auto_num_workers(configuration(conservative_benchmark=False)) is None
 
@@ -94,19 +93,17 @@ def test_accuracy_is_shown_group_by_group():
         for name, group in (("a", "one"), ("b", "two"), ("c", "one"))
     ]
     assert pytest_plugin.pytest_benchmark_group_stats(config, rows) is None
-    assert config.stash[MEASURED] == rows
+    assert config.stash[pytest_plugin.MEASURED] == rows
     pytest_plugin.pytest_terminal_summary(terminal)
     assert [line.split("  ")[0] for line in said] == ["accuracy beside time", "benchmark", "a", "c", "", "benchmark", "b", ""]
-    config.option.dist = "worksteal"
-    pytest_plugin.pytest_terminal_summary(terminal)
-    assert said[8].startswith("--benchmark: timing is off under -n")
-    config.conservative_benchmark = False
-    pytest_plugin.pytest_terminal_summary(terminal)
-    assert len(said) == 17
 
 
-def test_the_plugin_is_asked_before_those_it_changes_and_after_those_it_adds_to():
-    for hook in (pytest_plugin.pytest_xdist_auto_num_workers, pytest_plugin.pytest_benchmark_group_stats):
-        assert hook.pytest_impl["tryfirst"]
-        assert hook.pytest_impl["optionalhook"]
-    assert pytest_plugin.pytest_terminal_summary.pytest_impl["trylast"]
+def test_numbers_become_aligned_columns_and_texts_do_not():
+    def flat(name, fastest, **extra):
+        return {"name": name, "param": None, "group": None, "min": fastest, "median": 2 * fastest, "extra_info": extra}
+
+    header, first, second = pytest_plugin.table_lines([flat("slow", 1e-3, label="x", drift=2e-16), flat("fast", 1e-6, order=2)])
+    assert header.split()[-2:] == ["drift", "order"]
+    assert first.split() == ["fast", "1e-06", "2e-06", "2"]
+    assert second.split() == ["slow", "0.001", "0.002", "2e-16"]
+    assert len(header) == len(first)

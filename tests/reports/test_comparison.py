@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -11,7 +12,6 @@ from click.testing import CliRunner
 from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.comparison.times import Ratio
 from conservative.benchmarks.gate.results import Status
-from conservative.reports.cli import against
 from conservative.reports.cli.main import main
 from conservative.reports.page.comparison import WIDEST, bar, place, render
 from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
@@ -114,12 +114,15 @@ def test_a_ratio_lies_where_it_belongs():
 # ---------------------------------------------------------------------------------------------------------------- the command
 
 
+gate_module = sys.modules["conservative.reports.cli.gate"]  # its package has the command under the same name
+
+
 @pytest.fixture
 def gate(monkeypatch):
     """Return exit code and output of the command, where a comparison has ended."""
 
     def run(*arguments, ended=SLOWER):
-        monkeypatch.setattr(against, "_compare", lambda options: ended)
+        monkeypatch.setattr(gate_module, "_compare", lambda options: ended)
         done = CliRunner().invoke(main, ["gate", *map(str, arguments)])
         return done.exit_code, done.output
 
@@ -138,7 +141,7 @@ def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     assert gate("--against", "main", ended=answer())[0] == 0
 
 
-@pytest.mark.parametrize("options", [("--update", "why"), ("--times", "known"), ("--baseline", "kept.json"), ("results.json",)])
+@pytest.mark.parametrize("options", [("--update", "why"), ("--baseline", "kept.json"), ("results.json",)])
 def test_options_of_a_baseline_do_not_go_with_two_versions(gate, options):
     code, text = gate("--against", "main", *options)
     assert code == 2
@@ -151,7 +154,45 @@ def test_options_of_a_baseline_do_not_go_with_two_versions(gate, options):
 def test_options_of_two_versions_need_two(gate, options):
     code, text = gate(*options)
     assert code == 2
-    assert "can be used with --against alone" in text
+    assert "needs --against" in text
+
+
+def test_junit_has_violations_that_belong_to_no_row():
+    nothing = answer(was=None)  # no row of the earlier version has passed: everything would
+    assert [each.measure for each in nothing.comparison.violations] == ["rows"]
+    suite = ElementTree.fromstring(nothing.junit_text()).find("testsuite")
+    assert suite.get("failures") == "1"
+    assert "rows" in suite.find(".//failure").get("message")
+
+
+def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jinja2", None)  # an import of it fails
+    monkeypatch.delitem(sys.modules, "conservative.reports.page.comparison")
+    monkeypatch.setattr("conservative.errors.find_spec", lambda name: None if name == "jinja2" else name)
+    markdown = tmp_path / "gate.md"
+    assert gate("--against", "main", "--markdown", markdown) == (1, f"{SLOWER}\n")
+    assert gate("--against", "main", "--markdown", markdown, ended=answer())[0] == 0
+    code, text = gate("--against", "main", "--html", tmp_path / "page.html", ended=None)
+    assert (code, "conservative-rotation[report]" in text) == (2, True)
+    assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize("package", ["uv", "heyoka"])
+def test_a_missing_extra_exits_with_2_before_any_work(gate, monkeypatch, package):
+    monkeypatch.setattr("conservative.errors.find_spec", lambda name: None if name == package else name)
+    code, text = gate("--against", "main", ended=None)
+    assert (code, package in text) == (2, True)
+
+
+@pytest.mark.parametrize("option", ["--html", "--markdown", "--junit"])
+def test_a_file_of_somebody_else_is_not_replaced(gate, tmp_path, option):
+    notes = tmp_path / "notes"
+    notes.write_text("mine")
+    code, _ = gate("--against", "main", option, notes, ended=None)
+    assert (code, notes.read_text()) == (2, "mine")
+    for more in (["--force"], []):  # then its own result of before
+        assert gate("--against", "main", option, notes, *more)[0] == 1
+    assert notes.read_text() != "mine"
 
 
 def test_a_file_that_cannot_be_written_is_an_error_before_any_work(gate, tmp_path):

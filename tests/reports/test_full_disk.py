@@ -5,9 +5,8 @@ import re
 
 import pytest
 
-from conservative.benchmarks.gate import baseline, pytest_gate, results
+from conservative.benchmarks.gate import baseline, results
 from conservative.benchmarks.gate.results import Row
-from conservative.errors import NotWritten
 
 from ..environments import run_python
 
@@ -74,29 +73,21 @@ def test_a_report_without_room_does_not_say_that_it_kept_what_it_could_not(folde
     assert "are finished" not in err
 
 
-@pytest.mark.parametrize("write", ["results.write(found, Path('results.json'))", "dashboards.write(found, Path())"])
-def test_results_are_whole_or_as_before(write, folder):
-    (folder / "bencher.json").write_text("before")
-    (folder / "custom_smaller_is_better.json").write_text("before")
+def test_results_are_whole_or_as_before(folder):
     before = contents(folder)
-    code = f"""
+    code = """
 import os, resource, sys
 from pathlib import Path
-from conservative.benchmarks.gate import dashboards, results
+from conservative.benchmarks.gate import results
 from conservative.errors import NotWritten
 os.chdir(sys.argv[1])
 found = results.read(Path('results.json'))
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
-    {write}
+    results.write(found, Path("results.json"))
 except NotWritten as error:
     print(error.argument)
 """
     assert run_python(code, str(folder)) == (0, "results\n", "")
     assert contents(folder) == before
     assert json.loads(before["results.json"])["machine"] == "a machine"
-
-
-def test_the_summary_of_a_workflow_that_cannot_be_written_is_named(tmp_path):
-    with pytest.raises(NotWritten, match=r"GITHUB_STEP_SUMMARY: got .*Is a directory"):
-        pytest_gate._append(tmp_path, "text")

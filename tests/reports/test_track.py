@@ -132,7 +132,7 @@ def test_junit_takes_what_an_engine_may_say():
 
 def test_markdown_has_tables_changes_and_versions():
     text = Answer(history(BAD, GOOD, FAILED, times=(TIMES, SLOW)), gated=True).markdown_text()
-    assert text.startswith("## made: 1.0, 2.0, 3.0\n\n**3.0 against 2.0: FAILED**\n")
+    assert text.startswith("## Versions of made: 1.0, 2.0, 3.0\n\n**3.0 against 2.0: FAILED**\n")
     assert "| midpoint | 2.0 | 2 | 2 | ✓ 2e-13 | ✗ 9e-4 | 3.0e-3 | ✓ done | 2 | 2 |" in text
     assert "| midpoint | 3.0 | – | – | – | – | – | ✗ diverged | – | – |" in text
     assert "- midpoint on brick in 3.0: diverged after t = 0.5 s (why)" in text

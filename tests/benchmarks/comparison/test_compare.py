@@ -5,15 +5,16 @@ from dataclasses import replace
 
 import pytest
 
-from conservative.benchmarks.comparison.compare import TIME, judge
-from conservative.benchmarks.comparison.rows import Place, judge_values, measure_rows
+from conservative.benchmarks.comparison.compare import TIME, Place, judge, judge_values, measure_rows
 from conservative.benchmarks.comparison.side import Setting
 from conservative.benchmarks.gate.results import Status
+from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import GatedValue
 from conservative.errors import BadInput
 from conservative.references.environments.failures import EngineCrashed
+from conservative.registry import method, scene
 
-from .made_up import BASE, HEAD, PLACE, TIMED, found, timed, version
+from .made_up import BASE, HEAD, PLACE, TIMED, VALUES, found, timed, version
 
 SAME = (1.0, 0.98, 1.02)
 SLOW = (1.1, 1.08, 1.12)
@@ -37,17 +38,32 @@ def test_the_same_passes_and_says_nothing():
 
 
 WORSE = {
-    "attitude error max": found(attitude_error_max=1.01e-3),
-    "energy drift max": found(energy_drift_max=1e-14),
-    "steps": found(steps=601.0),
-    "observed order": found(observed_order=1.9),
+    "attitude error max": 1.01e-3,
+    "rate error max": 1.01e-3,
+    "energy drift max": 1e-14,
+    "steps": 601.0,
+    "observed order": 1.9,
 }
 
 
 @pytest.mark.parametrize("name", WORSE)
 def test_a_value_that_is_worse_fails(name):
-    assert violations(found(), WORSE[name]) == {name}
-    assert violations(WORSE[name], found()) == set()
+    # By `judge_values`, as the rows of a version are made, so that no measure gets lost there either.
+    was, now = (
+        judge_values(found().row, {key: GatedValue(value, 0.0) for key, value in values.items()})
+        for values in (VALUES, VALUES | {name: WORSE[name]})
+    )
+    assert violations(was, now) == {name}
+    assert violations(now, was) == set()
+
+
+def test_no_measure_of_a_real_row_is_ignored():
+    values = points.measure(points.Point(scene("lagrange_top:t_end=0.5"), method("reduced")))
+    assert {"rate error max", "vertical momentum drift max", "iterations", "observed order"} <= values.keys()
+    was = judge_values(found().row, values)
+    for name, each in values.items():
+        worse = GatedValue(each.value + (-0.5 if name == "observed order" else 0.5), each.spread)
+        assert violations(was, judge_values(found().row, values | {name: worse})) == {name}
 
 
 def test_last_digits_fail_nothing():

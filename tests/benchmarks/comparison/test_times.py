@@ -12,11 +12,12 @@ from conservative.benchmarks.comparison.times import (
     Clock,
     Timed,
     compare_times,
+    last_a_sample,
     ratio_of,
     settle,
 )
 
-from .made_up import PLACE, STEP, TIMED, Side
+from .made_up import STEP, TIMED, Side
 
 
 def compare(base, head, *, processes=PROCESSES):
@@ -74,7 +75,7 @@ def test_what_is_open_is_measured_in_more_processes():
 
 
 def test_a_side_that_does_not_survive_fails_its_row_alone():
-    other = Timed(PLACE, "gauss")
+    other = Timed("brick_flip / gauss", "brick_flip", "gauss", 0.01)
 
     class Fragile(Side):
         def timed(self, scene, method, dt, n_steps):
@@ -122,3 +123,18 @@ def test_of_one_process_there_is_no_interval():
         ratio = ratio_of(times)
         assert math.isnan(ratio.value)
         assert not ratio.slower
+
+
+@pytest.mark.parametrize(("step", "expected"), [(2.4e-5, 16), (0.9 * 4e-4, 16), (2e-5, 20), (0.0, 2**22)])
+def test_a_run_lasts_a_sample(step, expected):
+    class Steps:
+        def __init__(self, n):
+            self.n = n
+
+        def __call__(self):
+            return None
+
+        def wall_time(self, calls):
+            return calls * step * self.n
+
+    assert last_a_sample(Steps)[0] == expected

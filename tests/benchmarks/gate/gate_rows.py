@@ -1,43 +1,67 @@
-"""Results of a gate: those of an untouched run, and the same with one thing worse."""
+"""Results of a gate: rows with chosen values, real rows of an untouched run, and the same with one thing worse."""
 
 from dataclasses import replace
+from functools import cache
 
-from conservative.benchmarks.gate import compare, yardstick
-from conservative.benchmarks.gate.results import Row, Status
+from conservative.benchmarks.gate import baseline, compare
+from conservative.benchmarks.gate.results import Results, Row, Status
 from conservative.benchmarks.suite import points
 from conservative.registry import method, scene
 
+ROW = Row(
+    "file.py::test[a]",
+    "brick",
+    "reduced",
+    Status.PASSED,
+    "",
+    "hash",
+    {"energy drift max": 1e-3, "observed order": 2.0, "iterations": 30.0},
+    {"energy drift max": 1e-5, "observed order": 0.001},
+)
+RUN = Results("here", {ROW.id: ROW}, "abc")
+KEPT = baseline.update_baseline(None, [RUN], "first")
+OTHER = Row("file.py::test[b]", "top", "gauss", Status.PASSED, "heyoka==7", "other", {"rate error max": 1.0})
+
+
+def changed(row=ROW, **changes):
+    """The run with its row changed; a change of `values` is merged into those it has."""
+    if "values" in changes:
+        changes["values"] = {**row.values, **changes["values"]}
+    return Results("here", {row.id: replace(row, **changes)}, "abc")
+
+
 BRICK = scene("brick_flip:t_end=1")
-MACHINE = "this one"
-METHODS = ("reduced", "reduced:order=4", "mujoco:Euler")
-SECOND, FOURTH, ENGINE = METHODS
+METHODS = SECOND, FOURTH, ENGINE = "reduced", "reduced:order=4", "mujoco:Euler"
 
 
-COMPILE_REFERENCE = yardstick.compile_reference
-STEP, TURN = 1e-7, 2e-8
-"""Time, s, of a step of any method and of a turn of the yardstick on a clock that only counts them."""
-
-
-def row_of(name, instead=None):
-    """The row of a method; with `instead`, measured with another one that goes by its name."""
+def measured(name, instead=None):
+    """The row of a method on the brick; with `instead`, measured with another one that goes by its name."""
     point = points.Point(BRICK, method(name))
-    labels = point.labels
     found = points.measure(replace(point, method=instead or point.method))
     values, spreads = ({key: getattr(each, kind) for key, each in found.items()} for kind in ("value", "spread"))
-    ratio = yardstick.time_ratio(instead or point.method, BRICK, BRICK.dt) if name == SECOND and not instead else None
-    return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads, ratio)
+    labels = point.labels
+    return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads)
 
 
-def with_row(untouched, name, **changes):
-    """The results with one row changed; a change of `values` is merged into those it has."""
-    (id,) = (id for id, row in untouched.rows.items() if row.method == name)
-    row = untouched.rows[id]
-    changes["values"] = {**row.values, **changes.get("values", {})}
-    return replace(untouched, rows={**untouched.rows, id: replace(row, **changes)})
+@cache
+def untouched():
+    return {name: measured(name) for name in METHODS}
 
 
-def failures(kept, found, times="required"):
-    """The violations as (measure, method), and their text."""
-    verdict = compare.judge(kept, found, times)
+@cache
+def accepted():
+    """The baseline that accepts the untouched run."""
+    return baseline.update_baseline(None, [run()], "the first one")
+
+
+def run(**changes):
+    """The untouched run; `name={...}` merges values into those of a method."""
+    rows = [replace(row, values={**row.values, **changes.get(name, {})}) for name, row in untouched().items()]
+    return Results("here", {row.id: row for row in rows})
+
+
+def failures(kept, found):
+    """The violations as (measure, method)."""
+    verdict = compare.judge(kept, found)
     assert verdict.passed == (not verdict.violations)
-    return {(each.measure, each.method) for each in verdict.violations}, str(verdict)
+    return {(each.measure, each.method) for each in verdict.violations}

@@ -1,5 +1,6 @@
-"""Each way in which a run can be worse than its baseline, planted, and the failure that must name it."""
+"""Each way in which a run can be worse than its baseline, planted, and the violation that must name it."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -8,12 +9,27 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.benchmarks.gate import baseline, compare
+from conservative.benchmarks.gate import baseline, compare, results
 from conservative.benchmarks.gate.results import Results, Status
 from conservative.benchmarks.suite import points
 from conservative.registry import method, scene
 
-from .gate_rows import ENGINE, FOURTH, MACHINE, METHODS, SECOND, STEP, TURN, failures, row_of, with_row
+from .gate_rows import (
+    ENGINE,
+    FOURTH,
+    KEPT,
+    METHODS,
+    OTHER,
+    ROW,
+    RUN,
+    SECOND,
+    accepted,
+    changed,
+    failures,
+    measured,
+    run,
+    untouched,
+)
 
 
 @dataclass(frozen=True)
@@ -33,102 +49,125 @@ class NoGyroscopicTerm(cv.Method):
         return lambda: cv.Trajectory(scene, grid.t, scene.R_WB0 @ turns, np.tile(w, (len(turns), 1)), self.label)
 
 
-def test_an_untouched_run_passes(kept, untouched):
-    again = [row_of(name) for name in METHODS]
-    assert again[0].time_ratio == pytest.approx(STEP / TURN, rel=1e-12)
-    assert failures(kept, Results(MACHINE, {row.id: row for row in again}))[0] == set()
+# ---------------------------------------------------------------------------------------------------------- measured rows
 
 
-def test_one_more_newton_iteration(kept, untouched):
-    row = row_of(SECOND, method("reduced:tol=1e-40"))
-    found, text = failures(kept, with_row(untouched, SECOND, values=row.values))
-    assert ("iterations", SECOND) in found  # measured 299 instead of 204 in 100 steps
-    (single,) = (each.values["iterations"] + 1 for each in untouched.rows.values() if each.method == SECOND)
-    assert failures(kept, with_row(untouched, SECOND, values={"iterations": single}))[0] == {("iterations", SECOND)}
-    assert "--update" in text
+def test_an_untouched_run_passes():
+    again = {row.id: row for row in map(measured, METHODS)}
+    assert failures(accepted(), Results("elsewhere", again)) == set()
 
 
-def test_order_3_8_instead_of_4(kept, untouched):
-    found, text = failures(kept, with_row(untouched, FOURTH, values={"observed order": 3.8}))
-    assert found == {("observed order", FOURTH)}
-    assert "is 3.8, allowed at least 3.9" in text
+def test_one_more_newton_iteration():
+    more = measured(SECOND, method("reduced:tol=1e-40")).values
+    assert ("iterations", SECOND) in failures(accepted(), run(**{SECOND: more}))  # measured 299 instead of 204 in 100 steps
+    single = {"iterations": untouched()[SECOND].values["iterations"] + 1}
+    assert failures(accepted(), run(**{SECOND: single})) == {("iterations", SECOND)}
 
 
-def test_energy_drift_10_times_larger(kept, untouched):
-    for name in METHODS:
-        (drift,) = (row.values["energy drift max"] for row in untouched.rows.values() if row.method == name)
-        found, _ = failures(kept, with_row(untouched, name, values={"energy drift max": 10 * drift}))
-        assert found == {("energy drift max", name)}
+def test_energy_drift_10_times_larger():
+    for name, row in untouched().items():
+        worse = {"energy drift max": 10 * row.values["energy drift max"]}
+        assert failures(accepted(), run(**{name: worse})) == {("energy drift max", name)}
 
 
-def test_a_negative_control_in_place_of_the_method(kept, untouched):
-    row = row_of(SECOND, NoGyroscopicTerm())
-    found, _ = failures(kept, with_row(untouched, SECOND, values=row.values))
+def test_a_negative_control_in_place_of_the_method():
+    found = failures(accepted(), run(**{SECOND: measured(SECOND, NoGyroscopicTerm()).values}))
     assert {("attitude error max", SECOND), ("rate error max", SECOND), ("momentum drift max", SECOND)} <= found
 
 
-@pytest.mark.parametrize("measure", ["attitude error max", "energy drift max", "iterations", "observed order"])
-def test_nan(kept, untouched, measure):
-    assert failures(kept, with_row(untouched, SECOND, values={measure: float("nan")}))[0] == {(measure, SECOND)}
+def test_every_measure_of_a_row_is_gated():
+    for name, value in untouched()[SECOND].values.items():
+        worse = {name: value - 1 if name == baseline.ORDER else value + 1}
+        assert failures(accepted(), run(**{SECOND: worse})) == {(name, SECOND)}
+        assert failures(accepted(), run(**{SECOND: {name: math.nan}})) == {(name, SECOND)}
 
 
-def test_a_time_that_is_nan_or_missing(kept, untouched):
-    for ratio in (float("nan"), None):
-        assert failures(kept, with_row(untouched, SECOND, time_ratio=ratio))[0] == {("time ratio", SECOND)}
+def test_order_3_8_instead_of_4():
+    assert failures(accepted(), run(**{FOURTH: {"observed order": 3.8}})) == {("observed order", FOURTH)}
 
 
-def test_a_measure_that_is_gone(kept, untouched):
-    (row,) = (row for row in untouched.rows.values() if row.method == SECOND)
-    values = {name: value for name, value in row.values.items() if name != "energy drift max"}
-    found = replace(untouched, rows={**untouched.rows, row.id: replace(row, values=values)})
-    assert failures(kept, found)[0] == {("energy drift max", SECOND)}
-
-
-def test_a_row_removed_or_renamed(kept, untouched):
-    (id,) = (id for id, row in untouched.rows.items() if row.method == FOURTH)
-    rows = {other: row for other, row in untouched.rows.items() if other != id}
-    found, text = failures(kept, replace(untouched, rows=rows))
-    assert found == {("row", FOURTH)}
-    assert "was passed, is missing" in text
-    renamed = replace(untouched, rows={**rows, "other": replace(untouched.rows[id], id="other")})
-    found, text = failures(kept, renamed)
-    assert found == {("row", FOURTH)}
-    assert "is renamed other" in text
-    assert "note: unbaselined: other" in text
-
-
-@pytest.mark.parametrize("status", ["skipped", "failed", "error", "xfailed"])
-def test_a_row_that_did_not_pass(kept, untouched, status):
-    found, text = failures(kept, with_row(untouched, SECOND, status=Status(status)))
-    assert found == {("row", SECOND)}
-    assert f"was passed, is {status}" in text
-
-
-def test_an_engine_of_another_version(kept, untouched):
-    found, text = failures(kept, with_row(untouched, ENGINE, engine="mujoco==3.9.9/Euler"))
-    assert found == {("engine version", ENGINE)}
-    assert "is mujoco==3.9.9/Euler" in text
-
-
-def test_another_definition(kept, untouched):
+def test_the_definition_changes_with_the_motion_and_the_engine_with_its_version():
     longer = points.Point(scene("brick_flip:t_end=2"), method(SECOND)).definition
-    assert failures(kept, with_row(untouched, SECOND, definition=longer))[0] == {("definition", SECOND)}
+    assert longer != untouched()[SECOND].definition
+    assert untouched()[ENGINE].engine.startswith("mujoco==")
 
 
-def test_a_baseline_of_a_foreign_machine(kept, untouched):
-    elsewhere = replace(untouched, machine="another")
-    found, text = failures(kept, elsewhere)
-    assert found == {("foreign machine", "all")}
-    assert "was this one, is another" in text
-    found, text = failures(kept, elsewhere, "known")
-    assert found == set()
-    assert compare.judge(kept, elsewhere).passed  # which is the default
-    assert "note: unbaselined machine" in text
-    worse = replace(with_row(untouched, SECOND, values={"rate error max": 1.0}), machine="another")
-    assert failures(kept, worse, "known")[0] == {("rate error max", SECOND)}  # all but time is gated everywhere
-    both = baseline.update_baseline(kept, [elsewhere], "a second machine")
-    assert failures(both, elsewhere)[0] == failures(both, untouched)[0] == set()
+# ----------------------------------------------------------------------------------------------------- rows with chosen values
 
 
-def test_a_baseline_without_rows(untouched):
-    assert failures(baseline.Baseline({}, []), untouched)[0] == {("rows", "all")}
+def test_the_same_results_pass_and_values_at_their_limit():
+    assert compare.judge(KEPT, RUN) == compare.Verdict((), (), 1)
+    assert str(compare.judge(KEPT, RUN)) == "gate: passed, 1 rows, 0 violations"
+    assert compare.judge(KEPT, changed(values={"energy drift max": 1e-3 + 5e-5, "observed order": 1.95})).passed
+
+
+def test_a_violation_has_the_value_before_and_now_and_the_limit():
+    verdict = compare.judge(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
+    assert [tuple(vars(each).values()) for each in verdict.violations] == [
+        ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
+        ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
+    ]
+    assert "| observed order | brick | reduced | 2 | 1.9 |" in verdict.markdown_text()
+    assert "--update" in str(verdict)
+
+
+TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (replace(RUN, rows={}), ("row", "passed", "missing", "passed")),
+        (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
+        (replace(RUN, rows=TWO_NEW), ("row", "passed", "renamed new", "passed")),
+        *(
+            (changed(status=Status(each)), ("row", "passed", each, "passed"))
+            for each in ("skipped", "failed", "error", "xfailed")
+        ),
+        (changed(definition="new"), ("definition", "hash", "new", "hash")),
+        (changed(engine="mujoco==9"), ("engine version", "", "mujoco==9", "")),
+    ],
+)
+def test_rows_that_cannot_be_compared(found, expected):
+    (each,) = compare.judge(KEPT, found).violations
+    assert (each.measure, each.was, each.now, each.allowed) == expected
+    assert (each.scene, each.method) == ("brick", "reduced")
+
+
+def test_a_measure_that_is_gone():
+    values = {name: value for name, value in ROW.values.items() if name != "energy drift max"}
+    gone = Results("here", {ROW.id: replace(ROW, values=values)})
+    assert failures(KEPT, gone) == {("energy drift max", "reduced")}
+
+
+def test_a_row_that_is_new_is_a_note_if_it_passed():
+    both = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", method="new")})
+    assert compare.judge(KEPT, both).notes == ("unbaselined: new",)
+    failed = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", status=Status.FAILED)})
+    assert compare.judge(KEPT, failed) == compare.Verdict((), (), 1)
+
+
+def test_a_baseline_without_rows_is_a_violation():
+    assert failures(baseline.Baseline({}, []), RUN) == {("rows", "all")}
+
+
+@pytest.mark.parametrize(("drift", "failed"), [(0.36, False), (1.0, False), (1.01, True), (2.7e11, True), (math.nan, True)])
+def test_a_run_that_ran_away_is_a_failure_whatever_the_baseline_is(drift, failed):
+    values = {results.ENERGY_DRIFT: drift}
+    row = replace(OTHER, values=values)
+    unknown = compare.judge(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
+    assert [each.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
+    as_before = baseline.BaselineRow(
+        "top", "gauss", row.engine, "other", {results.ENERGY_DRIFT: baseline.Allowed(drift, 0, 1, 3e11)}
+    )
+    known = compare.judge(baseline.Baseline({row.id: as_before}, []), Results("here", {row.id: row}))
+    assert known.passed != failed
+
+
+def test_a_gain_as_large_as_a_failure_is_noted():
+    better = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 6e-5, "observed order": 2.06}))
+    assert better.passed
+    assert [note.partition(",")[0] for note in better.notes] == ["better: energy drift max", "better: observed order"]
+    same = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 4e-5, "observed order": 2.04}))
+    assert not same.notes
+    assert not compare.judge(KEPT, changed(definition="new", values={"energy drift max": 0.0})).notes
