@@ -119,6 +119,7 @@ def cells_with_outputs(notebook):
     return [cell.id for cell in code_cells(notebook) if cell.outputs or cell.execution_count]
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbformat.validate(notebook)

@@ -6,6 +6,8 @@ import pytest
 
 from .environments import Environment
 
+pytestmark = pytest.mark.slow
+
 OWN = """
 def test_own():
     import benchmarks, references, reports

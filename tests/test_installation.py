@@ -29,6 +29,7 @@ def nearest(file, links):
     return max((link for link in links if file.is_relative_to(link)), key=lambda link: len(link.parts))
 
 
+@pytest.mark.slow
 def test_a_wheel_out_of_the_sdist_has_every_module_once_below_conservative(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -38,6 +39,7 @@ def test_a_wheel_out_of_the_sdist_has_every_module_once_below_conservative(wheel
     assert "conservative/py.typed" in names
 
 
+@pytest.mark.slow
 def test_the_sdist_has_no_doubles(sdist):
     with tarfile.open(sdist) as archive:
         members = archive.getmembers()
@@ -61,11 +63,13 @@ def requirements(wheel):
     return found
 
 
+@pytest.mark.slow
 def test_five_packages_are_required_and_no_more(requirements):
     assert requirements[""] == LEAN
     assert set(requirements) == {"", "engines", "environments", "report", "ensembles", "cluster", "gate", "all", "dev"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_what_an_extra_is_checked_for_is_what_it_brings(requirements, extra):
     assert set(EXTRAS[extra]) == {IMPORTED_AS.get(package, package) for package in requirements[extra]}
@@ -88,6 +92,7 @@ def test_a_room_has_one_name(room):
     assert (code, out.strip()) == (0, f"conservative.{room}"), error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ROOMS)
 def test_the_package_of_another_project_comes_first(room, tmp_path):
     (tmp_path / room).mkdir()
@@ -131,6 +136,7 @@ def test_a_module_under_two_names_would_be_seen():
 PATHS = ["benchmarks/suite/test_speed.py", "benchmarks"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS)
 def test_the_suite_has_one_name_whatever_its_path_is(path):
     command = [sys.executable, "-m", "pytest", "--benchmark", "--collect-only", "-q", "-k", "lagrange_top-lame", path]

@@ -77,6 +77,7 @@ COMMANDS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "without", "extra"), COMMANDS, ids=[row[0] or "conservative" for row in COMMANDS])
 def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, extra):
     code, out, error = run_python(REFUSE + LOOK + COMMAND, without, *arguments.split())
@@ -87,6 +88,7 @@ def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, ex
     assert f"pip install 'conservative-rotation[{extra}]'" in error
 
 
+@pytest.mark.slow
 def test_the_gate_needs_no_table_library():
     gate = "import conservative.benchmarks.suite.test_speed, conservative.reports.cli.gate, conservative.reports.cli.main"
     code, _, error = run_python(REFUSE + gate, "pandas,altair,vl_convert,jinja2,rich,mujoco,pinocchio")

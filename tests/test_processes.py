@@ -45,6 +45,7 @@ def test_a_program_can_be_interrupted(start, number):
     assert process.wait(60) == -number
 
 
+@pytest.mark.slow
 def test_a_program_can_be_interrupted_where_a_shell_ignores_signals(start):
     # A script starts background jobs with SIGINT ignored, nohup with SIGHUP ignored; both are inherited.
     inner = f"{sys.executable} -m pytest -n0 -q -k test_a_program_can_be_interrupted[ {shlex.quote(__file__)}"

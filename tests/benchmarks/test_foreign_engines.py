@@ -33,6 +33,7 @@ def question(*methods):
     return Question(registry.scene("brick_flip"), 1e-6, 6.0, methods, (), 1.0, time_limit=15.0)
 
 
+@pytest.mark.slow
 def test_a_recommendation_survives_engines_that_hang_or_end_their_process():
     found = recommend(question(Harmful("hang"), Harmful("abort"), Slow(), Fast()))
     by_line = {advice.line: advice for advice in found.advice}
@@ -71,6 +72,7 @@ def test_the_engines_are_found_where_they_are_installed(installed):
     assert "foreign_fast" not in {method.name for method in list_engines()}
 
 
+@pytest.mark.slow
 def test_no_test_depends_on_which_engines_are_installed(installed):
     status, text = python(installed, "-m", "pytest", "-n0", "-q", "-p", "no:cacheprovider", *DEPENDENT)
     assert status == 0, text

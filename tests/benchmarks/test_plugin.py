@@ -50,6 +50,7 @@ def test_the_plugin_imports_nothing_of_ours():
     assert set(done.stdout.split()) == above | {"conservative.version"}
 
 
+@pytest.mark.slow
 def test_without_the_option_other_projects_see_nothing(other):
     code, text = run(other)
     assert code == 0
@@ -57,6 +58,7 @@ def test_without_the_option_other_projects_see_nothing(other):
     assert "accuracy beside time" not in text
 
 
+@pytest.mark.slow
 def test_without_the_option_the_suite_is_skipped_and_says_why(other):
     code, text = run(other, SUITE, "-rs", "-k", "brick_flip-reduced-dt")
     assert code == 0
@@ -64,6 +66,7 @@ def test_without_the_option_the_suite_is_skipped_and_says_why(other):
     assert "runs with --benchmark" in text
 
 
+@pytest.mark.slow
 def test_alone_it_runs_the_suite(other):
     code, text = run(other, "--benchmark", "--collect-only", "-q")
     assert code == 0
@@ -71,6 +74,7 @@ def test_alone_it_runs_the_suite(other):
     assert "test_other" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [("--benchmark", "checks"), ("checks", "--benchmark")], ids=["before", "after"])
 def test_with_a_path_it_runs_what_is_there(other, options):
     code, text = run(other, *options)
@@ -88,6 +92,7 @@ def test_accuracy_stands_beside_the_times(other):
     assert float(numbers[2]) == 1.25e-9
 
 
+@pytest.mark.slow
 def test_options_of_pytest_benchmark_keep_their_meaning(other):
     assert "1 passed, 1 skipped" in run(other, "--benchmark-only")[1]
     assert "1 passed, 1 skipped" in run(other, "--benchmark-skip")[1]
@@ -98,6 +103,7 @@ def test_options_of_pytest_benchmark_keep_their_meaning(other):
     assert found["extra_info"] == {"label": "mine", "error": 1.25e-9}
 
 
+@pytest.mark.slow
 def test_without_pytest_benchmark_the_option_says_what_is_missing(other):
     arguments = [sys.executable, "-m", "pytest", "-p", "no:benchmark", "-k", "plain", "checks"]
     without = subprocess.run(arguments, cwd=other, capture_output=True, text=True, timeout=120, check=False)
@@ -107,6 +113,7 @@ def test_without_pytest_benchmark_the_option_says_what_is_missing(other):
     assert "pip install 'conservative-rotation[gate]'" in asked.stderr
 
 
+@pytest.mark.slow
 def test_under_workers_timing_is_off_and_says_so(other):
     code, text = run(other, "--benchmark", "-n1", "checks")
     assert code == 0

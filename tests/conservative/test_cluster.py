@@ -54,6 +54,7 @@ def run(**options):
     return cv.integrate_many(cv.scenes.lagrange_top(), w_WB_B0=w, **given, **options)
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_loses_nothing_and_nothing_comes_twice(tmp_path, monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 1)
     alone, done = run(), []

@@ -153,6 +153,7 @@ run(sys.argv[2])
 """
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_to_the_same_bytes(whole, tmp_path):
     place = tmp_path / "a.zarr"
     command = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(place)]

@@ -17,6 +17,8 @@ from conservative.references.environments.lock import Source
 
 from ..environments import ROOT, variables
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def cache(no_environments):

@@ -53,6 +53,7 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.rglob("*") if path.name != "stdout"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder, tmp_path_factory):
     limit, words, arguments = COMMANDS[command]

@@ -16,6 +16,8 @@ from conservative.reports.run.measure import measure
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 
+pytestmark = pytest.mark.slow
+
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
 TIMES = ("s", "s/s")
 HANG = 600

@@ -12,6 +12,8 @@ from conservative.reports.cli.main import main
 from ... import environments
 from .projects import commit, write_project
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = environments.ROOT / "tests" / "example_package" / "example_integrator.py"
 ENTRY = "[conservative.methods]\\nexample = example_integrator:Example\\n"
 STEP = "middle = w + h / 2 * inverse @ (hat(J @ w) @ w)"

@@ -11,6 +11,8 @@ from conservative.references.environments.lock import Source
 from ...references.local_wheels import write_numpy, write_wheel
 from .projects import commit, git, write_project
 
+pytestmark = pytest.mark.slow
+
 NAME, MODULE = "made-up-integrator", "conservative"
 """Its module is called as the package that environments of projects have to have."""
 

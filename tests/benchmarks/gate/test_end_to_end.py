@@ -43,6 +43,7 @@ PLANTED = (
 )
 
 
+@pytest.mark.slow
 def test_from_end_to_end(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = -p no:cacheprovider\n")
     suite = tmp_path / "test_other.py"
@@ -81,6 +82,7 @@ def run(folder, *options):
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "reason"), [(("--benchmark", "-n1"), "-n0"), ((), "together with --benchmark")], ids=["workers", "alone"]
 )
