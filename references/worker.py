@@ -209,8 +209,8 @@ def _block_interrupts() -> Iterator[None]:
 def serve(descriptor: int, life: int) -> None:
     """Do one piece of work after the other, as messages from the parent say, until the parent is gone.
 
-    The parent holds the other end of the pipe `life`. When that closes, the system sends SIGIO, which ends this process whatever
-    it does.
+    The parent holds the other end of the pipe `life`. When that closes, the system sends SIGIO, which ends this process
+    whatever it does.
     """
     with suppress(ImportError, OSError, AttributeError):  # not every system has it
         import fcntl
