@@ -184,23 +184,17 @@ def write_store(path: str | Path, label: str, bodies: Bodies, grid: Grid, resume
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
     """
-    require_extra("path", "ensembles")
-    place, record = Path(path).absolute(), describe_run(label, bodies, grid)
-    if is_new(place):
+    place, record, there = Path(path).absolute(), describe_run(label, bodies, grid), find_ensemble(path, resume)
+    if there is None:
         try:
             with files.temporary(place, _make_folder) as (fresh, _):
                 _create(fresh, record, bodies, grid)
                 fresh.rename(place)
         except OSError as error:
             raise NotWritten("path", place, error, NEW_FOLDER) from None
-    else:
-        there = read_record(place)
-        if not resume:
-            got = f"{str(place)!r}, where an ensemble is"
-            raise BadInput("path", got, "a new folder, or resume=True to go on with this one")
-        if differing := _list_differences(there, record):
-            got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differing)}"
-            raise BadInput("path", got, "one of the same run")
+    elif differing := _list_differences(there, record):
+        got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differing)}"
+        raise BadInput("path", got, "one of the same run")
     handle = os.open(place, os.O_RDONLY)
     try:
         _lock(place, handle)
@@ -211,17 +205,37 @@ def write_store(path: str | Path, label: str, bodies: Bodies, grid: Grid, resume
         files.release(handle)
 
 
-def is_new(place: Path) -> bool:
-    """Return whether there is nothing, or an empty folder. Raise `BadInput` for a file."""
+def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
+    """Return the attributes of the ensemble in a folder to write to, None for a folder that is empty or not there yet.
+
+    Raises
+    ------
+    BadInput
+        There is an ensemble and `resume` is False, or something else.
+    NotWritten
+        The folder cannot be made.
+    MissingExtra
+        Zarr, of the extra `ensembles`, is not installed.
+    """
+    require_extra("path", "ensembles")
+    place = Path(path).absolute()
     try:
         there = os.listdir(place)  # noqa: PTH208  # which says whether it is a folder, too
-    except FileNotFoundError:
-        return True
+    except FileNotFoundError as error:
+        if not place.parent.is_dir():
+            raise NotWritten("path", place, error, NEW_FOLDER) from None
+        return None
     except NotADirectoryError:
         raise BadInput("path", f"{str(place)!r}, a file", NEW_FOLDER) from None
     except (OSError, ValueError) as error:
         raise NotWritten("path", place, error, NEW_FOLDER) from None
-    return not there
+    if not there:
+        return None
+    found = read_record(place)
+    if not resume:
+        got = f"{str(place)!r}, where an ensemble is"
+        raise BadInput("path", got, "a new folder, or resume=True to go on with this one")
+    return found
 
 
 def _lock(place: Path, handle: int) -> None:

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from conservative.errors import require_extra
+from conservative.errors import BadInput, require_extra
 
 from . import completion
-from .options import Count, FilePath, epilog, split_list
+from .options import Count, FilePath, OutputCommand, OutputFile, epilog, split_list
 
-if TYPE_CHECKING:
-    from ..run.sweep import Sweep
+SVG_MARK = "<!-- Written by conservative -->"
+"""The first line of pictures (`reports.charts.style.SVG_MARK`, which --help has no time to import)."""
 
 
 @click.command(
-    short_help="Integrate many random starts of one scene.",
+    cls=OutputCommand,
+    short_help="Integrate many random initial states of one scene.",
     epilog=epilog(
-        "conservative sweep my_body.toml --starts 100000 --spread attitude=5deg,rate=2% --out sweep.zarr",
+        "conservative sweep my_body.toml --starts 100000 --spread attitude=5deg,rate=2% --picture sweep.svg",
         "conservative sweep lagrange_top --spread inertia=1% --spread potential.weight=2% --dt 0.001 --json",
-        "conservative sweep brick_flip --starts 1000 --spread attitude=any --error 1e-6",
+        "conservative sweep brick_flip --starts 1000 --spread attitude=any --error 1e-6 --out sweep.zarr",
         "conservative sweep my_body.toml --starts 1e6 --spread rate=any --out big.zarr --scheduler tcp://host:8786",
     ),
 )
 @click.argument("scene", shell_complete=completion.scenes)
-@click.option("--starts", type=Count(), default=1000, show_default=True, metavar="N", help="How many.")
+@click.option("--starts", type=Count(), default=1000, show_default=True, metavar="N", help="Number of bodies.")
 @click.option(
     "--spread",
     multiple=True,
@@ -36,74 +37,68 @@ if TYPE_CHECKING:
     shell_complete=completion.spreads,
     help="Standard deviations: attitude=5deg or any; rate=0.1 (rad/s), 5deg/s, 10% or any; inertia=1%; potential.weight=2%.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Of the random starts.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")
 @click.option("--method", "-m", shell_complete=completion.methods, help="Name, with settings.  [default: by the scene]")
 @click.option("--dt", type=float, help="Step, s.  [default: the scene's]")
 @click.option("--error", type=float, help="Attitude error over the run, rad, instead of a method and a step.")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option(
-    "--samples", type=click.IntRange(2), default=51, show_default=True, metavar="M", help="Samples kept of each, at most."
+    "--samples",
+    type=click.IntRange(2),
+    default=6,
+    show_default=True,
+    metavar="M",
+    help="Samples kept of each body, at most: 2 are the initial and the final state. Each takes 96 bytes.",
 )
-@click.option("--out", type=FilePath(), help="Folder for the samples (Zarr); beside it, a picture with the ending .svg.")
-@click.option("--resume", is_flag=True, help="Do what is not yet in the folder --out; all else as it was.")
+@click.option("--out", type=FilePath(), help="Write the samples to a new folder (Zarr).")
+@click.option("--resume", is_flag=True, help="Compute what is missing or damaged in the folder --out; all else as it was.")
+@click.option("--picture", type=OutputFile(SVG_MARK), help="Draw how attitudes spread and drifts are distributed (SVG).")
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="[default: one a processor]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 @click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
-def sweep(scene: str, starts: int, spread: tuple[str, ...], out: Path | None, as_json: bool, **options: Any) -> None:
-    """Integrate many random starts, and bodies, about those of SCENE, and show how they spread, drifted and ended.
+def sweep(
+    scene: str,
+    starts: int,
+    spread: tuple[str, ...],
+    out: Path | None,
+    picture: Path | None,
+    scheduler: str | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Integrate many random initial states, and bodies, near those of SCENE, and show how they spread, drifted and ended.
 
-    Starts are normally distributed: attitudes turned by a rotation vector, rates and numbers of the potential changed, each
-    component by the standard deviation given; of the inertia, the second moments of mass. The same seed gives the same starts.
-    A percentage is relative to the scene's value, of a vector to its length.
+    Deviations are normally distributed: attitudes are turned by a rotation vector; rates, numbers of the potential and second
+    moments of mass are changed, each component by the standard deviation given. A percentage is relative to the scene's value,
+    for a vector to its length. The same seed gives the same initial states.
     """
     require_extra("conservative sweep", "report")
-    from ..run import sweep as work
-    from ..tables.sweep import json_text, summary_text
-
-    varied = work.read_spread(split_list("spread", spread))
-    with ExitStack() as stack:
-        picture = stack.enter_context(_open_picture(out))
-        client = stack.enter_context(_connect(options.pop("scheduler")))
-        planned = work.plan(scene, starts, varied, path=out, client=client, **options)
-        summary = _run(planned, picture)
-    summary |= {"out": str(out) if out else None, "picture": str(work.picture_path(out)) if out else None}
-    click.echo(json_text(summary) if as_json else summary_text(summary))
-    if summary["failures"]:
-        raise click.ClickException(_failed_text(summary))
-
-
-def _open_picture(out: Path | None) -> AbstractContextManager[IO[str] | None]:
-    """Return the file of the picture: a place that cannot be written is an error before any work."""
     from conservative.files import text_file
-
-    from ..run.sweep import picture_path
-
-    return nullcontext() if out is None else text_file(picture_path(out), "out")
-
-
-def _connect(address: str | None) -> AbstractContextManager[Any]:
-    if address is None:
-        return nullcontext()
     from conservative.integration.cluster import open_client
 
-    return open_client(address)
-
-
-def _run(planned: Sweep, picture: IO[str] | None) -> dict[str, Any]:
-    """Return the summary of a sweep, and write its picture."""
-    from ..charts.sweep import svg
-    from ..run.sweep import run_sweep, summarize
+    from ..charts.style import apply_style, svg_text
+    from ..run import sweep as work
     from ..terminal.progress import progress
 
-    with progress() as step:
-        result = run_sweep(planned, step)
-        step(1.0, "summary and picture")
-        if picture is not None:
-            picture.write(svg(result.ensemble))
-        return summarize(planned, result)
-
-
-def _failed_text(summary: dict[str, Any]) -> str:
-    n, first = summary["bodies"] - summary["outcomes"]["ok"], summary["failures"][0]
-    failed = f"{n:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
-    return f"{summary['label']} on {summary['scene']}: {failed}"
+    if picture is not None and picture == out:
+        raise BadInput("picture", repr(str(picture)), "another name than that of the folder --out")
+    varied = work.read_spread(split_list("spread", spread))
+    with ExitStack() as stack:
+        # first, as a place that cannot be written is an error before any work
+        drawing = stack.enter_context(text_file(picture, "picture")) if picture else None
+        client = stack.enter_context(open_client(scheduler)) if scheduler is not None else None
+        planned = work.plan(scene, starts, varied, path=out, client=client, **options)
+        if out is not None:
+            click.echo(f"Writing {planned.size} to {out}: {starts:,} bodies, {planned.samples} samples each", err=True)
+        with progress() as step:
+            result = work.run_sweep(planned, step)
+            step(1.0, "summary and picture")
+            if drawing is not None:
+                drawing.write(svg_text(apply_style(result.ensemble.plot())))
+            summary = work.summarize(planned, result)
+    summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
+    click.echo(work.json_text(summary) if as_json else work.summary_text(summary))
+    if summary["failures"]:
+        n, first = summary["bodies"] - summary["outcomes"]["ok"], summary["failures"][0]
+        failed = f"{n:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
+        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {failed}")

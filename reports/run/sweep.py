@@ -1,107 +1,133 @@
-"""One sweep: many random starts of a scene, how they are run, and the summary of what they gave."""
+"""One sweep: many random initial states of a scene, integrated and summarized."""
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from conservative import registry
-from conservative.attitude import Array
 from conservative.check import MOST_STEPS, describe, positive_number
 from conservative.errors import AccuracyNotReached, BadInput, NotWritten, nearest
+from conservative.integration.blocks import SAMPLE_BYTES
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
 from conservative.integration.spread import spread
-from conservative.method import grid_for
+from conservative.integration.store import find_ensemble
+from conservative.method import Grid, grid_for
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 
 from ..tables.cells import finite_or_none, outcome_record
-from ..tables.sweep import rate_text
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
 _SPREAD = "what varies, and how, such as attitude=5deg, rate=2%, inertia=1% or potential.weight=2%"
 MOST_TIMES = 6
-"""Times at which a summary tells how far attitudes are apart."""
+"""Times at most at which a summary shows how far attitudes are apart."""
 MOST_FAILURES = 10
-"""Failures that a summary lists."""
+"""Failures that a summary lists at most."""
 Step = Callable[[float, str], None]
-_WORDS = {"path": "out", "sample_every": "samples", "client": "scheduler", "n": "starts"}
-"""Arguments of functions, and the options that they come from."""
-_FOLDER = "a folder that is not there yet, such as sweep.zarr; the picture goes beside it, into sweep.svg"
+Summary = dict[str, Any]
+_OPTIONS = {"path": "out", "sample_every": "samples", "client": "scheduler", "n": "starts"}
+"""Arguments of `integrate_many` and `spread`, and the options that they come from."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What is asked for: n starts of a scene, spread as `spread` has it, and how they are integrated."""
+    """What `integrate_many` is given: a scene, initial states and bodies, and settings; and the options that they come from."""
 
     scene: Scene
-    n: int
-    spread: Mapping[str, Any]
-    seed: int
+    starts: Mapping[str, Any]
     settings: Mapping[str, Any]
-    steps: int | None = None
-    """Of each body, where that is known before the run."""
+    spread: Mapping[str, str]
+    seed: int
+    samples: int
+    steps: int | None
+    """Steps of each body, if they are known before the run."""
+
+    @property
+    def size(self) -> str:
+        """The size of all samples, such as `58 MB`."""
+        size = len(self.starts["R_WB0"]) * self.samples * SAMPLE_BYTES
+        power = min(max(0, int(math.log10(size) // 3)), 4)
+        return f"{size / 1000**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
 
 
-def read_spread(items: Iterable[str]) -> dict[str, Any]:
-    """Return the arguments that the function `spread` takes for texts such as `attitude=5deg` and `potential.weight=2%`.
+def read_spread(items: Iterable[str]) -> dict[str, str]:
+    """Return the quantities and their spreads from texts such as `attitude=5deg` and `potential.weight=2%`.
 
     Raises
     ------
     BadInput
-        A text says nothing of the kind, or a quantity stands there twice.
+        A text is not of that form, or a quantity is named twice.
     """
-    found: dict[str, Any] = {}
-    parameters: dict[str, str] = {}
+    found: dict[str, str] = {}
     for item in items:
         name, _, value = (part.strip() for part in item.partition("="))
         if not value:
             raise BadInput("spread", repr(item), _SPREAD)
-        part, key = (parameters, name.removeprefix(FIELD)) if name.startswith(FIELD) else (found, name)
-        if part is found and name not in KINDS:
+        if name not in KINDS and not name.startswith(FIELD):
             raise BadInput("spread", repr(name), f"{nearest(name, KINDS)}, or {FIELD} and the name of a number of the field")
-        if key in part:
-            raise BadInput("spread", f"{item!r} after {name}={part[key]}", "each quantity once")
-        part[key] = value
-    return found | ({"parameters": parameters} if parameters else {})
+        if name in found:
+            raise BadInput("spread", f"{item!r} after {name}={found[name]}", "each quantity once")
+        found[name] = value
+    return found
 
 
-def plan(scene_name: str, n: int, varied: Mapping[str, Any], seed: int, **settings: Any) -> Sweep:
-    """Return what is asked for; the settings are those of `integrate_many`, and `samples`, how many of each body are kept.
+def plan(
+    scene_name: str,
+    n: int,
+    varied: Mapping[str, str],
+    seed: int,
+    samples: int,
+    dt: float | None,
+    **settings: Any,
+) -> Sweep:
+    """Return what is asked for; `varied` is as `read_spread` returns it, and the settings are those of `integrate_many`.
 
     Raises
     ------
     BadInput
-        A name or a number cannot be used.
+        A name, a number, a spread or the folder cannot be used; messages name options.
     """
-    scene = registry.scene(scene_name)
-    if settings["resume"] and settings["path"] is None:
+    scene, out, steps = registry.scene(scene_name), settings["path"], None
+    if settings["resume"] and out is None:
         raise BadInput("resume", "no folder", "--out, the folder of a sweep that was interrupted")
-    samples, dt, end = settings.pop("samples"), settings.pop("dt"), settings["t_end"]
     if settings["error"] is None:
-        grid = grid_for(scene, scene.dt if dt is None else dt, end, MOST_STEPS)
-        settings |= {"dt": grid.dt, "sample_every": math.ceil(grid.n_steps / (samples - 1))}
-        return Sweep(scene, n, varied, seed, settings, grid.n_steps)
-    if dt is not None:
+        grid = grid_for(scene, scene.dt if dt is None else dt, settings["t_end"], MOST_STEPS)
+        steps, every = grid.n_steps, math.ceil(grid.n_steps / (samples - 1))
+        settings |= {"dt": grid.dt, "sample_every": every}
+        samples = Grid(grid.dt, steps, every).n_samples
+    elif dt is not None:
         raise BadInput("dt", describe(dt), "none together with --error, which chooses the step")
-    end = scene.t_end if end is None else positive_number("t_end", end, "a finite duration above 0, s")
-    return Sweep(scene, n, varied, seed, settings | {"dt": end / (samples - 1)})
+    else:
+        end = settings["t_end"]
+        end = scene.t_end if end is None else positive_number("t_end", end, "a finite duration above 0, s")
+        settings["dt"] = end / (samples - 1)
+    plain = {name: value for name, value in varied.items() if not name.startswith(FIELD)}
+    parameters = {name.removeprefix(FIELD): value for name, value in varied.items() if name not in plain}
+    try:
+        starts = spread(scene, n, **plain, parameters=parameters, seed=seed)
+        if out is not None:
+            find_ensemble(out, settings["resume"])
+    except BadInput as error:
+        raise _in_options(error) from None
+    given = {name: value for name, value in settings.items() if value not in (None, False)}
+    return Sweep(scene, starts, given, varied, seed, samples, steps)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a sweep gave, the wall time that took, s, and the last that was heard of its progress, None of no work."""
+    """The ensemble of a sweep, the wall time of the run, s, and its last progress, None if there was nothing to do."""
 
     ensemble: Ensemble
     wall: float
@@ -109,43 +135,39 @@ class Result:
 
 
 def run_sweep(sweep: Sweep, step: Step) -> Result:
-    """Return what the sweep gives; `step` is called with the share that is done, and how fast, in words.
+    """Return the result of a sweep; `step` is called with the share that is done, and how fast, in words.
 
     Raises
     ------
     BadInput
-        A spread, a setting or a folder cannot be used; messages name options.
+        A setting or the folder cannot be used; messages name options.
     """
-    heard: list[ProgressOfMany] = []
+    last: ProgressOfMany | None = None
 
     def hear(progress: ProgressOfMany) -> None:
-        heard[:] = [progress]
+        nonlocal last
+        last = progress
         step(progress.done / progress.total, _progress_text(sweep, progress))
 
     step(0.0, "preparing: a first run compiles")
+    begin = perf_counter()
     try:
-        starts, settings = spread(sweep.scene, sweep.n, seed=sweep.seed, **sweep.spread), _given(sweep.settings)
-        begin = perf_counter()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AccuracyNotReached)  # the summary says so
-            found = integrate_many(sweep.scene, **starts, **settings, progress=hear)
+            found = integrate_many(sweep.scene, **sweep.starts, **sweep.settings, progress=hear)
     except KeyboardInterrupt as stop:
-        if heard and (text := _kept_text(sweep, heard[0])):
+        if last is not None and (text := _kept_text(sweep, last)):
             stop.add_note(text)
         raise
     except BadInput as error:
         raise _in_options(error) from None
-    return Result(found, perf_counter() - begin, heard[0] if heard else None)
-
-
-def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in settings.items() if value not in (None, False)}
+    return Result(found, perf_counter() - begin, last)
 
 
 def _in_options(error: BadInput) -> BadInput:
     """Return an error about an argument of a function as one about an option."""
     allowed = error.allowed.replace("resume=True", "--resume")
-    argument = _WORDS.get(error.argument, error.argument)
+    argument = _OPTIONS.get(error.argument, error.argument)
     if argument == "samples":
         allowed = allowed.replace("a larger one, or a path", "fewer samples or starts, or a folder for them, --out")
         return BadInput(argument, str(error.got).partition("for ")[2], allowed)
@@ -155,7 +177,7 @@ def _in_options(error: BadInput) -> BadInput:
 
 
 def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    """Return what is kept, should the run end now; nothing where it is not written to a folder."""
+    """Return what is kept, should the run end now; nothing if samples are not written to a folder."""
     out = sweep.settings.get("path")
     if out is None:
         return ""
@@ -167,30 +189,45 @@ def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
     return f"{rate_text(progress.rate)} bodies/s{steps}"
 
 
-def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
-    """Return what was run, how it ended, what drifted and how far attitudes are apart."""
-    found, last = result.ensemble, result.last
+def summarize(sweep: Sweep, result: Result) -> Summary:
+    """Return outcomes, drifts, how far attitudes are apart, and rates."""
+    found, last, choice = result.ensemble, result.last, result.ensemble.choice
     rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
     failed = sorted(found.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
+    drifts: dict[str, Any] = {}
+    for name, values in found.drifts.items():
+        body = -1 if np.isnan(values).all() else int(np.nanargmax(values))
+        largest = {"largest": float(values[body]), "body": body, "median": float(np.nanmedian(values))} if body >= 0 else None
+        drifts[name] = largest
+    samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
+    quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples).tolist()
+    names = [f"p{100 * share:g}" for share in QUANTILES]
+    error = None
+    if choice is not None:
+        reached, bodies = choice.reached, getattr(choice, "bodies", 1)
+        error = {"asked": choice.error, "estimate": choice.estimate, "reached": reached, "bodies": bodies}
     return {
         "scene": sweep.scene.name,
         "label": found.label,
         "bodies": len(found),
-        "spread": _flat(sweep.spread),
+        "spread": dict(sweep.spread),
         "seed": sweep.seed,
         "dt": found.grid.dt,
         "steps": found.grid.n_steps,
         "t_end": float(found.t[-1]),
-        "error": _error_of(found.choice),
+        "error": error,
         "samples": len(found.t),
         "outcomes": {"ok": len(found) - len(failed), **kinds},
         "failures": [
             {"body": i, "text": str(failure.outcome), **outcome_record(failure.outcome)}
             for i, failure in failed[:MOST_FAILURES]
         ],
-        "drift": {name: _largest(values) for name, values in found.drifts.items()},
-        "angle_from_mean": _angles(found),
+        "drift": drifts,
+        "angle_from_mean": [
+            {"t": float(found.t[i]), **dict(zip(names, map(finite_or_none, row), strict=True))}
+            for i, row in zip(samples, quantiles, strict=True)
+        ],
         "wall_time": result.wall,
         "found_before": last.found if last else len(found),
         "bodies_per_second": rate,
@@ -198,43 +235,48 @@ def summarize(sweep: Sweep, result: Result) -> dict[str, Any]:
     }
 
 
-def _error_of(choice: Any) -> dict[str, Any] | None:
-    """Return the error that was asked for, rad, and its estimate, and on how many bodies that rests."""
-    if choice is None:
-        return None
-    return {"asked": choice.error, "estimate": choice.estimate, "reached": choice.reached, "bodies": choice.bodies}
+def json_text(summary: Summary) -> str:
+    """Return the summary as JSON."""
+    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def _flat(varied: Mapping[str, Any]) -> dict[str, str]:
-    plain = {name: value for name, value in varied.items() if name != "parameters"}
-    return plain | {f"{FIELD}{name}": value for name, value in varied.get("parameters", {}).items()}
+def summary_text(summary: Summary) -> str:
+    """Return the summary for a person."""
+    lines = list(_lines(summary))
+    width = max(len(name) for name, _ in lines)
+    return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in lines)
 
 
-def _largest(values: Array) -> dict[str, Any] | None:
-    """Return the largest and the median drift (n,), and the number of the body that has the largest; None of none."""
-    if np.isnan(values).all():
-        return None
-    body = int(np.nanargmax(values))
-    return {"largest": float(values[body]), "body": body, "median": float(np.nanmedian(values))}
+def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
+    yield "scene", summary["scene"]
+    yield "method", summary["label"]
+    yield "bodies", f"{summary['bodies']:,}: " + ", ".join(f"{count:,} {kind}" for kind, count in summary["outcomes"].items())
+    yield "spread", ", ".join(f"{name}={value}" for name, value in summary["spread"].items()) + f"; seed {summary['seed']}"
+    run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
+    yield "run", run
+    if error := summary["error"]:
+        reached = "" if error["reached"] else ", which is not what was asked for"
+        estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
+        yield "error", f"{estimate}; asked: {error['asked']:g} rad{reached}"
+    bodies, steps = (rate_text(summary[key]) for key in ("bodies_per_second", "body_steps_per_second"))
+    before = f", {summary['found_before']:,} bodies were there before" if summary["found_before"] else ""
+    yield "time", f"{summary['wall_time']:.3g} s: {bodies} bodies/s, {steps} body-steps/s{before}"
+    for name, drift in summary["drift"].items():
+        text = "none: no body has it, or all failed"
+        if drift is not None:
+            text = f"{drift['largest']:.2e} at most (body {drift['body']}), median {drift['median']:.1e} (relative)"
+        yield f"drift of {name}", text
+    yield "angle from the mean", "median, and 5 to 95 % of the bodies"
+    for row in summary["angle_from_mean"]:
+        low, middle, high = ("-" if value is None else f"{math.degrees(value):.3g}°" for value in list(row.values())[1:])
+        yield f"  at t = {row['t']:.4g} s", f"{middle}, {low} to {high}"
+    yield from ((name, summary[name]) for name in ("out", "picture") if summary[name])
+    yield from ((f"body {failure['body']}", failure["text"]) for failure in summary["failures"])
 
 
-def _angles(found: Ensemble) -> list[dict[str, float | None]]:
-    """Return quantiles of angles from the mean attitude, rad, at a few times, s."""
-    samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
-    quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples)
-    names = [f"p{100 * share:g}" for share in QUANTILES]
-    return [
-        dict(zip(["t", *names], [float(found.t[i]), *map(finite_or_none, row)], strict=True))
-        for i, row in zip(samples, quantiles.tolist(), strict=True)
-    ]
-
-
-def picture_path(out: Path) -> Path:
-    """Return the file of the picture beside a folder of samples. Raise `BadInput` where both would be the same."""
-    try:
-        picture = out.with_suffix(".svg")
-    except ValueError:  # no name, such as . or /
-        picture = out
-    if picture == out:
-        raise BadInput("out", repr(str(out)), _FOLDER)
-    return picture
+def rate_text(value: float) -> str:
+    """Return a rate with three digits, such as 3,460 or 20.7M, in any unit."""
+    for size, prefix in ((1e9, "G"), (1e6, "M")):
+        if value >= size:
+            return f"{value / size:.3g}{prefix}"
+    return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"
