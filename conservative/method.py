@@ -23,9 +23,9 @@ Run = Callable[[], Trajectory]
 
 @dataclass(frozen=True, init=False)
 class Grid:
-    """Steps of dt, s, and the samples kept of them: the start, every `every`-th step, and the last.
+    """Steps of length dt, s, and the stored samples: the initial state, every `every`-th step, and the last one.
 
-    The last step is the first one at or past the end asked for, so `t[-1]` can lie up to one step after it.
+    The last step is the first one at or after the requested end, so `t[-1]` can be up to one step later.
 
     Raises
     ------
@@ -54,7 +54,7 @@ class Grid:
         return self.steps * self.dt
 
     def count_samples(self, done: int) -> int:
-        """Return how many samples a run of `done` steps has filled."""
+        """Return the number of samples in the first `done` steps."""
         return self.n_samples if done == self.n_steps else 1 + done // self.every
 
     @property
@@ -92,23 +92,23 @@ def _read_step(dt: object, end: float) -> float:
 
 
 class Method(ABC):
-    """A way to integrate scenes: a frozen value, defined in one file and registered in one line.
+    """An integration method: a frozen dataclass, defined in one file and registered by one entry point.
 
     Subclasses must define `family`, `role`, `order` and `prepare`; everything else has a default.
 
     Attributes
     ----------
     family, role
-        The name that the class is registered with, and the side it is on.
+        Name of its entry point, and its role: ours, engine or truth.
     candidacy
-        How the automatic choice considers it; None where it does not.
+        How the automatic choice considers it; None if it does not.
     colour
-        A name out of `conservative.reports.charts.style.PALETTE` or a text such as "#0072B2"; None for a colour that is left.
+        A name in `conservative.reports.charts.style.PALETTE`, or a colour such as "#0072B2"; None for any free colour.
     module, kernel
-        Module of an engine, whose import reports time, and module in `conservative.kernels` whose function `enter` takes all
-        steps of a run; "" for none.
+        Python module of an engine, and module in `conservative.kernels` whose function `enter` makes all steps of a run; ""
+        for none.
     time_dependent
-        Whether it takes potentials that depend on the time; of others `unsupported` says that by itself, whatever else it says.
+        Whether it supports potentials that depend on time. If not, `unsupported` reports such scenes automatically.
     """
 
     family: ClassVar[str]
@@ -125,57 +125,57 @@ class Method(ABC):
 
     @property
     def name(self) -> str:
-        """Return the registered name with the settings that are not defaults; `conservative.registry.method` reads it back."""
+        """Registered name with the settings that differ from the defaults; `conservative.registry.method` parses it."""
         settings = settings_text(self)
         return f"{self.family}:{settings}" if settings else self.family
 
     @property
     def label(self) -> str:
-        """Return name and version of what computes, and the setting, such as `mujoco==4.0.0/RK4`.
+        """Name and version of the computing package, and the setting, such as `mujoco==4.0.0/RK4`.
 
-        By default that is the package the class is from, with its version where one of that name is installed.
+        Default: the package of the class, with its version if it is installed.
         """
         return f"{maker_of(type(self))}/{self.name}"
 
     @property
     @abstractmethod
     def order(self) -> int | None:
-        """Order of convergence in dt that the method claims; None where accuracy does not depend on dt."""
+        """Order of convergence in dt; None if the accuracy does not depend on dt."""
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Names of the invariants that it conserves to round-off (or to its solver's tolerance) by construction."""
+        """Names of the invariants that it conserves by construction, to round-off or to its solver's tolerance."""
         return frozenset()
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
-        """Return how far orthonormality, and the invariants in `conserves`, may be off in a run that is called ok.
+        """Return the limits on orthonormality, and on the drift of the invariants in `conserves`, for the outcome ok.
 
-        By default 0.001 and 0.1, meant for engines at loose tolerances: whoever conserves something should say how well.
+        The defaults, 0.001 and 0.1, are meant for engines with loose tolerances. Methods that conserve something should
+        return tighter limits.
         """
         return Bounds(drift=1e-3, orthonormality=0.1)
 
     @property
     def cost(self) -> Cost:
-        """What its work costs, for the automatic choice to compare; by default that of an explicit step of order 8."""
+        """Cost of its work, for the automatic choice; default: that of an explicit step of order 8."""
         return Cost(step=340.0)
 
     @refuse_time
     def unsupported(self, scene: Scene) -> str | None:
-        """Return why the scene cannot be done, None if it can."""
+        """Return the reason why the scene is not supported, or None."""
         return None
 
     def longest_step(self, scene: Scene) -> float:
-        """Return the step, s, up to which it takes the scene; inf where there is no such limit or no step."""
+        """Return the longest step size for the scene, s; inf without a limit."""
         return math.inf
 
     @abstractmethod
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Convert the scene once, compile what needs it, and return the run: called with nothing, gives the trajectory.
+        """Convert the scene, compile, and return a function without arguments that makes a run and returns the trajectory.
 
-        All that happens once per model belongs before the run, which timing calls, and who has many short runs: a run by itself
-        is not checked, `check(scene, grid, run())` is. What is converted may be kept for later runs of the scene, which never
-        changes. A run may be called many times and starts afresh each time. Runs that were prepared apart may overlap, in
-        threads; nobody calls one run twice at a time.
+        Work that is needed once per scene belongs here and not in the run, which is timed. The run is not checked; use
+        `check(scene, grid, run())`. It can be called repeatedly and starts from the initial state each time. Runs of separate
+        calls of `prepare` can execute in parallel threads; the same run cannot.
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:
@@ -187,44 +187,44 @@ class Method(ABC):
         return None
 
     def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
-        """Return what a run of this method gave if it may be called ok, else what is good of it, with the failure.
+        """Return the trajectory if it passes every check, otherwise its valid samples and the failure.
 
-        Every run goes through here. To be ok, it has to give a `Trajectory` of the scene with all samples of the grid, float64
-        of the right shapes, at the right times, finite, and within `bounds`.
+        Every run is checked here: the result is a `Trajectory` of the scene with all samples of the grid, with the right
+        shapes, types and times, finite, and within `bounds`.
         """
         return accept(found, scene, grid, self, self.bounds(scene, grid))
 
     def solve(self, scene: Scene, grid: Grid) -> Trajectory:
-        """Return the trajectory on a grid, checked, whatever its outcome."""
+        """Return the checked trajectory on a grid, whatever its outcome."""
         return self.check(scene, grid, self.prepare(scene, grid)())
 
     @classmethod
     def variants(cls) -> tuple[Method, ...]:
-        """Return the settings that tables and generic tests take up by themselves."""
+        """Return the settings that tables and generic tests include."""
         return (cls(),)
 
     @classmethod
     def candidate_settings(cls) -> tuple[Method, ...]:
-        """Return the settings that the automatic choice probes, where the first supports the scene; by default all variants."""
+        """Return the settings that the automatic choice probes if the first one supports the scene; default: all variants."""
         return cls.variants()
 
     @classmethod
     def suite_settings(cls) -> tuple[Method, ...]:
-        """Return the settings that the benchmark suite times; by default all variants."""
+        """Return the settings that the benchmark suite times; default: all variants."""
         return cls.variants()
 
     @classmethod
     def many_settings(cls) -> tuple[Method, ...]:
-        """Return the settings measured on many bodies, first the one that stands for all; by default those of the suite."""
+        """Return the settings measured on many bodies, the representative one first; default: those of the suite."""
         return cls.suite_settings()
 
     @classmethod
     def picture_settings(cls) -> tuple[Method, ...]:
-        """Return the settings whose motion a report draws, where it has them; by default the first that it has."""
+        """Return the settings whose motion a report draws; default: the first that it measured."""
         return ()
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
-        """Return the trajectory of steps dt to t_end, s, whatever its outcome; `integrate` is this with checks and exceptions.
+        """Return the trajectory with step size dt to t_end, s, whatever its outcome. `integrate` raises exceptions instead.
 
         Raises
         ------

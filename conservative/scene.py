@@ -30,7 +30,7 @@ MOST_DERIVATIONS = 64
 
 @dataclass(frozen=True, eq=False, init=False)
 class Scene:
-    """A rigid body turning about a fixed point, from a start, for a time.
+    """A rigid body that rotates about a fixed point: body, potential, initial state and duration.
 
     Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range our
     own methods are right or say what failed; engines are given the numbers as they are.
@@ -38,7 +38,7 @@ class Scene:
     Parameters
     ----------
     name
-        What tables and pictures call it.
+        Name in tables and charts.
     body
         The body.
     R_WB0
@@ -48,20 +48,18 @@ class Scene:
     t_end
         Duration, s.
     potential
-        What acts on the body; None for a free body, which then carries no torque code anywhere. One that depends on the time
-        is `Turning`, or is given by functions of attitude and time.
+        The field that acts on the body; None for a free body. `Turning` and functions of attitude and time depend on time.
     dt
-        Step of the source, s, which commands and studies take unless told otherwise; default a 20th of a radian of the
-        start's rate, at most a hundredth of t_end.
+        Default step size of commands and studies, s; default: 0.05 rad at the initial rate, at most a hundredth of t_end.
     extra_invariants
         Conserved quantities beyond those that follow from the body and the potential.
     group, source
-        Heading under which `conservative list` shows the scene, default "your own", and where it comes from.
+        Heading of the scene in `conservative list` (default "your own"), and its source.
 
     Raises
     ------
     BadInput
-        An argument is not finite, has another shape, is out of range, or is not a rotation.
+        An argument is not finite, out of range, not a rotation, or has the wrong shape.
     """
 
     name: str
@@ -113,44 +111,44 @@ class Scene:
 
     @property
     def free(self) -> bool:
-        """Whether nothing acts on the body."""
+        """Whether the body is free: no potential."""
         return self.potential is None
 
     @property
     def integrable(self) -> bool:
-        """Whether as many quantities are known to be conserved as there are degrees of freedom, three: a closed form exists.
+        """Whether a closed form of the motion exists: three invariants are known, one for each degree of freedom.
 
-        So it is of a free body, and of one with three invariants, those of `extra_invariants` counted. Source: Arnold,
-        Mathematical Methods of Classical Mechanics, section 49 (Liouville's theorem).
+        This holds for free bodies and for scenes with three invariants, including `extra_invariants` (Arnold, Mathematical
+        Methods of Classical Mechanics, section 49, Liouville's theorem).
         """
         return self.free or len(self.invariants) >= 3
 
     @cached_property
     def kinetic_energy0(self) -> float:
-        """Kinetic energy at the start, J."""
+        """Initial kinetic energy, J."""
         return float(self.w_WB_B0 @ self.body.inertia @ self.w_WB_B0) / 2
 
     @cached_property
     def energy_scale(self) -> float:
-        """What energy errors are relative to, J: kinetic energy at the start plus the size of the potential; never 0.
+        """Reference scale of energy drifts, J: initial kinetic energy plus the magnitude of the potential.
 
-        Unlike the energy itself it does not vanish where kinetic and potential energy cancel.
+        Unlike the energy itself, it does not vanish if kinetic and potential energy cancel.
         """
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         return size or 1.0
 
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:
-        """What the exact motion conserves: energy and momenta as body and potential have it, then `extra_invariants`."""
+        """Conserved quantities of the exact motion: energy, momenta, and `extra_invariants`."""
         return (*invariants_of(self.body, self.potential, self.w_WB_B0, self.energy_scale), *self.extra_invariants)
 
     def in_field_axes(self, R_WB: Array, t: Array) -> Array:
-        """Return attitudes (n, 3, 3) at times (n,), s, in axes that the field is fixed in: the world's, or those that turn."""
+        """Return attitudes (n, 3, 3) at times (n,), s, relative to the axes in which the field is fixed."""
         return self.potential.in_orbit(R_WB, t) if isinstance(self.potential, Turning) else R_WB
 
     @cached_property
     def symmetry_axis_B(self) -> Array | None:
-        """Unit vector (3,), body axes, about which body and field are symmetric; None where they are not."""
+        """Unit vector (3,), body axes, of the common symmetry axis of body and field; None if there is none."""
         return axial_direction(self.body, self.potential)
 
     @cached_property
@@ -170,11 +168,11 @@ class Scene:
         return found
 
     def forget(self) -> None:
-        """Drop what `derive` has kept, so that whoever times the preparation of a run times all of it."""
+        """Delete the cache of `derive`, for timing the complete preparation of a run."""
         self._derivations.clear()
 
     def rename(self, name: str, **changes: Any) -> Scene:
-        """Return the scene under another name and with other fields where `changes` says so."""
+        """Return a copy with another name, and with the fields in `changes` replaced."""
         return replace(self, name=name, **changes)
 
     def __repr__(self) -> str:

@@ -30,17 +30,17 @@ class Trajectory:
     Attributes
     ----------
     scene, t
-        What was integrated, and times (n,), s.
+        The scene, and the times (n,), s.
     R_WB
-        Attitudes (n, 3, 3), body to world, as the method has them: not tidied up.
+        Attitudes (n, 3, 3), body to world, as the method returns them, without orthonormalization.
     w_WB_B
         Angular velocities (n, 3), rad/s, body axes.
     label, counters
-        Who made it, with version and setting, such as `mujoco==4.0.0/RK4`, and work done.
+        Method with version and setting, such as `mujoco==4.0.0/RK4`, and counts of its work.
     failure
-        What ended the run early, as the exception that `integrate` raises; the samples then end before it. Else None.
+        The exception that `integrate` raises if the run ended early, otherwise None. The samples end before the failure.
     choice
-        Method, step and estimated error, where `integrate` was asked for an error instead of a method. Else None.
+        Method, step size and estimated error of a run with a target error, otherwise None.
     """
 
     scene: Scene
@@ -54,7 +54,7 @@ class Trajectory:
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended: ok, or what failed and when."""
+        """How the run ended: ok, or the failure and its time."""
         return OK if self.failure is None else self.failure.outcome
 
     @property
@@ -64,7 +64,7 @@ class Trajectory:
 
     @cached_property
     def energy(self) -> Array:
-        """Kinetic plus potential energy (n,), J; in a field that depends on the time that of the moment, which changes."""
+        """Kinetic plus potential energy (n,), J. It is not conserved in a field that depends on time."""
         return invariants.energy(self.scene.body, self.scene.potential, self.R_WB, self.w_WB_B, self.t)
 
     @cached_property
@@ -74,14 +74,19 @@ class Trajectory:
 
     @property
     def work(self) -> dict[str, int]:
-        """Counts of work by their names, those that the method has."""
+        """Counts of work by name, without those that the method does not provide."""
         return {name: count for name, count in vars(self.counters).items() if count is not None}
 
     def drift(self, invariant: Invariant | str) -> Array:
-        """Return (I - I0) / scale of an invariant I, (n,) or (n, 3), with I0 of the scene and not of the first sample: no unit.
+        """Return the drift (I - I0) / scale of an invariant I, (n,) or (n, 3); I0 is its value in the scene's initial state.
 
-        It is one of `scene.invariants`, by itself or by name, such as "energy"; `conservative.invariants.sizes` makes sizes of
-        what is returned, of a vector its length. Another name is a `BadInput`.
+        The invariant is one of `scene.invariants`, or its name, such as "energy". `conservative.invariants.sizes` returns
+        magnitudes.
+
+        Raises
+        ------
+        BadInput
+            The scene has no such invariant.
         """
         invariant = invariants.find_invariant(invariant, self.scene.invariants)
         start = invariant.evaluate(self.scene.R_WB0[None], self.scene.w_WB_B0[None])
@@ -129,10 +134,10 @@ Steps = Any
 
 @dataclass(frozen=True)
 class Bounds:
-    """Up to where a run is called ok, sample by sample: no unit.
+    """Limits for every sample of a run with the outcome ok, dimensionless.
 
-    `drift` is that of the invariants that a method names, relative to their scales; of momenta, relative to all that the energy
-    can make of them. `orthonormality` is the largest component of |R'R - 1|.
+    `drift` limits the drift of the invariants that a method conserves, relative to their scales. `orthonormality` limits the
+    largest component of |R'R - 1|.
     """
 
     drift: float

@@ -70,47 +70,47 @@ def integrate(
     Parameters
     ----------
     scene
-        What moves.
+        The scene.
     dt
-        Step, s, by default 0.01. For adaptive methods, and with `error`, the distance of samples.
+        Step size, s; default 0.01. For adaptive methods, and with `error`, the sampling interval.
     method
-        A method, or its name, as everywhere: `"mujoco@3.6.0:RK4"`. Default `Reduced()`, the paper's map in three unknowns;
-        in fields that depend on the time, the first that the automatic choice tries.
+        A method, or its name, for example `"mujoco@3.6.0:RK4"`. Default: `Reduced()`, the paper's integrator in three
+        unknowns; in fields that depend on time, the first candidate of the automatic choice.
     t_end
-        Duration, s; default the scene's. The run ends with the first step at or past it.
+        Duration, s; default: the scene's. The run ends with the first step at or after it.
     sample_every
-        Keep every so many steps (and the first and last state).
+        Store every `sample_every`-th step, and the first and last state.
     error
-        Attitude error over the run, rad, instead of a method and a step: `conservative.methods.automatic` chooses both, and
-        `trajectory.choice` has them and the estimated error; a warning `AccuracyNotReached` where round-off is in the way. What
-        takes more than 10^10 steps is refused. What the trial runs show is kept: the next call for a scene with the same
-        numbers makes one run.
+        Target for the attitude error over the run, rad. The method and the step size are then chosen automatically and
+        stored in `trajectory.choice`, together with the estimated error. If round-off prevents that error, the warning
+        `AccuracyNotReached` is issued. Trial runs are cached: the next call for the same scene makes one run only.
     on_failure
-        "raise", or "return" to get the samples before the failure, with an outcome that says what failed.
+        "raise", or "return" to return the samples before the failure; `trajectory.outcome` then describes the failure.
     t_eval
-        Times of the samples, s, increasing, from 0 to t_end, or their number, evenly spaced from 0 to t_end, instead of
-        `sample_every` and, with `error`, of dt. Steps stay as they are: a sample is reached from the step before it, by short
-        steps that leave nothing but round-off. The run ends with the last sample.
+        Increasing times of the samples, s, from 0 to t_end, or the number of evenly spaced samples; replaces `sample_every`.
+        The steps do not change: each sample is computed from the step before it with substeps that add only round-off. The
+        run ends with the last sample.
     progress
-        Called with a `Progress`, whose text is a line, before a trial run for an `error`: from one second on, and not more
-        often than ten times a second. `print` will do. Nothing is shown by itself.
+        Called with a `Progress` before each trial run for an `error`, for example `print`: after the first second, and at
+        most ten times per second.
 
     Raises
     ------
     BadInput
-        An argument cannot be used, the steps do not fit in memory or are too many, or the method has no step of that length.
+        An argument is invalid, the samples do not fit in memory, there are too many steps, or the step is too long for the
+        method.
     MissingEngine
-        A method of that name needs an engine that is not installed.
+        The method needs an engine that is not installed.
     Unsupported
-        The method cannot do the scene.
+        The method does not support the scene.
     NotConverged
         The equations of a step could not be solved.
     Diverged
-        The state stopped being finite, or an engine gave up.
+        The state is no longer finite, or an engine stopped.
     NotConserved
-        Orthonormality, or an invariant that the method names, left the method's `bounds`.
+        Orthonormality, or an invariant that the method conserves, is outside the method's `bounds`.
     InvalidResult
-        The method gave no trajectory of the scene, or not all samples, or others than those of the grid.
+        The method's result is not a trajectory of the scene with all samples of the grid.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
