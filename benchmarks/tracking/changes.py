@@ -1,8 +1,7 @@
-"""From two versions to what changed between them: changes of conclusions, not of digits.
+"""Changes of conclusions between two versions, not of digits.
 
-A conclusion is that a run reaches its end, an order, that something is conserved, drifts little or drifts, that energy is
-gained or lost, and how large the error and the time are within a factor. Two versions differ in one only where all that was
-measured beside them, which should not matter, differs alike. Source: our own.
+The conclusions are: whether a run reaches its end, an order, whether a quantity is conserved, drifts little or drifts, the sign
+of an energy drift, and the error and the time within a factor. A change counts only if it exceeds the spreads of both versions.
 """
 
 from __future__ import annotations
@@ -16,18 +15,21 @@ from conservative.outcome import Outcome
 
 from ..measures.drift_class import DriftClass, classify
 from .observation import Fit, Observation, Spread
-from .step_times import StepTimes, differ, ratio
 
+StepTimes = tuple[float, ...]
+"""Shortest time of a step, s, in each repeat."""
+TIME_FACTOR = 1.25
+"""Smallest ratio of times that differ."""
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
-"""Two orders differ from this difference on, if that is also so many of their standard errors."""
+"""Orders differ if their difference is larger than the first, and than so many standard errors."""
 FACTOR = 3.0
-"""Errors and drifts differ from this factor on."""
+"""Smallest ratio of errors, or drifts, that differ."""
 ROUND_OFF = 1e-9
-"""Attitude error, rad, below which no two differ: there an error is round-off."""
+"""Attitude errors, rad, below this do not differ: they are round-off."""
 
 
 class Aspect(Enum):
-    """What a change is of."""
+    """The subject of a change."""
 
     OUTCOME = "outcome"
     ATTITUDE_ORDER = "order of the attitude"
@@ -39,18 +41,18 @@ class Aspect(Enum):
 
 @dataclass(frozen=True)
 class Change:
-    """A conclusion that is another one in the later of two versions.
+    """A conclusion that differs between two versions.
 
     Attributes
     ----------
     aspect
-        What it is about.
+        Subject.
     was, now
-        What was measured; of a time, `now` is how many times as long it is.
+        Measurements; for times, `now` is the ratio.
     quantity
-        Name of the invariant that a drift is of; else empty.
+        Name of the invariant of a drift; else empty.
     lost
-        Whether something is gone that was there: a run that reached its end, an order, an invariant.
+        Whether the later version lost something: the end of a run, an order, an invariant.
     """
 
     aspect: Aspect
@@ -61,20 +63,25 @@ class Change:
 
 
 def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_times: StepTimes) -> tuple[Change, ...]:
-    """Return what changed from one version to another, on one scene and with one setting, most important first.
+    """Return the changes from one version to another, on one scene and with one setting, most important first.
 
     Parameters
     ----------
     was, now
-        What was seen of both.
+        Observations of both.
     was_times, now_times
-        What a step takes in both (n,), s; empty where that is not known.
+        Times of a step in both (n,), s; empty if not known.
     """
     if was.outcome.kind is not now.outcome.kind:
         return (Change(Aspect.OUTCOME, was.outcome, now.outcome, lost=was.outcome.ok),)
     if not was.outcome.ok:
         return ()
-    return (*_orders(was, now), *_drifts(was, now), *_error(was, now), *_time(was_times, now_times))
+    found = [*_orders(was, now), *_drifts(was, now)]
+    if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
+        found.append(Change(Aspect.ERROR, was.error, now.error))
+    if differ(was_times, now_times):
+        found.append(Change(Aspect.TIME, Spread.of(was_times), ratio(was_times, now_times)))
+    return tuple(found)
 
 
 def _orders(was: Observation, now: Observation) -> Iterator[Change]:
@@ -85,7 +92,7 @@ def _orders(was: Observation, now: Observation) -> Iterator[Change]:
     grown = direction(was.error, now.error)
     for aspect, before, after in pairs:
         if math.isnan(before.slope) or math.isnan(after.slope):
-            # Whether an order can be fitted may hang on round-off; where the error changed with it, it does not.
+            # Whether an order can be fitted can depend on round-off. If the error changed too, it does not.
             if math.isnan(before.slope) != math.isnan(after.slope) and grown:
                 yield Change(aspect, before, after, lost=math.isnan(after.slope) and grown > 0)
         elif abs(after.slope - before.slope) > max(ORDER_STEP, ORDER_ERRORS * math.hypot(before.stderr, after.stderr)):
@@ -105,17 +112,19 @@ def _drifts(was: Observation, now: Observation) -> Iterator[Change]:
             yield Change(Aspect.DRIFT, before, after, quantity, lost=other > grade)
 
 
-def _error(was: Observation, now: Observation) -> Iterator[Change]:
-    if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
-        yield Change(Aspect.ERROR, was.error, now.error)
-
-
-def _time(was: StepTimes, now: StepTimes) -> Iterator[Change]:
-    if differ(was, now):
-        yield Change(Aspect.TIME, Spread.of(was), ratio(was, now))
-
-
 def direction(was: Spread, now: Spread) -> int:
-    """Return 1 where all sizes grew by more than `FACTOR`, -1 where they shrank by as much, else 0."""
+    """Return 1 if all sizes grew by more than `FACTOR`, -1 if they shrank by as much, else 0."""
     before, after = was.sizes, now.sizes
     return int(after[0] > FACTOR * before[1]) - int(before[0] > FACTOR * after[1])
+
+
+def differ(was: StepTimes, now: StepTimes) -> bool:
+    """Return whether every time (n,), s, of one version is longer than every time of the other by `TIME_FACTOR`."""
+    if not was or not now:
+        return False
+    return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
+
+
+def ratio(was: StepTimes, now: StepTimes) -> Spread:
+    """Return the ratio of the shortest times (n,), s, with the spread of the ratios of single repeats."""
+    return Spread.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])

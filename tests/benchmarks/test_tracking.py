@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.benchmarks.tracking.changes import Aspect, direction, find_changes
-from conservative.benchmarks.tracking.observation import Fit, Point, Spread
-from conservative.benchmarks.tracking.orders import NO_STEP, fit_orders
-from conservative.benchmarks.tracking.step_times import differ, ratio
+from conservative.benchmarks.tracking.changes import Aspect, differ, direction, find_changes, ratio
+from conservative.benchmarks.tracking.observation import NO_STEP, Fit, Point, Spread, fit_orders
 from conservative.benchmarks.tracking.track import make_plan, require_several
 from conservative.outcome import Outcome, OutcomeKind
 
