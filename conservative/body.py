@@ -25,12 +25,12 @@ _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix 
 
 @dataclass(frozen=True, eq=False, init=False)
 class RigidBody:
-    """A rigid body that turns about a fixed point.
+    """A rigid body that rotates about a fixed point.
 
     Parameters
     ----------
     inertia
-        Principal moments (3,) or the whole tensor (3, 3) about the fixed point in body axes, kg m^2. The largest component
+        Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component
         is of 1e-100 to 1e100 kg m^2.
 
     Raises
@@ -65,7 +65,7 @@ class RigidBody:
 
     @property
     def R_BP(self) -> Array:
-        """Rotation (3, 3) that takes principal to body components."""
+        """Rotation (3, 3) from principal to body components."""
         return self._principal[1]
 
     @cached_property
@@ -74,14 +74,14 @@ class RigidBody:
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
     def momentum(self, w_WB_B: ArrayLike) -> Array:
-        """Return the angular momentum (..., 3) in body axes, kg m^2/s, of rates (..., 3) in rad/s."""
+        """Return the angular momentum (..., 3) in body axes, kg m^2/s, for rates (..., 3) in rad/s."""
         return np.asarray(w_WB_B, dtype=float) @ self.inertia
 
     def symmetry_axis(self, tolerance: float = 1e-14) -> int | None:
-        """Return which principal axis (0, 1, 2) is one of symmetry; None for an asymmetric body, 2 for a spherical one.
+        """Return the index (0, 1, 2) of the principal axis of symmetry; None for an asymmetric body, 2 for a spherical one.
 
-        Two moments are equal where they differ by no more than `tolerance` relative to the larger of them, or by what rounding
-        the tensor does to them.
+        Two moments are equal if they differ by at most `tolerance` relative to the larger one, or by the round-off of the
+        tensor.
         """
         J = self.moments
         rounded = 0.0 if np.array_equal(self.R_BP, np.eye(3)) else min(tolerance, _ROUNDED) * J.max()

@@ -30,7 +30,7 @@ def _restore(kind: type[_Error], args: tuple[object, ...], values: dict[str, obj
 
 
 class BadInput(_Error, ValueError):
-    """An argument that cannot be used; the message says which one, what was got and what is allowed."""
+    """An invalid argument. The message contains its name, the value and the allowed values."""
 
     def __init__(self, argument: str, got: object, allowed: str) -> None:
         self.argument, self.got, self.allowed = argument, got, allowed
@@ -38,7 +38,7 @@ class BadInput(_Error, ValueError):
 
 
 class Unsupported(BadInput):
-    """A method was asked for a scene that it cannot do."""
+    """The method does not support the scene."""
 
 
 class NotLoadable(BadInput):
@@ -51,7 +51,7 @@ class NotLoadable(BadInput):
 
 
 class NotWritten(BadInput):
-    """A file or a folder cannot be written; what was there is as it was. Attributes: `path`, and the `cause`."""
+    """A file or a folder cannot be written. Existing files are unchanged. Attributes: `path`, and the `cause`."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class NotWritten(BadInput):
 
 
 class MissingEngine(_Error, ImportError):
-    """An engine is not installed; the message has the line that installs it."""
+    """An engine is not installed. The message contains the command that installs it."""
 
     def __init__(self, engine: str, package: str) -> None:
         self.engine, self.package = engine, package
@@ -73,9 +73,9 @@ class MissingEngine(_Error, ImportError):
 
 
 class MissingExtra(_Error, ImportError):
-    """Packages of an extra are not installed; the message has the line that installs them.
+    """Packages of an extra are not installed. The message contains the command that installs them.
 
-    Attributes: `what` needs them, the names of the `packages`, and the `extra` that brings them.
+    Attributes: `what` needs them, the names of the `packages`, and the `extra`.
     """
 
     def __init__(self, what: str, packages: str, extra: str) -> None:
@@ -85,7 +85,7 @@ class MissingExtra(_Error, ImportError):
 
 
 class IntegrationFailed(_Error, ArithmeticError):
-    """A run did not reach its end, or not as it says. Attribute: `outcome`, which trajectories and tables carry."""
+    """A run failed. Attribute: `outcome`, which trajectories and tables contain."""
 
     outcome: Outcome
 
@@ -117,13 +117,13 @@ class NotConverged(IntegrationFailed):
 
 
 class WrongBranch(NotConverged):
-    """The equations of a step have solutions, none of which is the one that the state leads to continuously."""
+    """The solver found a solution of a step's equations on another branch than the one that continues the motion."""
 
     kind = OutcomeKind.WRONG_BRANCH
 
 
 class Diverged(IntegrationFailed):
-    """The state stopped being finite, or an engine gave up. Attributes: `time` (s, of the last good sample), `reason`."""
+    """The state is no longer finite, or an engine stopped. Attributes: `time` (s, of the last good sample), `reason`."""
 
     def __init__(self, time: float, reason: str = "the state is not finite") -> None:
         self.time, self.reason = time, reason
@@ -138,10 +138,10 @@ class Diverged(IntegrationFailed):
 
 
 class NotConserved(IntegrationFailed):
-    """A run reached its end without keeping what its method keeps.
+    """A run reached its end, but an invariant that its method conserves drifted.
 
     Attributes: `time` (s, of the last good sample), `quantity` (name of the invariant, or orthonormality), its largest `drift`
-    and the `bound` up to which a run is called ok, both relative.
+    and the `bound` for the outcome ok, both relative.
     """
 
     def __init__(self, time: float, quantity: str, drift: float, bound: float) -> None:
@@ -154,7 +154,7 @@ class NotConserved(IntegrationFailed):
 
 
 class InvalidResult(IntegrationFailed):
-    """What a method gave is no trajectory of the scene on the grid. Attribute: `reason`, what is wrong with it."""
+    """A method's result is not a trajectory of the scene on the grid. Attribute: `reason`."""
 
     def __init__(self, label: str, reason: str) -> None:
         self.label, self.reason = label, reason
@@ -166,7 +166,7 @@ class InvalidResult(IntegrationFailed):
 
 
 class NotRun(IntegrationFailed):
-    """The method does not take a body, one of many. Attribute: `reason`, what `integrate` would raise for it alone."""
+    """The method does not support one body of many. Attribute: `reason`, the message of `integrate` for this body."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -175,7 +175,7 @@ class NotRun(IntegrationFailed):
 
 
 class PotentialFailed(_Error, RuntimeError):
-    """A function that a potential was made of raised an exception, which is this one's `__cause__`."""
+    """A user's function of a potential raised an exception, which is the `__cause__` of this one."""
 
     def __init__(self, cause: BaseException) -> None:
         super().__init__(
@@ -185,7 +185,7 @@ class PotentialFailed(_Error, RuntimeError):
 
 
 class AccuracyNotReached(UserWarning):
-    """The error asked for is below what round-off lets the scene have. Attributes: `error`, `estimate` (rad)."""
+    """The requested error is smaller than round-off allows for the scene. Attributes: `error`, `estimate` (rad)."""
 
     def __init__(self, error: float, estimate: float) -> None:
         self.error, self.estimate = error, estimate

@@ -27,14 +27,14 @@ JACOBI_INTEGRAL = "Jacobi integral"
 class Invariant:
     """A conserved quantity.
 
-    `evaluate(R_WB, w_WB_B)` gives (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3); drifts are relative to `scale`,
-    which has the unit `unit` and is above 0. In a field that turns, the attitudes it is given are R_OB, those in the axes O
-    that turn with the field (`Scene.in_field_axes`): what is conserved does not depend on the time there.
+    `evaluate(R_WB, w_WB_B)` returns (n,) or (n, 3) for attitudes (n, 3, 3) and rates (n, 3). Drifts are relative to `scale`,
+    which is positive and has the unit `unit`. In a turning field, `evaluate` receives attitudes R_OB relative to the axes O
+    that turn with the field (`Scene.in_field_axes`).
 
     Raises
     ------
     BadInput
-        name or unit is no text, scale is not a finite number above 0, or evaluate cannot be called.
+        name or unit is not a string, scale is not a positive number, or evaluate is not callable.
     """
 
     name: str

@@ -12,7 +12,7 @@ from typing import Any
 
 
 class OutcomeKind(StrEnum):
-    """The ways in which a run can end, or not begin."""
+    """How a run ended, or why it did not start."""
 
     OK = "ok"
     NOT_CONVERGED = "not converged"
@@ -38,15 +38,15 @@ class Outcome:
     Attributes
     ----------
     kind
-        Which way.
-    reason
-        More about it, in words; may be empty.
+        Kind of end.
+        reason
+        Details in words; may be empty.
     step
         Number of the step that failed, from 1.
     time
         Time of the last good state, s.
     residual
-        Last size of the residual of a step's equations, or of the correction relative to the unknown; dimensionless.
+        Last residual of a step's equations, or last correction relative to the unknown; dimensionless.
     """
 
     kind: OutcomeKind
@@ -78,7 +78,7 @@ OK = Outcome(OutcomeKind.OK)
 class Counters:
     """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
 
-    None means that the method does not have the thing or its engine does not tell.
+    None means that the method or its engine does not provide the count.
     """
 
     steps: int

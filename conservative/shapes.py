@@ -32,7 +32,7 @@ _LENGTH = "a finite length above 0, m"
 
 @dataclass(frozen=True, eq=False, init=False)
 class MassDistribution:
-    """Mass, centre of mass and inertia about it: what a shape or an engine's model file says of a body.
+    """Mass, centre of mass, and inertia about the centre of mass.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class MassDistribution:
     Raises
     ------
     BadInput
-        The mass is not a finite number above 0, `com_B` not three finite numbers, or the inertia none that a `RigidBody` takes.
+        The mass is not a positive number, `com_B` is not three finite numbers, or the inertia is not valid for `RigidBody`.
     """
 
     mass: float
@@ -171,13 +171,13 @@ def cylinder(radius: float, height: float, *, mass: float | None = None, density
 def cone(radius: float, height: float, *, mass: float | None = None, density: float | None = None) -> MassDistribution:
     """Return a solid circular cone about its third axis.
 
-    Its tip is 3/4 of the height below the centre of mass along that axis, its base 1/4 above: `about((0, 0, 3/4 height))`
-    stands it on the tip. J1 = J2 = 3/80 m (4 r^2 + h^2), J3 = 3/10 m r^2 about the centre of mass.
+    The tip is 3/4 of the height below the centre of mass along that axis, and the base is 1/4 above it. `about((0, 0, 3/4
+    height))` moves the fixed point to the tip. J1 = J2 = 3/80 m (4 r^2 + h^2), J3 = 3/10 m r^2 about the centre of mass.
 
     Parameters
     ----------
     radius, height
-        Of the base, and from tip to base, m.
+        Radius of the base, and distance from tip to base, m.
     mass, density
         One of them: mass in kg, or density in kg/m^3.
 

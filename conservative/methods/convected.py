@@ -29,15 +29,14 @@ class Convected(Method):
     Parameters
     ----------
     tol
-        The paper's eps: Newton stops where the norm of the residual (27) is at most this. It is absolute: the residual has
-        changes of base vectors and of momenta, the latter in units in which the motion is of order one (SI units, unless the
-        largest moment, kg m^2, or the rate, 1/s, that the energy makes of it is out of 2^-16 to 2^16;
-        `conservative.methods.units`).
+        The paper's eps: Newton's method stops when the norm of the residual (27) is at most this. It is absolute. The
+        residual contains changes of base vectors and of momenta; momenta are in SI units, or for very large or small bodies in
+        units in which the motion is of order one (`conservative.methods.units`).
 
     Raises
     ------
     BadInput
-        tol is not a number above 0.
+        tol is not a positive number.
     """
 
     tol: float = 1e-8

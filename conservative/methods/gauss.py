@@ -28,33 +28,31 @@ from .units import in_own_units
 
 @dataclass(frozen=True)
 class Gauss(Method):
-    """Collocation at s Gauss points: order 2s; energy, momenta and orthonormality to round-off, whatever the step.
+    """Collocation at s Gauss points, order 2s. Conserves energy, momenta and orthonormality to round-off with any step size.
 
-    In the body momentum L and the vertical gamma = R' e_z (of a free body: the direction of the world momentum) the motion is a
-    closed system with quadratic invariants only, and collocation at Gauss points keeps all of those (Hairer, Lubich & Wanner,
-    IV.2.1). The attitude is gamma and one angle about the vertical, which is a quadrature; see `kernels/gauss.py`. One stage is
-    the implicit midpoint rule.
+    In the body momentum L and the vertical gamma = R' e_z (for free bodies, the direction of the world momentum) the motion is
+    a closed system with quadratic invariants only, which Gauss collocation conserves (Hairer, Lubich & Wanner, Geometric
+    Numerical Integration, IV.2.1). The attitude consists of gamma and an angle about the vertical, which is a quadrature; see
+    `kernels/gauss.py`. One stage is the implicit midpoint rule.
 
-    It is the better-behaved method in long runs, not the cheaper one: being symmetric in time, its error in the attitude of a
-    regular motion grows in proportion to the time at first, where that of `Taylor` and `Projected`, which are not, grows as
-    its square. Of runs with the same error after 250 s, its error after 10^6 steps is 7 to 30 times smaller than theirs; to
-    reach an error, `Taylor` with a shorter step needs 0.6 to 0.8 of its time even there. The equations are therefore solved to
-    round-off, and the projection takes nothing but round-off off the invariants: what looser stages leave is not symmetric.
+    The method is symmetric in time, so the attitude error of a regular motion grows linearly at first, while the errors of
+    `Taylor` and `Projected` grow quadratically. If all have the same error after 250 s, its error after 10^6 steps is 7 to 30
+    times smaller. `Taylor` with a shorter step is still faster: it needs 0.6 to 0.8 of the time for the same error. The stages
+    are solved to round-off, because looser stages are not symmetric.
 
-    A step of some radians, for which the iteration does not converge, fails at once, as `NotConverged`. Where it converges, it
-    is to the solution that a step of 0 leads to continuously.
+    Steps of several radians, for which the iteration does not converge, fail with `NotConverged`.
 
     Parameters
     ----------
     stages
         s, 1 to 10.
     frame
-        "body", "non_spinning" (the spin of a symmetric body is added in closed form), or "auto": non-spinning where it can be.
+        "body", "non_spinning" (the spin of a symmetric body is added in closed form), or "auto": non-spinning if possible.
 
     Raises
     ------
     BadInput
-        stages is not an integer of 1 to 10, or frame is none of the three.
+        stages is not an integer of 1 to 10, or frame is unknown.
     """
 
     stages: int = 6

@@ -58,11 +58,11 @@ MOST_RADIANS = 1e6
 
 @dataclass(frozen=True)
 class Lame(Method):
-    """The exact step of a symmetric body in uniform gravity, its centre of mass on its axis; see the module for the equations.
+    """Closed-form steps of a symmetric top in uniform gravity (centre of mass on its axis); see the module for the equations.
 
-    Accuracy does not depend on dt: one step is about 1e-15 off in attitude, and such errors add up. Energy, momenta and
-    orthonormality are kept to round-off. A step longer than about half a period of nutation is taken in equal parts, which
-    `Counters.stages` counts; one in which the body could turn by more than 10^6 rad is refused with `BadInput`.
+    The accuracy does not depend on dt: each step adds an attitude error of about 1e-15 rad. Energy, momenta and orthonormality
+    are conserved to round-off. Steps longer than about half a period of nutation are divided into equal parts, counted in
+    `Counters.stages`. Steps in which the body could turn by more than 10^6 rad raise `BadInput`.
 
     References: F. Klein and A. Sommerfeld, Theorie des Kreisels, for alpha and beta as elliptic functions of the second kind;
     E. T. Whittaker and G. N. Watson, Modern Analysis, chapters 20 and 23, for p and Lame's equation.

@@ -44,22 +44,21 @@ class MoserVeselov(Method):
         L1 = L0 - (4/h) c x B c / (1 + |c|^2)
         R1 = R0 Cay(2 c)
 
-    conserves energy and world momentum whatever the constants css and cdd are. These are series in h^2 that depend on energy
-    and |L| alone (Hairer & Vilmart 2006, J. Phys. A 39, 13225): order/2 terms of them give an even order, css = 1 and cdd = 0
-    the original map of order 2 (Moser & Veselov 1991), and their sum, order "exact", leaves no truncation error at all.
-    The step is taken in closed form: see `kernels/moser_veselov.py`. Nothing drifts, neither energy nor momentum nor
-    orthonormality: round-off shows in the phase only. The exact step can be longer than one whose Cayley vector is finite: its
-    quaternion goes on through the half turn where c is infinite.
+    conserves energy and world momentum for any constants css and cdd. These are series in h^2 that depend only on energy and
+    |L| (Hairer & Vilmart 2006, J. Phys. A 39, 13225). css = 1 and cdd = 0 is the map of Moser & Veselov (1991), of order 2;
+    order/2 terms give an even order, and the complete sum, order "exact", has no truncation error. The step has a closed form:
+    see `kernels/moser_veselov.py`. Energy, momentum and orthonormality do not drift; round-off affects only the phase. An exact
+    step can be longer than a half turn, where c is infinite, because it uses the quaternion.
 
     Parameters
     ----------
     order
-        2, 4, 6, 8, 10 or "exact", which the attribute `order` has as None: accuracy does not depend on the step.
+        2, 4, 6, 8, 10 or "exact". For "exact" the attribute `order` is None.
 
     Raises
     ------
     BadInput
-        order is none of these; and on running: the step is too long, see `longest_step`.
+        order is unknown; when running, the step is too long (see `longest_step`).
     """
 
     order: int | None = None

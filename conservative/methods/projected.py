@@ -26,17 +26,16 @@ from .units import in_own_units
 class Projected(Method):
     """Dormand and Prince's explicit method of order 8 on quaternion and momentum, each step projected onto the invariants.
 
-    Energy, the momentum about the field's axis (the vertical one under gravity) and orthonormality are kept to round-off, since
-    whatever a step loses of them is put back (Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.4): they are
-    imposed, where the other methods here inherit them. It is neither symmetric in time nor symplectic, and needs steps well
-    below the fastest turn; but no equations are solved, so that a step costs twelve evaluations of the torque and little more.
-    Near a steady precession, where energy and momentum depend on each other, what a step loses of them is put back to the
-    square of its error only.
+    Each step is projected onto energy, momentum about the field's axis and orthonormality, which are conserved to round-off
+    (Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.4). The method is neither symmetric in time nor symplectic,
+    and its steps must be well below the period of the fastest rotation. It is explicit: a step costs twelve evaluations of the
+    torque and little more. Near a steady precession, where energy and momentum depend on each other, the projection restores
+    them only to the square of the step's error.
 
-    Fields may depend on the time. In one that turns the Jacobi integral takes the place of the energy; in one that is given as
-    functions of attitude and time nothing does, and no energy is put back.
+    Fields may depend on time. In a turning field the Jacobi integral replaces the energy. In a field given as functions of
+    attitude and time no energy is conserved.
 
-    Free bodies have `MoserVeselov`, which has no truncation error at all.
+    For free bodies use `MoserVeselov`, which has no truncation error.
     """
 
     family: ClassVar[str] = "projected"

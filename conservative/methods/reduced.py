@@ -35,9 +35,9 @@ from .units import in_own_units
 
 @dataclass(frozen=True)
 class Reduced(Method):
-    """The scheme of Krenk & Nielsen, eliminated to three unknowns and compiled; equal to `Convected` to round-off.
+    """The integrator of Krenk & Nielsen, reduced to three unknowns and compiled; equal to `Convected` to round-off.
 
-    With w* = J^-1 (L_n + L_n+1)/2, the mean of the two body momenta each in its own frame,
+    With w* = J^-1 (L_n + L_n+1)/2, from the mean of the two body momenta, each in its own body axes,
 
         Q_n+1 = Q_n Cay(dt w*)
         Q_n+1 L_n+1 = Q_n L_n + dt tau*        tau* = sum_j qbar_j x (-V*_j)
@@ -45,28 +45,27 @@ class Reduced(Method):
     follows from the paper's (22) to (26) without approximation. Energy, world momentum (or its vertical component) and
     orthonormality are conserved to round-off; the axial momentum of a top is not.
 
-    That is the map of order 2. Taken with the lengths of a symmetric composition it gets order 4 to 10 and conserves the same,
-    as every stage does.
+    This map has order 2. Symmetric compositions of it have order 4 to 10 and conserve the same quantities.
 
     Parameters
     ----------
     order
         2, 4, 6, 8 or 10.
     composition
-        Name of the set of lengths (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the best measured
-        one of the order.
+        Name of a composition (`conservative.methods.coefficients.compositions.COMPOSITIONS`); None for the most accurate one of
+        the order.
     tol
-        Relative error that the solver may leave in a stage. The default lies below round-off on purpose: an error of one sign,
-        however small, shows after 10^8 steps as a drift.
+        Relative tolerance of the solver in a stage. The default is below round-off on purpose: any systematic error, however
+        small, becomes a drift after 10^8 steps.
     frame
-        "body": the paper's map and nothing else. "non_spinning": a symmetric body's spin is left out and added in closed form;
-        "auto": so where it can be. Energy and momentum of a top then are those of the slow motion, and as its L3 is not
-        conserved, they are kept to the order of the method only. A free body keeps them to round-off.
+        "body": the paper's integrator. "non_spinning": the spin of a symmetric body is added in closed form; "auto":
+        non-spinning if possible. Energy and momentum of a top are then conserved only to the order of the method, because they
+        are those of the slow motion. For free bodies they are conserved to round-off.
 
     Raises
     ------
     BadInput
-        An argument is none of these.
+        An argument has another value.
     """
 
     order: int = 2

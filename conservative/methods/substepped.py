@@ -15,24 +15,23 @@ from ..trajectory import Bounds, Trajectory
 
 @dataclass(frozen=True)
 class Substepped(Method):
-    """A method whose run, where the equations of a step have no solution, is made again with shorter steps.
+    """A method that repeats a run with shorter steps if the equations of a step have no solution.
 
-    ALL steps of the run are taken in 1, 2, 4, ... equal parts, up to `most`: parts that changed from step to step would cost a
-    symmetric method its long-time behaviour. `Counters.steps` counts parts, and the label of the trajectory says how many there
-    are in a step.
+    ALL steps of the run are divided into 1, 2, 4, ... equal parts, up to `most`. Parts that change from step to step would
+    destroy the long-time behaviour of a symmetric method. `Counters.steps` counts parts, and the label of the trajectory
+    contains the number of parts per step.
 
     Parameters
     ----------
     method
-        Name of the method with its settings, those after the first separated by "/", as in `reduced:order=4/frame=auto`.
+        Name of the method with its settings; separate several settings by "/", as in `reduced:order=4/frame=auto`.
     most
-        Parts of a step that are allowed.
+        Largest number of parts per step.
 
     Raises
     ------
     BadInput
-        The name or a setting is unknown, the method has no step or is itself of this kind, or `most` is not an integer of 1 or
-        more.
+        The name or a setting is unknown, the method has no step or is itself `Substepped`, or `most` is not a positive integer.
     """
 
     method: str = "reduced"
@@ -52,7 +51,7 @@ class Substepped(Method):
 
     @property
     def inner(self) -> Method:
-        """Return the method that takes the parts."""
+        """Return the method of the parts."""
         return registry.method(self.method.replace("/", ","))
 
     @property

@@ -35,44 +35,42 @@ PARTS = 100
 
 @dataclass(frozen=True, init=False)
 class Taylor(Method):
-    """The series of the motion in powers of time, each step projected onto the invariants: the cheapest accuracy in a field.
+    """Taylor series of the motion in time, each step projected onto the invariants: the fastest general method in a field.
 
-    The coefficients of a step follow one from another, as every product in the equations of motion is one of two series; the
-    powers in the torque of a spring or an attraction follow from a recurrence of their own (Barton, Willers & Zahar, 1971).
-    Energy, momenta and orthonormality are kept to round-off, since whatever a step loses of them is put back (Hairer, Lubich &
-    Wanner, Geometric Numerical Integration, IV.4): they are imposed, not inherited, and steps have to be well below the fastest
-    turn.
+    The coefficients of a step follow from recurrences, because every product in the equations of motion is a product of two
+    series; the powers in the torque of a spring or an attraction have a recurrence of their own (Barton, Willers & Zahar,
+    1971). Energy, momenta and orthonormality are conserved to round-off by projection (Hairer, Lubich & Wanner, Geometric
+    Numerical Integration, IV.4). Steps must be well below the period of the fastest rotation.
 
-    Of random bodies, those in gravity cost least with order 8 to 10 where errors of 1e-2 to 1e-4 rad are wanted, 12 to 14 for
-    1e-5 to 1e-9 and 14 to 16 below; in the other fields, whose torque takes more products for each order, with about two less.
+    For random bodies in gravity, the fastest orders are 8 to 10 for errors of 1e-2 to 1e-4 rad, 12 to 14 for 1e-5 to 1e-9, and
+    14 to 16 below. In the other fields they are about two lower.
 
-    A tolerance is for motions that are fast for a short time, as where an attracting point passes close by: with one passage at
-    a fortieth of the largest distance, tolerance 1e-12 takes 135 parts and leaves an error of 3e-13 rad, where 4,000 steps of
-    one length leave 1e-8 rad. Elsewhere steps of one length are as good. Lengths are chosen as in Jorba & Zou, A software
-    package for the numerical integration of ODEs by means of high-order Taylor methods (2005); the order is 6 and two thirds of
-    the tolerance's digits, by a measurement of random bodies near an attracting point.
+    Use a tolerance for motions that are fast for a short time, such as a close passage of an attracting point. For a passage at
+    a fortieth of the largest distance, tolerance 1e-12 takes 135 substeps for an error of 3e-13 rad, while 4,000 equal steps
+    leave 1e-8 rad. For other motions equal steps are as good. Substeps are chosen as in Jorba & Zou, A software package for the
+    numerical integration of ODEs by means of high-order Taylor methods (2005). The order is 6 plus two thirds of the digits of
+    the tolerance, the best choice for random bodies near an attracting point.
 
-    Many bodies (`integrate_many`) move several at a time, each in a lane of a register, with steps of one length. Their numbers
-    are those of one at a time but for round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps, by 4e-13 after
-    1,000, and where motions are chaotic, in the end as those of two starts that round-off tells apart. With a tolerance, and in
-    fields that turn, bodies run one by one.
+    `integrate_many` integrates several bodies at once, one per lane of a vector register, with equal steps. The results differ
+    from those of single bodies only by round-off: attitudes of random heavy tops differ by 3e-15 after 100 steps and 4e-13
+    after 1,000. With a tolerance, and in turning fields, bodies run one by one.
 
-    Free bodies have `MoserVeselov`, which has no truncation error at all, symmetric tops `Lame`, and potentials given as Python
-    functions `Projected`, as a function has no recurrence.
+    For free bodies use `MoserVeselov`, which has no truncation error, for symmetric tops `Lame`, and for potentials given as
+    Python functions `Projected`.
 
     Parameters
     ----------
     order
-        Of the series, 4 to 18, by default 14; None with a tolerance, which chooses it. All of them are the same machine code.
+        Order of the series, 4 to 18; default 14. None with a tolerance, which determines it.
     tolerance
-        None for steps as long as the grid's. Else each of these is divided into parts so short that the last two terms of the
-        series are no larger than this: of the rows of the attitude's matrix, dimensionless, and of rates in units of what all
-        energy makes of the largest moment.
+        None for the steps of the grid. Otherwise each step is divided into substeps in which the last two terms of the series
+        are at most this large, relative to 1 for the attitude matrix and to the largest possible rate of the axis of largest
+        inertia.
 
     Raises
     ------
     BadInput
-        order is not an integer in that range, tolerance not a finite number above 0, or both are given.
+        order is not an integer in that range, tolerance is not a positive number, or both are given.
     """
 
     order: int | None = None
@@ -111,7 +109,7 @@ class Taylor(Method):
 
     @property
     def terms(self) -> int:
-        """Order of the series, also where a tolerance chooses it."""
+        """Order of the series, also if a tolerance determines it."""
         if self.tolerance is None:
             return self.order or DEFAULT
         return max(LOWEST, min(HIGHEST, round(6 - 2 / 3 * math.log10(self.tolerance))))

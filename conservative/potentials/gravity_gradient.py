@@ -19,25 +19,24 @@ from .varied import VariedGradient, fill
 
 @dataclass(frozen=True, eq=False, init=False)
 class GravityGradient:
-    """The gradient of a far centre's gravity on a body turning about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
+    """Gravity gradient of a distant centre on a body that rotates about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
 
-    The part of the potential that depends on attitude to second order in size over distance (Hughes, 9.3); the torque is 3
-    rate^2 u x J u, body axes. e points to the centre and stays where it is in the world: a satellite, whose centre does not,
-    has `Orbit.gravity_gradient`. V is quadratic in the base vectors, so its finite derivative is its gradient at their mean.
+    This is the second-order term in size over distance (Hughes, Spacecraft Attitude Dynamics, 9.3). The torque in body axes is
+    3 rate^2 u x J u. The direction e to the centre is fixed in the world; for a satellite use `Orbit.gravity_gradient`.
 
     Parameters
     ----------
     rate
-        sqrt(G M / r^3), rad/s, above 0: the rate of a circular orbit at that distance r.
+        sqrt(G M / r^3), rad/s, positive: the rate of a circular orbit at the distance r.
     inertia
         That of the body: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
     direction_W
-        Direction (3,) of the centre, world axes; its length does not matter, but must not be 0.
+        Direction (3,) of the centre, world axes; any length above 0.
 
     Raises
     ------
     BadInput
-        A parameter is not finite, of another shape, not above 0, or not an inertia.
+        A parameter is not finite, not positive, not an inertia, or has the wrong shape.
     """
 
     rate: float

@@ -96,16 +96,16 @@ class LinearSpring(PointPotential):
     stiffness
         N/m, above 0.
     point_B
-        Where it holds the body (3,), m, body axes, from the fixed point.
+        Attachment point on the body (3,), m, body axes, from the fixed point.
     anchor_W
-        Where it is fastened (3,), m, world axes, from the fixed point.
+        Attachment point in the world (3,), m, world axes, from the fixed point.
     rest_length
         m, 0 or more. With 0 the potential is quadratic in the base vectors.
 
     Raises
     ------
     BadInput
-        A parameter is not finite, of another shape or out of its range.
+        A parameter is not finite, out of range, or has the wrong shape.
     """
 
     stiffness: float
@@ -169,21 +169,21 @@ class LinearSpring(PointPotential):
 
 @dataclass(frozen=True, eq=False, init=False)
 class PointAttraction(PointPotential):
-    """Gravity or electricity between a point of the body and a point of the world: V = -strength / distance.
+    """Gravitational or electrostatic attraction of a body point to a world point: V = -strength / distance.
 
     Parameters
     ----------
     strength
-        G m M of two masses, or -q Q / (4 pi epsilon0) of two charges, J m; not 0, and below 0 where they repel.
+        G m M of two masses, or -q Q / (4 pi epsilon0) of two charges, J m; negative for repulsion, not 0.
     point_B
-        The body's point (3,), m, body axes, from the fixed point.
+        Body point (3,), m, body axes, from the fixed point.
     anchor_W
-        The world's point (3,), m, world axes, from the fixed point.
+        World point (3,), m, world axes, from the fixed point.
 
     Raises
     ------
     BadInput
-        A parameter is not finite, of another shape, or 0 where it must not be; or both points are the fixed point.
+        A parameter is not finite, 0, or has the wrong shape; or both points are the fixed point.
     """
 
     strength: float

@@ -15,35 +15,33 @@ from ..attitude import Array
 
 @runtime_checkable
 class Potential(Protocol):
-    """What a potential offers. A frozen value; attitudes are (..., 3, 3), energies in J, gradients in J.
+    """Base of all potentials: frozen values. Attitudes are (..., 3, 3), energies and gradients are in J.
 
-    There are two ways to a potential of one's own. The short one is `FunctionPotential(energy, gradient)`, two plain Python
-    functions, called from the compiled loop and differentiated by differences: a thousand times slower than a compiled field.
-    The fast one is a frozen class with the methods below, whose `kernel_field` returns a named tuple of its own that implements
-    the functions of `conservative.kernels.fields`: follow the example of `conservative/potentials/point_to_point.py` and
-    `conservative/kernels/point_fields.py`. Whatever it is, `finite_derivative` must satisfy its identity to round-off, since
-    energy is conserved to no better than that.
+    For a potential of your own, `FunctionPotential(energy, gradient)` with two Python functions is simple, and a thousand times
+    slower than a compiled field. For speed, write a frozen class with the methods below. Its `kernel_field` returns a named
+    tuple that implements the functions of `conservative.kernels.fields`: see `conservative/potentials/point_to_point.py` and
+    `conservative/kernels/point_fields.py`. `finite_derivative` must satisfy its identity to round-off, because energy is
+    conserved only as well as that.
 
-    A potential may have one method more, `in_units(energy)`, which returns the same field with energies in units of `energy`, a
-    power of two, J. With it our methods do scenes of any size, as they integrate in units in which a scene is of order one;
-    without it such scenes are integrated as they are.
+    An optional method `in_units(energy)` returns the field with energies in units of `energy` (J, a power of two). Our methods
+    need it to integrate very large and very small scenes in units in which they are of order one.
     """
 
     def energy(self, R_WB: Array) -> Array:
         """Return V, (...), in J."""
 
     def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J; the matrix need not be a rotation, as means of rotations are not."""
+        """Return dV/dR, (..., 3, 3), in J. The matrix can be the mean of two rotations."""
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
         """Return V*, (3, 3), with sum(V* (R_1 - R_0)) = V(R_1) - V(R_0) and V* -> dV/dR as R_1 -> R_0 (paper, 21)."""
 
     def scale(self) -> float:
-        """Return a size of V in J that is above 0 wherever the potential acts: what energy errors are relative to."""
+        """Return the reference scale of energy drifts in J, positive if the potential acts on the body."""
 
     @property
     def axis_W(self) -> Array | None:
-        """Return the unit vector (3,), world axes, about which the field is symmetric; None where there is none.
+        """Return the unit vector (3,) of the field's symmetry axis, world axes; None if there is none.
 
         The component of the world momentum along it is conserved.
         """

@@ -24,40 +24,39 @@ _ROUND_OFF = 8 * 2.0**-53
 
 @dataclass(frozen=True, eq=False, init=False)
 class FunctionPotential:
-    """A user's own potential, given by its energy and its gradient as functions of the matrix R_WB, and maybe of the time.
+    """A potential given by Python functions for its energy and gradient, of the matrix R_WB and optionally of time.
 
-    The compiled loop calls them through a pointer, dozens of times a step, so that a step costs one or two milliseconds, not a
+    The compiled loop calls the functions dozens of times per step, so a step takes one to two milliseconds instead of a
     fraction of a microsecond. The finite derivative is the discrete gradient of Gonzalez (1996), with Rbar the mean of both
     attitudes and D their difference:
 
         V* = G + (V(R1) - V(R0) - <G, D>) / <D, D> D        G = dV/dR at Rbar
 
-    It conserves energy to round-off for any V. Where the numerator is nothing but round-off, as it is for tiny steps, V* = G.
-    The attributes `energy`, `gradient` and `scale` are what every potential has: functions of attitudes (..., 3, 3).
+    It conserves energy to round-off for any V. For tiny steps, where the numerator is only round-off, V* = G.
 
-    Energy is not conserved where the functions depend on the time. Then `energy` and `gradient` have no value without one, and
-    a scene has no invariant but the momentum about `axis_W`; `Projected` and SciPy do it, other methods say that they do not.
+    If the functions depend on time, energy is not conserved, and the only invariant is the momentum about `axis_W`. `Projected`
+    and SciPy support this.
 
     Parameters
     ----------
     energy
-        V in J of a matrix (3, 3); it is also asked for matrices near a rotation, as means of rotations are.
+        Function that returns V in J for a matrix (3, 3). The matrix can be the mean of two rotations.
     gradient
-        dV/dR (3, 3) in J of such a matrix: entry i, j is the derivative by R[i, j].
+        Function that returns dV/dR (3, 3) in J for such a matrix: entry i, j is the derivative with respect to R[i, j].
     scale
-        A size of V in J, above 0, that energy errors are relative to; default the largest of a few gradients.
+        Reference scale of energy drifts, J, positive; default: the largest of a few gradients.
     axis_W
-        Unit vector (3,), world axes, about which the field is symmetric, at all times, if there is one.
+        Symmetry axis of the field, if there is one: unit vector (3,), world axes.
     time_dependent
-        Whether both are functions of the matrix and of the time, s: energy(R, t), gradient(R, t).
+        Whether both are functions of matrix and time (s): energy(R, t), gradient(R, t).
 
     Raises
     ------
     BadInput
-        A function cannot be called with what it is to be a function of, does not give finite numbers of the right shape, or the
-        gradient is not that of the energy (compared with differences at one attitude, and two times).
+        A function cannot be called with these arguments or does not return finite numbers of the right shape; or the gradient
+        is not the derivative of the energy (checked by finite differences).
     PotentialFailed
-        While integrating, one of the functions raised an exception, which is the cause.
+        A function raised an exception during integration, which is the cause.
 
     Examples
     --------

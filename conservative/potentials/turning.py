@@ -31,12 +31,12 @@ class Orbit:
     rate
         rad/s, above 0.
     normal_W
-        Axis (3,) that they turn about, right-handed, world axes; its length does not matter, but must not be 0.
+        Axis of rotation (3,), right-handed, world axes; any length above 0.
 
     Raises
     ------
     BadInput
-        rate is not a finite number above 0, or normal_W is not finite, of another shape, or 0.
+        rate is not a positive number, or normal_W is not finite, is 0, or has the wrong shape.
     """
 
     rate: float
@@ -52,20 +52,21 @@ class Orbit:
         return from_quaternion(np.concatenate([np.cos(half), np.sin(half) * self.normal_W], axis=-1))
 
     def gravity_gradient(self, inertia: ArrayLike, direction_W: ArrayLike) -> Turning:
-        """Return the gradient of a planet's gravity on a satellite in this orbit.
+        """Return the gravity gradient of a planet on a satellite in this orbit.
 
         Parameters
         ----------
         inertia
-            That of the satellite: moments (3,) or the tensor (3, 3) in body axes, kg m^2.
+            Inertia of the satellite: moments (3,) or tensor (3, 3), body axes, kg m^2.
         direction_W
-            Direction (3,) of the planet, or away from it, at t = 0, world axes: in the plane of the orbit, at right angles to
-            `normal_W`. What it has along that, up to 1e-9, is taken off.
+            Direction (3,) of the planet, or the opposite direction, at t = 0, world axes. It must be perpendicular to
+            `normal_W`; a relative deviation up to 1e-9 is removed.
 
         Raises
         ------
         BadInput
-            It is not; or a parameter is not finite, of another shape, not above 0, or not an inertia.
+            direction_W is not perpendicular to `normal_W`; or a parameter is not finite, not positive, not an inertia, or has
+            the wrong shape.
         """
         found = GravityGradient(self.rate, inertia, direction_W)
         nearest = found.direction_W - found.direction_W @ self.normal_W * self.normal_W
@@ -78,21 +79,21 @@ class Orbit:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Turning:
-    """A field that is fixed in axes O which turn: V(R_WB, t) = V_0(R_OB), R_OB = R_WO(t)' R_WB.
+    """A field that is fixed in turning axes O: V(R_WB, t) = V_0(R_OB), R_OB = R_WO(t)' R_WB.
 
-    Energy is not conserved, but the Jacobi integral is: E - rate n.l, with the normal n and the world momentum l.
+    The Jacobi integral E - rate n.l is conserved instead of the energy, with the normal n and the world momentum l.
 
     Parameters
     ----------
     potential
-        V_0, a potential that does not depend on the time. At t = 0 the field is this one, world axes.
+        V_0, a potential that does not depend on time. At t = 0 the axes O are the world axes.
     orbit
         The axes O.
 
     Raises
     ------
     BadInput
-        potential is no potential or depends on the time, or orbit is not an `Orbit`.
+        potential is not a potential, or depends on time; or orbit is not an `Orbit`.
     """
 
     potential: Potential

@@ -21,7 +21,7 @@ class UniformGravity:
     Parameters
     ----------
     weight
-        m g in N. Negative turns the field over.
+        m g, N; negative values reverse the field.
     com_B
         Centre of mass (3,) from the fixed point, m, body axes.
 
@@ -43,7 +43,7 @@ class UniformGravity:
 
     @property
     def moment_B(self) -> Array:
-        """Weight times centre of mass (3,), N m, body axes: all that the motion needs."""
+        """Weight times centre of mass (3,), N m, body axes. The motion depends on nothing else."""
         return self.weight * self.com_B
 
     def energy(self, R_WB: Array) -> Array:
@@ -57,7 +57,7 @@ class UniformGravity:
         return out
 
     def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (3, 3): V is linear in the base vectors, so the gradient itself is exact."""
+        """Return V*, (3, 3), in J: the gradient, which is exact because V is linear in the base vectors."""
         return self.gradient(R_0)
 
     @property
