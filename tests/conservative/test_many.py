@@ -7,7 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative.integration import blocks
+from conservative.integration import blocks, shared_choice
+from conservative.integration.inputs import read_bodies
+from conservative.methods.between import Samples
 from conservative.methods.many import Bodies
 
 from .many_bodies import BODY, fields, scene, starts, tensors
@@ -160,6 +162,24 @@ def test_one_step_for_all_comes_from_an_error():
     assert np.abs(found.R_WB - finer.R_WB).max() < 1e-6  # 2e-9
     with pytest.raises(cv.BadInput, match=r"^method: .* None together with error"):
         cv.integrate_many(own, R, w, **wanted, method="reduced")
+
+
+def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
+    n, goal = 100, shared_choice.Goal(1e-6, 2.0, Samples(None, 1))
+    bodies = read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), *starts(n), None, None)
+    numbers = shared_choice.pick(bodies)
+    sensitive, steps = numbers[-1], []  # one of those that are only verified
+    assert len(numbers) == 16
+
+    def find_worst(bodies, numbers, method, grid):
+        steps.append(grid.dt)
+        truncation = goal.error / 2 * (grid.dt / steps[0]) ** method.order
+        return max((truncation * (1e6 if i == sensitive else 1), i) for i in numbers)
+
+    monkeypatch.setattr(shared_choice, "find_worst", find_worst)
+    choice = shared_choice.choose_for_all(bodies, goal)
+    assert choice.reached
+    assert choice.grid.dt < steps[0] * 5e5 ** (-1 / choice.method.order)
 
 
 def test_an_error_below_round_off_is_a_warning():
