@@ -58,6 +58,8 @@ def test_floats_come_back_as_they_are(unfinished):
         (SMALL[:1] + SMALL[2:], ["--quick True, now False"]),
         ([*SMALL[:3], "turned_brick", *SMALL[4:]], ["scenes: brick_flip (now without)", "turned_brick missing (now with)"]),
         ([*SMALL[:5], "reduced:order=4"], ["methods: moser_veselov:order=2 (now without)"]),
+        ([*SMALL, "--time-limit", "7"], ["--time-limit ", "now 7"]),
+        ([*SMALL, "--bodies", "2", "--seed", "5"], ["--bodies ", "--seed 0, now 5"]),
         ([*SMALL, "--skip-missing"], ["--skip-missing False, now True"]),
         ([*SMALL[:3], "brick_flip:disturbance=1e-6", *SMALL[4:]], ["scenes: brick_flip"]),
     ],
