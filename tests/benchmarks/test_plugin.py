@@ -58,31 +58,6 @@ def test_without_the_option_other_projects_see_nothing(other):
     assert "accuracy beside time" not in text
 
 
-@pytest.mark.slow
-def test_without_the_option_the_suite_is_skipped_and_says_why(other):
-    code, text = run(other, SUITE, "-rs", "-k", "brick_flip-reduced-dt")
-    assert code == 0
-    assert "1 skipped" in text
-    assert "runs with --benchmark" in text
-
-
-@pytest.mark.slow
-def test_alone_it_runs_the_suite(other):
-    code, text = run(other, "--benchmark", "--collect-only", "-q")
-    assert code == 0
-    assert "test_speed.py::test_speed[brick_flip-reduced-dt0.01]" in text
-    assert "test_other" not in text
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--benchmark", "checks"), ("checks", "--benchmark")], ids=["before", "after"])
-def test_with_a_path_it_runs_what_is_there(other, options):
-    code, text = run(other, *options)
-    assert code == 0
-    assert "2 passed" in text
-    assert "test_speed" not in text
-
-
 def test_accuracy_stands_beside_the_times(other):
     _, text = run(other, "--benchmark", "checks")
     after = text.split("accuracy beside time")[1].splitlines()
@@ -101,22 +76,3 @@ def test_options_of_pytest_benchmark_keep_their_meaning(other):
     assert "1 passed, 1 skipped" in text
     (found,) = json.loads((other / "found.json").read_text())["benchmarks"]
     assert found["extra_info"] == {"label": "mine", "error": 1.25e-9}
-
-
-@pytest.mark.slow
-def test_without_pytest_benchmark_the_option_says_what_is_missing(other):
-    arguments = [sys.executable, "-m", "pytest", "-p", "no:benchmark", "-k", "plain", "checks"]
-    without = subprocess.run(arguments, cwd=other, capture_output=True, text=True, timeout=120, check=False)
-    assert without.returncode == 0
-    asked = subprocess.run([*arguments, "--benchmark"], cwd=other, capture_output=True, text=True, timeout=120, check=False)
-    assert asked.returncode == pytest.ExitCode.USAGE_ERROR
-    assert "pip install 'conservative-rotation[gate]'" in asked.stderr
-
-
-@pytest.mark.slow
-def test_under_workers_timing_is_off_and_says_so(other):
-    code, text = run(other, "--benchmark", "-n1", "checks")
-    assert code == 0
-    assert "timing is off under -n" in text
-    assert "accuracy beside time" not in text
-    assert "timing is off" not in run(other, "--benchmark", "-n0", "checks")[1]

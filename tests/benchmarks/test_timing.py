@@ -64,6 +64,23 @@ def test_a_budget_is_of_all_calls_of_a_sample(rest):
     assert (found.rounds, found.calls) == (5, 1000)
 
 
+@pytest.mark.parametrize(("each", "calls"), [(0.0009, 12), (0.0011, 10)])
+def test_calls_double_while_too_short_to_be_trusted(rest, each, calls):
+    """A sample of less than a tenth says little: twice as many then; else as many as are wanted."""
+    assert count_calls(lambda: rest(each), 0.01) == calls
+
+
+def test_a_sample_that_is_too_short_sets_no_number_of_calls(rest):
+    """One call that looks a hundred times as quick as the others is followed by two, not by a thousand."""
+    rests = iter([1e-3, 1e-5, *[1e-3] * 100])
+    assert count_calls(lambda: rest(next(rests)), 0.01) == 10
+
+
+@pytest.mark.parametrize(("budget", "rounds"), [(0.0399, 3), (0.0401, 4), (0.0601, 6), (1.0, 7)])
+def test_a_budget_is_what_the_next_round_must_not_exceed(rest, budget, rounds):
+    assert time_interleaved({"run": lambda: rest(0.01)}, budget=budget)["run"].rounds == rounds
+
+
 def test_the_collector_is_off_while_timing_and_on_afterwards(rest):
     seen = []
     time_interleaved({"look": lambda: (seen.append(gc.isenabled()), rest(1e-3))}, rounds=3, min_time=1e-6)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.declarations import Candidacy
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
@@ -44,29 +43,6 @@ AXIS = "momentum along the field's axis"
 )
 def test_order_and_invariants(method, name, order, conserves):
     assert (method.name, method.order, method.conserves, method.role) == (name, order, conserves, cv.Role.OURS)
-
-
-def test_candidates_and_their_cost():
-    assert (cv.Lame.candidacy, cv.Reduced.candidacy) == (Candidacy(1, exact=True), Candidacy(4, "implicit"))
-    assert (cv.MoserVeselov.candidacy.rank, cv.MoserVeselov.candidacy.exact) == (0, True)
-    assert (cv.Taylor.candidacy, cv.Projected.candidacy) == (Candidacy(1, "explicit"), Candidacy(2, "explicit"))
-    assert (cv.Gauss.candidacy.rank, cv.Gauss.candidacy.group) == (3, "implicit")
-    costs = [(each.cost.step, each.cost.correction) for each in (cv.Reduced(), cv.Gauss(5), cv.Projected())]
-    assert costs == [(10, 50), (90, 32.5), (340, 80)]
-    assert [each.order for each in cv.Reduced.candidate_settings()] == [2, 4, 6, 8]
-    assert [each.order for each in cv.MoserVeselov.candidate_settings()] == [None]
-
-
-def test_settings_that_are_shown():
-    assert [each.order for each in cv.Reduced.variants()] == [2, 4, 6, 8, 10]
-    assert [each.order for each in cv.Reduced.suite_settings()] == [2, 4, 6]
-    assert cv.Reduced.picture_settings() == (cv.Reduced(),)
-    assert [each.stages for each in cv.Gauss.variants()] == [2, 4, 6, 8]
-    assert [each.stages for each in cv.Gauss.suite_settings()] == [2, 6]
-    assert [each.order for each in cv.MoserVeselov.variants()] == [2, 4, 6, 8, 10, None]
-    assert [each.order for each in cv.MoserVeselov.suite_settings()] == [2, None]
-    assert cv.Convected.picture_settings() == (cv.Convected(),)
-    assert (cv.Convected().tol, cv.Reduced().tol, cv.Gauss().stages, cv.Substepped().most) == (1e-8, 1e-20, 6, 64)
 
 
 @pytest.mark.parametrize(
@@ -107,13 +83,6 @@ def test_what_is_refused(make, argument):
     with pytest.raises(cv.BadInput) as raised:
         make()
     assert raised.value.argument == argument
-
-
-def test_rows_of_a_tableau_that_are_refused_are_counted():
-    with pytest.raises(cv.BadInput, match=r"A: got rows of \[0, 0\]; allowed: rows of 0 to 1 coefficients"):
-        explicit.ExplicitTableau("", 1, ((), ()), (0.5, 0.5))
-    with pytest.raises(cv.BadInput, match=r"b: got sum b A c\^0 = 0.6; allowed: 0.5, as order 2 asks for"):
-        explicit.ExplicitTableau("", 2, ((), (0.6,)), (0.0, 1.0))
 
 
 def test_what_is_at_the_edge_of_what_is_allowed():
