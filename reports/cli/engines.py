@@ -30,7 +30,7 @@ def _source(find_links: Path | None, allow_build: bool) -> Any:
 
 
 @click.group(
-    short_help="Install engines in environments of their own.",
+    short_help="Install, list and remove engines.",
     epilog=epilog(
         "conservative engines install exudyn mujoco==3.6.0",
         "conservative run brick_flip --method exudyn:RK44",
@@ -38,20 +38,20 @@ def _source(find_links: Path | None, allow_build: bool) -> Any:
     ),
 )
 def engines() -> None:
-    """Have engines, in any version, each in an environment of its own in the user's cache folder."""
+    """Install engines, in any version, each in its own environment in the user's cache folder."""
 
 
-json_option = click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
-@engines.command(short_help="Make environments.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))
+@engines.command(short_help="Install engines.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @find_links_option
 @allow_build_option
 @json_option
 @click.pass_context
 def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool, as_json: bool) -> None:
-    """Make the environment of each NAME, by default of its newest version, unless it is there.
+    """Install each engine NAME, by default in its newest version, in a new environment.
 
     The exit code is 1 if an engine was installed but cannot be imported.
     """
@@ -73,10 +73,10 @@ def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None,
     ctx.exit(int(any(each.trouble for each in done)))
 
 
-@engines.command("list", short_help="Show them.", epilog=epilog("conservative engines list --json"))
+@engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))
 @json_option
 def list_engines(as_json: bool) -> None:
-    """Show the engines that can be had, and the environments that are there, with every package's version."""
+    """List the available engines, and the installed environments with the version of every package."""
     _require()
     from ..tables.engines import json_text, lines
 
@@ -84,11 +84,11 @@ def list_engines(as_json: bool) -> None:
         click.echo(line)
 
 
-@engines.command(short_help="Remove environments.", epilog=epilog("conservative engines remove mujoco==3.6.0"))
+@engines.command(short_help="Remove engines.", epilog=epilog("conservative engines remove mujoco==3.6.0"))
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @json_option
 def remove(names: tuple[str, ...], as_json: bool) -> None:
-    """Remove the environment of each NAME==VERSION, or all of NAME."""
+    """Remove the environment of each NAME==VERSION, or all environments of NAME."""
     _require()
     from conservative.references.environments.install import remove
 

@@ -11,15 +11,15 @@ from .options import epilog
 
 @click.command(
     "list",
-    short_help="Show scenes and methods.",
+    short_help="List scenes and methods.",
     epilog=epilog(
         "conservative list",
         "conservative list --json | jq '.methods[] | select(.available) | .name'",
     ),
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_all(as_json: bool) -> None:
-    """Show the scenes, grouped, and the methods, with what they conserve and whether their engine is installed."""
+    """List scenes and methods with their invariants and installed engines."""
     require_extra("conservative list", "report", "rich")
     from ..tables.catalogue import json_text, tables
     from ..terminal.tables import print_tables

@@ -74,17 +74,17 @@ def _as_click(error: Exception) -> Exception:
 @click.group(
     cls=Commands,
     epilog=epilog(
-        "conservative report                      everything, into report/",
-        "conservative run brick_flip --dt 0.01    one run",
-        "conservative list                        scenes and methods",
+        "conservative report                      measure the main scenes, write report/",
+        "conservative run brick_flip --dt 0.01    integrate a scene once",
+        "conservative list                        show scenes and methods",
     ),
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(package_name="conservative-rotation", message="%(prog)s %(version)s")
 def main() -> None:
-    """Integrate the rotation of rigid bodies so that energy and momentum stay, and measure that beside other engines.
+    """Integrate the rotation of rigid bodies with conserved energy and momentum, and compare with physics engines.
 
-    Completion of names and files: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)", or zsh_source, or fish_source.
+    Tab completion: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)"; or zsh_source, fish_source.
     """
 
 

@@ -8,16 +8,16 @@ from .options import epilog
 
 
 @click.command(
-    short_help="Write a scene file to start from.",
+    short_help="Print a scene file to edit.",
     epilog=epilog(
         "conservative new > my_body.toml",
         "conservative run my_body.toml",
         "conservative new --json | jq '.choices.shape'",
     ),
 )
-@click.option("--json", "as_json", is_flag=True, help="Keys with their meanings, what else there is, and the text, as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the keys, their meanings and allowed values, and the text as JSON.")
 def new(as_json: bool) -> None:
-    """Print a scene file with every key explained; every command takes such a file where it takes the name of a scene."""
+    """Print a scene file with every key explained. Commands accept such a file instead of a scene's name."""
     from conservative.scene_files.scene_file import template
 
     from ..tables.scene_file import json_text

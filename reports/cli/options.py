@@ -13,8 +13,8 @@ from conservative.errors import BadInput
 
 EXIT_CODES = """Exit codes:
     0    done
-    1    a run failed: it did not converge, or diverged; or the gate is not passed
-    2    the command or an input cannot be used, or an engine or a baseline is missing
+    1    a run failed, or the gate did not pass
+    2    invalid command or input, or a missing engine or baseline
     130  interrupted by Ctrl-C, 143 by SIGTERM; report and sweep keep what is finished, and --resume goes on
 """
 
@@ -160,10 +160,10 @@ class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the 
 find_links_option = click.option(
     "--find-links",
     type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
-    help="Folder of wheels to take everything from, without a network.",
+    help="Install from this folder of wheels, without a network.",
 )
 allow_build_option = click.option(
-    "--allow-build", is_flag=True, help="Run a package's own code to build it, where it has no wheel."
+    "--allow-build", is_flag=True, help="Build packages that have no wheel, which runs their code."
 )
 
 

@@ -15,7 +15,7 @@ from .options import OutputCommand, OutputFile, epilog
 
 @click.command(
     cls=OutputCommand,
-    short_help="Integrate one scene once.",
+    short_help="Integrate a scene once.",
     epilog=epilog(
         "conservative run brick_flip --method reduced --dt 0.01",
         "conservative run lagrange_top -m mujoco:RK4 --dt 0.001 --t-end 2 --json",
@@ -27,17 +27,17 @@ from .options import OutputCommand, OutputFile, epilog
     "--method",
     "-m",
     shell_complete=completion.methods,
-    help=f"Name, with settings.  [default: {DEFAULT_METHOD}, or one for fields that depend on the time]",
+    help=f"Method with settings.  [default: {DEFAULT_METHOD}, or the first that supports the field]",
 )
-@click.option("--dt", type=float, help="Step, s; of an adaptive method the distance of samples.  [default: the scene's]")
+@click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
-@click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
-@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples: t, R_WB, w_WB_B, energy, momentum.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples t, R_WB, w_WB_B, energy, momentum.")
 def run(scene: str, method: str | None, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
-    """Integrate SCENE once and show how it ended, its drifts and its last state.
+    """Integrate SCENE once and print its outcome, drifts and final state.
 
-    Every step is a sample; of more than a million steps, as many samples, evenly spaced, at most.
-    A run that fails leaves what it reached in the file, and exits with 1.
+    Every step is stored, or at most a million evenly spaced samples. If the run fails, the file contains the samples
+    before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")
     from ..run.single_run import json_text, run_once, summary_text
