@@ -15,7 +15,7 @@ from .options import epilog
         "conservative new --json | jq '.choices.shape'",
     ),
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the keys, their meanings and allowed values, and the text as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print keys, meanings, allowed values and the text as JSON.")
 def new(as_json: bool) -> None:
     """Print a scene file with every key explained. Commands accept such a file instead of a scene's name."""
     from conservative.scene_files.scene_file import template
