@@ -53,7 +53,7 @@ def recommend(
     """
     require_extra("conservative recommend", "report")
     from conservative import registry
-    from conservative.benchmarks.recommendation.question import ask
+    from conservative.benchmarks.recommendation.recommend import ask
     from conservative.benchmarks.recommendation.recommend import recommend as answer
     from conservative.files import make_folder, text_file
 

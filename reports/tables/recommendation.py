@@ -7,10 +7,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from conservative.benchmarks.recommendation.advice import Advice
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
-from conservative.benchmarks.recommendation.recommend import Recommendation
+from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
 from conservative.benchmarks.studies.method_names import names_of
 from conservative.benchmarks.studies.selection import tolerance_setting
 

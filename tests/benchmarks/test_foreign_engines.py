@@ -7,8 +7,7 @@ import sys
 import pytest
 
 from conservative import registry
-from conservative.benchmarks.recommendation.question import Question, list_engines
-from conservative.benchmarks.recommendation.recommend import recommend
+from conservative.benchmarks.recommendation.recommend import Question, list_engines, recommend
 from conservative.outcome import OutcomeKind
 
 from ..environments import ROOT, variables
@@ -65,7 +64,7 @@ def python(variables, *arguments):
 
 
 def test_the_engines_are_found_where_they_are_installed(installed):
-    code = "from conservative.benchmarks.recommendation.question import list_engines; print(*(m.name for m in list_engines()))"
+    code = "from conservative.benchmarks.recommendation.recommend import list_engines; print(*(m.name for m in list_engines()))"
     status, text = python(installed, "-c", code)
     assert status == 0, text
     assert {"foreign_fast", "foreign_slow", "foreign_harm"} <= set(text.split())

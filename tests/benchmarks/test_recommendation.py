@@ -11,8 +11,7 @@ from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
 from conservative.benchmarks.recommendation import extrapolation
 from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, Scaling, fit_law
-from conservative.benchmarks.recommendation.question import ask, list_engines
-from conservative.benchmarks.recommendation.recommend import recommend
+from conservative.benchmarks.recommendation.recommend import ask, list_engines, recommend
 from conservative.method import Grid
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.exact.method import Exact
