@@ -2,7 +2,7 @@
 
     FOLDER/exudyn/1.13.6/         a virtual environment
     FOLDER/exudyn/1.13.6/record.json, lock.txt
-    FOLDER/temporary/             what is being made, and what engines write; `doctor` clears what is left there
+    FOLDER/temporary/             what is being made, and what engines write; `clear_leftovers` removes it
 
 FOLDER is `engines` in the user's cache folder of this package, as platformdirs knows it.
 """
@@ -10,7 +10,6 @@ FOLDER is `engines` in the user's cache folder of this package, as platformdirs 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -105,15 +104,10 @@ def read_environment(folder: Path) -> Environment | None:
     return found if (found.engine, found.version) == (folder.parent.name, folder.name) else None
 
 
-def folders() -> Iterator[Path]:
-    """Yield the folder of each environment, be it whole or not."""
-    found = (path for path in sorted(folder_of_all().glob("*/*")) if path.parent.name != "temporary" and path.is_dir())
-    yield from (path for path in found if not path.name.startswith("."))
-
-
 def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
     """Return the environments of an engine, or all, that are whole: by name, older versions first."""
-    found = [environment for folder in folders() if (environment := read_environment(folder))]
+    folders = folder_of_all().glob("*/[!.]*")
+    found = [environment for folder in folders if (environment := read_environment(folder))]
     mine = [environment for environment in found if engine in (None, environment.engine)]
     return tuple(sorted(mine, key=lambda each: (each.engine, version_key(each.version))))
 

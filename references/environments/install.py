@@ -6,17 +6,19 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput, nearest
-from conservative.files import leftovers, temporary
 from conservative.files import remove as remove_tree
+from conservative.files import remove_leftovers, temporary
 
 from .catalogue import Distribution, distribution_of
 from .environment import (
     LOCK,
     Environment,
+    find_environment,
     folder_of_all,
     folder_of_projects,
     interpreter_of,
@@ -24,8 +26,8 @@ from .environment import (
     read_environment,
     temporary_folder,
 )
-from .failures import EngineCrashed, EngineTimeout
-from .lock import Lock, Source, resolve, split_requirement
+from .failures import EngineCrashed, EngineTimeout, MissingEnvironment
+from .lock import Lock, Source, find_python, resolve, split_requirement
 from .uv_command import UvFailed, run_uv
 from .workers import close_workers, worker_of
 
@@ -49,8 +51,11 @@ class Installation:
     trouble: str
 
 
-def install(requirement: str, source: Source | None = None) -> Installation:
-    """Return the environment of `NAME` or `NAME==VERSION`, made where it is not there.
+def install(requirement: str, source: Source | None = None, force: bool = False) -> Installation:
+    """Return the environment of `NAME` or `NAME==VERSION`, made if it is not there.
+
+    With `force` an environment that is there is made again with the same packages, from its lock. It is replaced when the new
+    one is complete.
 
     Raises
     ------
@@ -61,11 +66,18 @@ def install(requirement: str, source: Source | None = None) -> Installation:
     engine, version = split_requirement(requirement)
     distribution = distribution_of(engine)
     clear_leftovers()
-    lock = resolve(distribution, version, source)
+    try:
+        there = find_environment(engine, version) if force else None
+    except MissingEnvironment:
+        there = None
+    if there is not None:
+        lock = Lock(there.version, find_python(there.python), (there.folder / LOCK).read_text(encoding="utf-8"))
+    else:
+        lock = resolve(distribution, version, source)
     folder = folder_of_all() / engine / lock.version
-    there = read_environment(folder)
-    environment = there or make(engine, lock, folder, source)
-    return Installation(environment, there is None, import_trouble(environment, distribution))
+    found = None if force else read_environment(folder)
+    environment = found or make(engine, lock, folder, source)
+    return Installation(environment, found is None, import_trouble(environment, distribution))
 
 
 def check(requirement: str) -> None:
@@ -85,7 +97,8 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, _make_folder) as (scratch, _):
             _fill(scratch, lock, source)
-            Environment(engine, lock.version, scratch, _python_of(scratch), freeze(scratch)).write()
+            packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", interpreter_of(scratch)).splitlines())
+            Environment(engine, lock.version, scratch, _python_of(scratch), packages).write()
             _replace(folder, scratch)
     except UvFailed as failure:
         raise BadInput("engine", f"{engine}=={lock.version}", f"what uv can install ({failure.summary})") from None
@@ -108,11 +121,6 @@ def _fill(folder: Path, lock: Lock, source: Source) -> None:
     run_uv("pip", "sync", *options, *source.options, folder / LOCK)
 
 
-def freeze(folder: Path) -> tuple[str, ...]:
-    """Return all that is installed in an environment, as `name==version`."""
-    return tuple(run_uv("pip", "freeze", "--quiet", "--python", interpreter_of(folder)).split("\n")[:-1])
-
-
 def _python_of(folder: Path) -> str:
     ask = [str(interpreter_of(folder)), "-I", "-c", "import platform; print(platform.python_version())"]
     return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
@@ -120,13 +128,13 @@ def _python_of(folder: Path) -> str:
 
 def _replace(folder: Path, scratch: Path) -> None:
     """Give a folder its name; what has that name goes."""
-    if folder.exists():
-        drop(folder)
-    try:
-        scratch.rename(folder)
-    except OSError:  # another process was faster
-        if read_environment(folder) is None:
-            raise
+    close_workers(folder)
+    with _removed(folder) if folder.exists() else nullcontext():
+        try:
+            scratch.rename(folder)
+        except OSError:  # another process was faster
+            if read_environment(folder) is None:
+                raise
 
 
 def import_trouble(environment: Environment, distribution: Distribution) -> str:
@@ -156,30 +164,38 @@ def remove(requirement: str) -> tuple[Environment, ...]:
             f"what is installed: {nearest(requirement, there)}" if there else "a name after something is installed",
         )
     for environment in found:
-        close_workers(environment)
+        close_workers(environment.folder)
         drop(environment.folder)
     return found
 
 
 def drop(folder: Path) -> None:
     """Remove a folder: under another name first, so that nothing half removed is ever used."""
+    with _removed(folder):
+        pass
+
+
+@contextmanager
+def _removed(folder: Path) -> Iterator[None]:
+    """Rename a folder away, and remove it at the end of the block; it gets its name back if the block raises."""
     away = Path(tempfile.mkdtemp(prefix=f"removed-{os.getpid()}-", dir=temporary_folder()))
     folder.rename(away / folder.name)
-    remove_tree(away)
+    try:
+        yield
+    except BaseException:
+        (away / folder.name).rename(folder)
+        raise
+    finally:
+        remove_tree(away)
 
 
-def clear_leftovers() -> list[str]:
-    """Remove what processes have left that were ended in the middle; return the names."""
-    left = [path for path in _leftovers() if path.exists()]
-    for path in left:
-        remove_tree(path)
-    return [path.name for path in left]
-
-
-def _leftovers() -> Iterator[Path]:
+def clear_leftovers() -> None:
+    """Remove what processes have left that were ended in the middle."""
     for path in (*folder_of_all().glob("*/.*-*"), *folder_of_projects().glob("*/.*-*")):
-        yield from leftovers(path.with_name(path.name[1:].rpartition("-")[0]))
-    yield from (path for path in sorted(temporary_folder().iterdir()) if not _alive(path.name))
+        remove_leftovers(path.with_name(path.name[1:].rpartition("-")[0]))
+    for path in temporary_folder().iterdir():
+        if not _alive(path.name):
+            remove_tree(path)
 
 
 def _alive(name: str) -> bool:

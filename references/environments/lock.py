@@ -139,6 +139,11 @@ def normal_name(package: str) -> str:
     return re.sub(r"[-_.]+", "-", package.partition("[")[0]).lower()
 
 
+def find_python(version: str) -> str:
+    """Return the path of a Python with the major and minor number of a version, such as 3.11.7; ours if there is none."""
+    return dict(_pythons()).get(".".join(version.split(".")[:2]), sys.executable)
+
+
 def _pythons() -> Iterator[tuple[str, str]]:
     """Yield version and path of this Python, then of others on the machine, newer ones first."""
     ours = f"{sys.version_info.major}.{sys.version_info.minor}"

@@ -61,7 +61,7 @@ def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> 
     except BadInput as error:
         raise BadInput("against", error.got, error.allowed) from None
     trouble = import_trouble(found, distribution)
-    close_workers(found)
+    close_workers(found.folder)
     if trouble:
         raise BadInput("against", f"{wheel.name}, in whose environment {trouble}", f"a version that needs {US}, which imports")
     os.utime(folder / RECORD)

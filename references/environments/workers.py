@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from threading import Lock
 
 from .client import Worker
@@ -19,7 +20,7 @@ def worker_of(environment: Environment, variables: Mapping[str, str] | None = No
 
     A forked process has workers of its own, as two cannot share a pipe.
     """
-    key = (str(environment.folder), *sorted((variables or {}).items())), os.getpid()
+    key = (environment.folder, *sorted((variables or {}).items())), os.getpid()
     with _lock:
         if key not in _workers:
             home = environment.folder / "home"
@@ -28,8 +29,8 @@ def worker_of(environment: Environment, variables: Mapping[str, str] | None = No
 
 
 @atexit.register
-def close_workers(environment: Environment | None = None) -> None:
+def close_workers(folder: Path | None = None) -> None:
     """End the workers of an environment, by default all of this process; each is started again when it is asked."""
-    for ((folder, *_), process), worker in list(_workers.items()):
-        if process == os.getpid() and (environment is None or folder == str(environment.folder)):
+    for ((place, *_), process), worker in list(_workers.items()):
+        if process == os.getpid() and folder in (None, place):
             worker.close()

@@ -19,16 +19,6 @@ if TYPE_CHECKING:
 Value = TypeVar("Value")
 
 
-def _require() -> None:
-    require_extra("conservative engines", "environments")
-
-
-def _source(find_links: Path | None, allow_build: bool) -> Any:
-    from conservative.references.environments.lock import Source
-
-    return Source(find_links, allow_build)
-
-
 @click.group(
     short_help="Install, list and remove engines.",
     epilog=epilog(
@@ -48,26 +38,29 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON."
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @find_links_option
 @allow_build_option
+@click.option("--force", is_flag=True, help="Build an environment that is there again, with the same packages.")
 @json_option
 @click.pass_context
-def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool, as_json: bool) -> None:
+def install(
+    ctx: click.Context, names: tuple[str, ...], find_links: Path | None, allow_build: bool, force: bool, as_json: bool
+) -> None:
     """Install each engine NAME, by default in its newest version, in a new environment.
 
     The exit code is 1 if an engine was installed but cannot be imported.
     """
-    _require()
+    require_extra("conservative engines", "environments")
     from conservative.references.environments.install import check, install
+    from conservative.references.environments.lock import Source
 
     from ..tables.engines import installation_line
 
-    source = _source(find_links, allow_build)
     for name in names:
         check(name)  # all of them, before the first takes minutes
 
     def install_each() -> Iterable[Installation]:
         for name in names:
-            click.echo(f"{name}: looking for it, and installing it where it is not there", err=True)
-            yield install(name, source)
+            click.echo(f"installing {name}", err=True)
+            yield install(name, Source(find_links, allow_build), force)
 
     done = _show(install_each(), installation_line, as_json)
     ctx.exit(int(any(each.trouble for each in done)))
@@ -77,7 +70,7 @@ def install(ctx: click.Context, names: tuple[str, ...], find_links: Path | None,
 @json_option
 def list_engines(as_json: bool) -> None:
     """List the available engines, and the installed environments with the version of every package."""
-    _require()
+    require_extra("conservative engines", "environments")
     from ..tables.engines import json_text, lines
 
     for line in [json_text()] if as_json else lines():
@@ -89,29 +82,12 @@ def list_engines(as_json: bool) -> None:
 @json_option
 def remove(names: tuple[str, ...], as_json: bool) -> None:
     """Remove the environment of each NAME==VERSION, or all environments of NAME."""
-    _require()
+    require_extra("conservative engines", "environments")
     from conservative.references.environments.install import remove
 
     from ..tables.engines import removal_line
 
     _show((environment for name in names for environment in remove(name)), removal_line, as_json)
-
-
-@engines.command(short_help="Find and mend broken ones.", epilog=epilog("conservative engines doctor"))
-@click.option("--dry-run", is_flag=True, help="Only say what is wrong; exit code 1 if anything is.")
-@find_links_option
-@allow_build_option
-@json_option
-@click.pass_context
-def doctor(ctx: click.Context, dry_run: bool, find_links: Path | None, allow_build: bool, as_json: bool) -> None:
-    """Check each environment against what was recorded of it, and make those anew that differ."""
-    _require()
-    from conservative.references.environments.doctor import examine
-
-    from ..tables.engines import finding_line
-
-    found = _show(examine(not dry_run, _source(find_links, allow_build)), finding_line, as_json)
-    ctx.exit(int(any(each.trouble and each.remedy not in ("made anew", "removed") for each in found)))
 
 
 def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:

@@ -18,6 +18,7 @@ from .options import OutputCommand, OutputFile, epilog
     short_help="Integrate a scene once.",
     epilog=epilog(
         "conservative run brick_flip --method reduced --dt 0.01",
+        "conservative run brick_flip -m reduced -m mujoco:RK4        a table of both",
         "conservative run lagrange_top -m mujoco:RK4 --dt 0.001 --t-end 2 --json",
         "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
     ),
@@ -26,25 +27,42 @@ from .options import OutputCommand, OutputFile, epilog
 @click.option(
     "--method",
     "-m",
+    "methods",
+    multiple=True,
     shell_complete=completion.methods,
-    help=f"Method with settings.  [default: {DEFAULT_METHOD}, or the first that supports the field]",
+    help=f"Method with settings; repeat it for a table.  [default: {DEFAULT_METHOD}, or the first that supports the field]",
 )
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples t, R_WB, w_WB_B, energy, momentum.")
-def run(scene: str, method: str | None, dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
-    """Integrate SCENE once and print its outcome, drifts and final state.
+def run(
+    scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None
+) -> None:
+    """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
 
     Every step is stored, or at most a million evenly spaced samples. If the run fails, the file contains the samples
     before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")
-    from ..run.single_run import json_text, run_once, summary_text
-    from ..terminal.progress import show_waiting
+    from ..run.single_run import compare, comparison_table, json_text, run_once, summary_text
+    from ..terminal.progress import progress, show_waiting
+    from ..terminal.tables import print_tables
 
-    with show_waiting(f"{scene}: {method}" if method else scene) as expect:
-        summary = run_once(scene, method, dt, t_end, csv, expect)
-    click.echo(json_text(summary) if as_json else summary_text(summary))
-    if not summary["outcome"].ok:
-        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {summary['outcome']}")
+    if len(methods) > 1:
+        if csv is not None:
+            raise click.UsageError("--csv holds the samples of one method; give --method once.")
+        with progress() as step:
+            summaries = compare(scene, methods, dt, t_end, step)
+    else:
+        with show_waiting(": ".join([scene, *methods])):
+            summaries = [run_once(scene, methods[0] if methods else None, dt, t_end, csv)]
+    if as_json:
+        click.echo(json_text(summaries))
+    elif len(methods) > 1:
+        print_tables([comparison_table(summaries)])
+    else:
+        click.echo(summary_text(summaries[0]))
+    failed = [f"{each['label']} on {each['scene']}: {each['outcome']}" for each in summaries if not each["outcome"].ok]
+    if failed:
+        raise click.ClickException("; ".join(failed))

@@ -1,20 +1,19 @@
-"""One run of one method on one scene: its summary and its samples."""
+"""One run of one method on one scene: its summary and its samples; and a table of several methods."""
 
 from __future__ import annotations
 
 import csv
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
-from io import StringIO
 from pathlib import Path
+from time import perf_counter
 from typing import IO, Any
 
 from conservative import registry
-from conservative.attitude import orthonormality
-from conservative.benchmarks.measures.timing import wall_time
+from conservative.attitude import angle_between, orthonormality
 from conservative.errors import BadInput
 from conservative.files import text_file
 from conservative.integration.one import default_method, integrate, require_support
@@ -22,29 +21,28 @@ from conservative.invariants import Invariant, sizes
 from conservative.method import Grid, Method, grid_for
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
+from conservative.references.exact.method import Exact
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..tables.cells import outcome_record
-from ..terminal.progress import Expect
+from ..tables.cells import DASH, outcome_record
+from ..terminal.progress import Step
+from ..terminal.tables import TerminalTable
 
-TRIAL = 100
-"""The part of a run's steps, as a divisor, that runs first to tell how long the run takes."""
 SAMPLES = 1_000_000
 """Largest number of samples; every step is one in runs of no more steps."""
 STEPS = 10**11
 """Largest number of steps: a day's work of a fast method."""
+TIMED = 0.2
+"""Time, s, for which a run of a table is repeated; a longer one is made once."""
+FIRST_STEPS = 10
+"""Steps of the run that compiles a method before it is timed."""
 
 
 def run_once(
-    scene_name: str,
-    method_name: str | None,
-    dt: float | None,
-    t_end: float | None,
-    samples: Path | None,
-    expect: Expect | None = None,
+    scene_name: str, method_name: str | None, dt: float | None, t_end: float | None, samples: Path | None
 ) -> dict[str, Any]:
-    """Integrate and return the summary; samples go to the file `samples` if there is one; `expect` is told how long it takes.
+    """Integrate and return the summary; samples go to the file `samples` if there is one.
 
     Raises
     ------
@@ -55,15 +53,53 @@ def run_once(
     """
     scene = registry.scene(scene_name)
     method = registry.method(method_name) if method_name else default_method(scene)
-    grid = _bounded_grid(scene, method, scene.dt if dt is None else dt, t_end)
+    grid = bounded_grid(scene, method, dt, t_end)
     with text_file(samples, "csv") if samples else nullcontext() as stream:
-        if expect is not None:
-            _announce_time(scene, method, grid, stream is not None, expect)
-        return _integrate(scene, method, grid, stream)
+        trajectory = _integrate(scene, method, grid)
+        if stream is not None:
+            write_samples(trajectory, stream)
+    return summarize(trajectory, method, grid.dt)
 
 
-def _bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
+def compare(
+    scene_name: str, method_names: Sequence[str], dt: float | None, t_end: float | None, step: Step
+) -> list[dict[str, Any]]:
+    """Return the summary of each method on a scene, with its wall time and the attitude error at the end of the run.
+
+    The summary has `wall_time`, s, of the fastest run after a short first one, which compiles, and `attitude_error`, rad, relative to
+    the exact solution. The error is None where no exact solution is known, or the run did not reach its end.
+
+    Raises
+    ------
+    BadInput
+        A name, a setting, dt or t_end cannot be used, or a method does not take the scene; found before the first run.
+    MissingEngine
+        The engine of a method is not installed.
+    """
+    scene = registry.scene(scene_name)
+    runs = [(method, bounded_grid(scene, method, dt, t_end)) for method in map(registry.method, method_names)]
+    for method, _ in runs:
+        _ = method.label  # raises `MissingEngine`
+    exact = Exact()
+    found = []
+    for number, (method, grid) in enumerate(runs):
+        step(number / len(runs), method.name)
+        _integrate(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
+        wall_time, error, begin = math.inf, None, perf_counter()
+        while wall_time == math.inf or perf_counter() - begin < TIMED:
+            start = perf_counter()
+            trajectory = _integrate(scene, method, grid)
+            wall_time = min(wall_time, perf_counter() - start)
+        if trajectory.ok and exact.unsupported(scene) is None:
+            truth = exact.solve(scene, Grid(grid.dt * grid.n_steps, 1))
+            error = float(angle_between(trajectory.R_WB[-1:], truth.R_WB[-1:])[0])
+        found.append(summarize(trajectory, method, grid.dt) | {"attitude_error": error, "wall_time": wall_time})
+    return found
+
+
+def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
     """Return the steps and samples, or find what `integrate` would refuse before a file is opened."""
+    dt = scene.dt if dt is None else dt
     try:
         grid = grid_for(scene, dt, t_end, STEPS)  # few samples: how many there will be is decided below
     except OverflowError:  # more steps than a float can count
@@ -74,20 +110,8 @@ def _bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float |
     return Grid(grid.dt, grid.n_steps, math.ceil(grid.n_steps / SAMPLES))
 
 
-def _integrate(scene: Scene, method: Method, grid: Grid, stream: IO[str] | None) -> dict[str, Any]:
-    duration = grid.dt * grid.n_steps
-    trajectory = integrate(scene, grid.dt, method, duration, grid.every, on_failure="return")
-    if stream is not None:
-        write_samples(trajectory, stream)
-    return summarize(trajectory, method, grid.dt)
-
-
-def _announce_time(scene: Scene, method: Method, grid: Grid, writes: bool, expect: Expect) -> None:
-    """Do the first of `TRIAL` parts, again now that it is compiled, and tell how long all take; of few steps say nothing."""
-    if grid.n_steps >= TRIAL:
-        part = replace(grid, n_steps=grid.n_steps // TRIAL)
-        _integrate(scene, method, part, None)
-        expect(TRIAL * wall_time(lambda: _integrate(scene, method, part, StringIO() if writes else None)))
+def _integrate(scene: Scene, method: Method, grid: Grid) -> Trajectory:
+    return integrate(scene, grid.dt, method, grid.dt * grid.n_steps, grid.every, on_failure="return")
 
 
 def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:
@@ -131,9 +155,10 @@ def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
     writer.writerows(samples_of(trajectory).tolist())
 
 
-def json_text(summary: dict[str, Any]) -> str:
-    """Return the summary as JSON."""
-    content = summary | {"outcome": outcome_record(summary["outcome"])}
+def json_text(summaries: list[dict[str, Any]]) -> str:
+    """Return the summary as JSON; of several a list."""
+    every = [summary | {"outcome": outcome_record(summary["outcome"])} for summary in summaries]
+    content = every if len(every) > 1 else every[0]
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -152,6 +177,25 @@ def summary_text(summary: dict[str, Any]) -> str:
     ]
     width = max(len(name) for name, _ in lines)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
+
+
+def comparison_table(summaries: list[dict[str, Any]]) -> TerminalTable:
+    """Return a table with a row for each method on a scene."""
+    first = summaries[0]
+    drifts = list(first["drift"])
+    header = ["method", "outcome", *(f"drift of {name}" for name in drifts), "attitude error, rad", "steps", "wall time, s"]
+    rows = [
+        [
+            summary["method"],
+            str(summary["outcome"]),
+            *(f"{summary['drift'][name]:.1e}" for name in drifts),
+            DASH if summary["attitude_error"] is None else f"{summary['attitude_error']:.1e}",
+            f"{summary['counters']['steps']:,}",
+            f"{summary['wall_time']:.2g}",
+        ]
+        for summary in summaries
+    ]
+    return TerminalTable(f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s", header, rows)
 
 
 def _last_lines(last: dict[str, Any] | None) -> list[tuple[str, str]]:

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from typing import Any
 
 from conservative import registry
-from conservative.references.environments.doctor import Finding
 from conservative.references.environments.environment import Environment, list_environments
 from conservative.references.environments.install import Installation
 
@@ -31,8 +30,8 @@ def json_text() -> str:
     return json.dumps({"engines": registry.list_engines(), "environments": found}, indent=2)
 
 
-def as_plain(value: Environment | Installation | Finding) -> dict[str, Any]:
-    """Return what is known of an environment, of its installation or of its health, as JSON has it."""
+def as_plain(value: Environment | Installation) -> dict[str, Any]:
+    """Return an environment, or its installation, as JSON has it."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(value), default=str))
     return plain
 
@@ -40,15 +39,12 @@ def as_plain(value: Environment | Installation | Finding) -> dict[str, Any]:
 def installation_line(done: Installation) -> str:
     """Return how an installation went, in a line."""
     found, how = done.environment, "installed" if done.new else "was there"
+    name = f"{found.engine}=={found.version}"
     trouble = f"; cannot be imported: {done.trouble}" if done.trouble else ""
-    return f"{found.engine}=={found.version}: {how}, {len(found.packages)} packages, Python {found.python}{trouble}"
+    advice = f". Run: conservative engines install --force {name}" if done.trouble and not done.new else ""
+    return f"{name}: {how}, {len(found.packages)} packages, Python {found.python}{trouble}{advice}"
 
 
 def removal_line(environment: Environment) -> str:
     """Return that an environment is gone, in a line."""
     return f"{environment.engine}=={environment.version}: removed"
-
-
-def finding_line(finding: Finding) -> str:
-    """Return how an environment is, and what was done about it, in a line."""
-    return f"{finding.name}: " + ("; ".join(filter(None, (finding.trouble, finding.remedy))) or "whole")

@@ -126,11 +126,11 @@ def tables(recommendation: Recommendation) -> Iterator[TerminalTable]:
     failing = [advice for advice in recommendation.advice if advice.best and not advice.reached]
     limit = f"What does not, at up to {recommendation.conditions.cost_limit:g} s of computing per simulated second"
     if reaching:
-        yield TerminalTable("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching], True)
+        yield TerminalTable("What reaches it, cheapest first", REACHING, [_reaching(advice) for advice in reaching])
     if failing:
-        yield TerminalTable(limit, FAILING, [_failing(advice) for advice in failing], True)
+        yield TerminalTable(limit, FAILING, [_failing(advice) for advice in failing])
     probes = [row for advice in recommendation.advice for row in _probe_rows(advice)]
-    yield TerminalTable("The probe runs; <- is what is in the tables above", PROBES, probes, True)
+    yield TerminalTable("The probe runs; <- is what is in the tables above", PROBES, probes)
 
 
 def notes(recommendation: Recommendation) -> list[str]:

@@ -10,8 +10,6 @@ from time import monotonic
 
 Step = Callable[[float, str], None]
 """Called with the share of all work that is done, 0 to 1, and what comes next."""
-Expect = Callable[[float], None]
-"""Called with the time, s, that the rest is expected to take."""
 DELAY = 1.0
 """Time, s, that one piece of work takes before a bar appears."""
 
@@ -35,23 +33,15 @@ def progress() -> Iterator[Step]:
 
 
 @contextmanager
-def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[Expect | None]:
-    """Show, if it takes long, that one piece of work goes on; yield the function to tell how long, None without a terminal."""
+def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[None]:
+    """Show that one piece of work goes on, if it takes longer than `DELAY`."""
     if not has_terminal():
-        yield None
+        yield
         return
     from .bars import Bar
 
-    bar, done = Bar(clock), Event()
+    bar, done, start = Bar(clock), Event(), clock()
     task = bar.add_task(what, total=None)
-
-    start = clock()
-
-    def expect(seconds: float) -> None:
-        # Compiled code keeps the interpreter locked, and the bar standing: so its text has the time as well.
-        bar.update(task, total=clock() - start + seconds, description=f"{what}, about {seconds:.0f} s")
-        if seconds > DELAY:
-            bar.start()
 
     def tick() -> None:
         while not done.wait(0.1):
@@ -62,7 +52,7 @@ def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[
     ticking = Thread(target=tick, daemon=True)
     ticking.start()
     try:
-        yield expect
+        yield
     finally:
         done.set()
         ticking.join()

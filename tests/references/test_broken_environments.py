@@ -1,6 +1,5 @@
 """Environments that are broken by hand, or whose making was ended in the middle: found, mended, never used."""
 
-import json
 import os
 import shutil
 import signal
@@ -12,7 +11,7 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.references.environments import doctor, environment, install
+from conservative.references.environments import environment, install, workers
 from conservative.references.environments.lock import Source
 
 from ..environments import ROOT, variables
@@ -29,48 +28,46 @@ def installed(wheels, name="trial"):
     return install.install(name, Source(wheels))
 
 
-def no_numpy(folder):
-    (path,) = folder.glob("lib/python*/site-packages/numpy/__init__.py")
-    path.unlink()
-
-
-def other_version(folder):
-    (path,) = folder.glob("lib/python*/site-packages/trial-1.10.dist-info/METADATA")
-    path.parent.rename(path.parent.with_name("trial-7.0.dist-info"))
-
-
-BREAKS = {
-    "Python gone": lambda folder: (folder / "bin" / "python").unlink(),
-    "record cut short": lambda folder: (folder / environment.RECORD).write_text('{"engine": "tri'),
-    "record gone": lambda folder: (folder / environment.RECORD).unlink(),
-    "record of another": lambda folder: (folder / environment.RECORD).write_text(json.dumps({"engine": "x"})),
-    "lock and record gone": lambda folder: [(folder / name).unlink() for name in (environment.LOCK, environment.RECORD)],
-    "NumPy broken": no_numpy,
-    "package gone": lambda folder: [shutil.rmtree(path) for path in folder.glob("lib/python*/site-packages/trial-*")],
-    "other version": other_version,
-    "everything gone": lambda folder: [shutil.rmtree(path) for path in folder.iterdir() if path.is_dir()],
-}
-
-
-def test_the_doctor_finds_and_mends(cache, wheels):
-    folder = installed(wheels).environment.folder
-    source = Source(wheels)
-    for name, broken in BREAKS.items():
-        assert doctor.trouble_of(folder) == ""
-        broken(folder)
-        assert doctor.trouble_of(folder), name
-        (mended,) = doctor.examine(True, source)
-        assert (mended.name, mended.remedy) == ("trial==1.10", "made anew"), name
-    assert [finding.trouble for finding in doctor.examine(False, source)] == [""]
+def test_force_rebuilds_from_the_lock(cache, wheels):
+    before = installed(wheels, "trial==1.9").environment
+    for module in before.folder.glob("lib/python*/site-packages/trial*"):
+        shutil.rmtree(module) if module.is_dir() else module.unlink()
+    workers.close_workers()  # the running one has imported the package
+    assert installed(wheels, "trial==1.9").trouble
+    rebuilt = install.install("trial", Source(wheels), force=True)  # not 1.10, the newest in the folder of wheels
+    assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")
     assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial")).ok
+    assert [path.name for path in (cache / "trial").iterdir()] == ["1.9"]
 
 
-def test_what_cannot_be_mended_is_removed(cache, wheels, tmp_path):
-    installed(wheels)
-    no_numpy(environment.find_environment("trial").folder)
-    (finding,) = doctor.examine(True, Source(tmp_path))
-    assert finding.remedy.startswith("removed, as it cannot be made anew")
+@pytest.mark.parametrize("step", ["_fill", "_replace"])
+def test_a_rebuild_that_fails_leaves_the_environment(cache, wheels, monkeypatch, step):
+    before = installed(wheels).environment
+    if step == "_fill":
+        source = Source(cache)  # without wheels
+    else:
+        source = Source(wheels)
+        monkeypatch.setattr(install.Path, "rename", renamed_never_from(install.Path.rename, ".1.10-"))
+    with pytest.raises(cv.BadInput):
+        install.install("trial", source, force=True)
+    assert environment.list_environments() == (before,)
+    assert installed(wheels).trouble == ""
+
+
+def renamed_never_from(rename, start):
+    def fail(path, target):
+        if path.name.startswith(start):
+            raise PermissionError(13, "Permission denied")
+        return rename(path, target)
+
+    return fail
+
+
+def test_an_environment_without_a_record_is_made_again(cache, wheels):
+    (installed(wheels).environment.folder / environment.RECORD).unlink()
     assert environment.list_environments() == ()
+    again = installed(wheels)
+    assert (again.new, again.trouble) == (True, "")
 
 
 INSTALL = (
@@ -105,9 +102,7 @@ def test_a_kill_leaves_nothing_half_installed(cache, wheels):
         time.sleep(part * duration)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate(timeout=60)
-        for found in environment.list_environments():
-            assert doctor.trouble_of(found.folder) == ""
-            whole += 1
+        whole += len(environment.list_environments())
         assert installed(wheels).trouble == ""
         assert [path.name for path in (cache / "trial").iterdir()] == ["1.10"]
     assert whole < 6

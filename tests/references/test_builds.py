@@ -52,13 +52,6 @@ def test_no_build_is_taken_for_the_newest_release(wheels, tmp_path):
     assert environment.find_environment("trial").version == "1.0"
 
 
-def test_the_doctor_finds_nothing_wrong_with_a_build(wheels, tmp_path):
-    from conservative.references.environments.doctor import examine
-
-    build(wheels, tmp_path)
-    assert [finding.trouble for finding in examine(mend=False)] == [""]
-
-
 @pytest.mark.parametrize("name", ["other-1.0-py3-none-any.whl", "trial.whl", "trial-1.0.whl"])
 def test_a_file_that_is_no_wheel_of_the_engine_is_refused(name, tmp_path):
     with zipfile.ZipFile(tmp_path / name, "w"):

@@ -11,7 +11,6 @@ from click.testing import CliRunner
 from conservative import integrate, registry
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.reports.cli.main import main
-from conservative.reports.run import single_run
 
 
 def conservative(*arguments):
@@ -49,11 +48,29 @@ def test_run_equals_the_known_rates():
     assert summary["outcome"] == {"kind": "ok", "reason": "", "step": None, "time": None, "residual": None}
 
 
-def test_a_long_run_is_announced_with_the_time_of_all_its_parts(monkeypatch):
-    told = []
-    monkeypatch.setattr(single_run, "wall_time", lambda part: part() and 2.0)  # s
-    single_run.run_once("brick_flip", "reduced", 0.01, 2.0, None, told.append)
-    assert told == [2.0 * single_run.TRIAL]
+def test_several_methods_are_a_table():
+    arguments = ("run", "brick_flip", "-m", "reduced", "-m", "reduced:order=4")
+    second, fourth = json.loads(conservative(*arguments, "--json").stdout)
+    assert [second["method"], fourth["method"]] == ["reduced", "reduced:order=4"]
+    assert 1e-2 < second["attitude_error"] < 0.1  # measured 5.5e-2
+    assert fourth["attitude_error"] < 1e-3
+    assert fourth["drift"]["energy"] < 1e-13
+    assert fourth["wall_time"] > 0
+    lines = conservative(*arguments).stdout.splitlines()
+    assert any(line.split()[:2] == ["reduced:order=4", "ok"] for line in lines)
+    assert any(line.split()[:2] == ["reduced", "ok"] for line in lines)
+
+
+def test_a_table_shows_the_methods_that_fail_and_exits_with_1():
+    done = conservative("run", "lagrange_top", "-m", "reduced", "-m", "convected:1e-99", "--t-end", "0.1")
+    assert done.exit_code == 1
+    assert "not converged in step" in done.stdout
+    assert any(line.split()[:2] == ["reduced", "ok"] for line in done.stdout.splitlines())
+
+
+def test_a_table_has_no_samples_to_write(tmp_path):
+    done = conservative("run", "brick_flip", "-m", "reduced", "-m", "gauss", "--csv", tmp_path / "a.csv")
+    assert (done.exit_code, list(tmp_path.iterdir())) == (2, [])
 
 
 def test_run_tells_its_step_and_duration():

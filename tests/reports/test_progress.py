@@ -20,19 +20,18 @@ SLOW = """
 from threading import Event
 from conservative.reports.terminal import bars
 from conservative.reports.terminal.progress import show_waiting
-now, shown = [0.0], {0.5: Event(), 1.0: Event()}
+now, shown = [0.0], {0.5: Event(), 1.0: Event(), 1.5: Event()}
 class Watched(bars.Bar):
     def update(self, task, **what):
         super().update(task, **what)
         if what.get("completed") in shown:
             shown[what["completed"]].set()
 bars.Bar = Watched
-with show_waiting("a scene: a method", clock=lambda: now[0]) as expect:
-    expect(4.0)
+with show_waiting("a scene: a method", clock=lambda: now[0]):
     for now[0], seen in shown.items():
         seen.wait()
 """
-FAST = SLOW.replace("4.0", "0.1")
+FAST = SLOW.replace("1.0: Event(), 1.5: Event()", "0.9: Event()")
 
 
 def on_a_terminal(code, columns=80):
@@ -62,8 +61,8 @@ def test_a_terminal_shows_share_time_spent_and_time_left(columns):
     assert max(map(len, lines)) <= columns - len("^C")  # or the terminal's ^C breaks the line, which then stays
 
 
-def test_a_single_piece_of_work_shows_how_long_it_is_expected_to_take():
-    assert re.search(r"\d\d% 0:00:01 left 0:00:03 a scene: a method, about 4 s", on_a_terminal(SLOW))
+def test_a_single_piece_of_work_that_takes_long_is_shown():
+    assert re.search(r"0:00:01 .* a scene: a method", on_a_terminal(SLOW))
 
 
 def test_what_takes_no_time_shows_nothing():
@@ -73,6 +72,6 @@ def test_what_takes_no_time_shows_nothing():
 def test_elsewhere_there_is_nothing(capsys):
     with progress.progress() as step:
         step(0.5, "a study")
-    with progress.show_waiting("a scene") as expect:
-        assert expect is None
+    with progress.show_waiting("a scene"):
+        pass
     assert capsys.readouterr() == ("", "")
