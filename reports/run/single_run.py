@@ -66,8 +66,8 @@ def compare(
 ) -> list[dict[str, Any]]:
     """Return the summary of each method on a scene, with its wall time and the attitude error at the end of the run.
 
-    The summary has `wall_time`, s, of the fastest run after a short first one, which compiles, and `attitude_error`, rad, relative to
-    the exact solution. The error is None where no exact solution is known, or the run did not reach its end.
+    `wall_time`, s, is that of the fastest run after a short first one, which compiles. `attitude_error`, rad, is relative to
+    the exact solution. It is None if no exact solution is known, or the run did not reach its end.
 
     Raises
     ------
