@@ -30,7 +30,7 @@ def installed(wheels, name="trial"):
 
 def test_force_rebuilds_from_the_lock(cache, wheels):
     before = installed(wheels, "trial==1.9").environment
-    for module in before.folder.glob("lib/python*/site-packages/trial*"):
+    for module in before.folder.glob("lib/python*/site-packages/numpy*"):
         shutil.rmtree(module) if module.is_dir() else module.unlink()
     workers.close_workers()  # the running one has imported the package
     assert installed(wheels, "trial==1.9").trouble
