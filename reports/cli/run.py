@@ -36,9 +36,7 @@ from .options import OutputCommand, OutputFile, epilog
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples t, R_WB, w_WB_B, energy, momentum.")
-def run(
-    scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None
-) -> None:
+def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
 
     Every step is stored, or at most a million evenly spaced samples. If the run fails, the file contains the samples
