@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
-from conservative.benchmarks.verification import exact_solutions as study
 from conservative.invariants import energy, momentum_W
 from conservative.references.exact.method import free_body
+
+from .exact_trials import FREE_BOUND, Trial, draw_free
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
@@ -20,9 +21,9 @@ FREE = ["brick_flip", "brick_flip_1e-6", "brick_flip_1e-12", "hairer_vilmart", "
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_bodies(seed, separatrix):
-    attitude, rates = study.draw_free(np.random.default_rng(seed), separatrix).errors()
-    assert attitude < study.FREE_BOUND  # measured 1.4e-15 over the 1,000 cases of the study; the bound is 1e-13
-    assert rates < study.FREE_BOUND  # measured 8e-16
+    attitude, rates = draw_free(np.random.default_rng(seed), separatrix).errors()
+    assert attitude < FREE_BOUND  # measured 1.4e-15 over the 1,000 cases of the study; the bound is 1e-13
+    assert rates < FREE_BOUND  # measured 8e-16
 
 
 def numbers(texts):
@@ -57,7 +58,7 @@ SEPARATRIX = cv.RigidBody((4, 5, 9)), (3, 0.7, 1)
 def test_the_separatrix_itself():
     body, w0 = SEPARATRIX
     t = np.array([-50.0, -1.0, 0.0, 0.4, 2.0, 9.0])
-    case = study.Trial("separatrix", body, None, R0, np.array(w0, dtype=float), t[t > 0])
+    case = Trial(body, None, R0, np.array(w0, dtype=float), t[t > 0])
     attitude, rates = case.errors()
     assert attitude < 1e-14  # measured 7e-16
     assert rates < 1e-14  # measured 3e-16

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
-from conservative.benchmarks.verification import exact_solutions as study
 from conservative.invariants import energy, momentum_W
 from conservative.method import Grid
 from conservative.references.exact.method import Exact, lagrange_top
+
+from .exact_trials import TOP_BOUND, Trial, draw_top
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)
 CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
@@ -21,10 +22,10 @@ CASES = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json"
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32), st.sampled_from([None, 1e-6, 1e-9, 1e-12]))
 def test_agrees_with_multi_precision_on_random_tops(seed, pole):
-    case = study.draw_top(np.random.default_rng(seed), pole)
+    case = draw_top(np.random.default_rng(seed), pole)
     attitude, rates = case.errors()
-    assert attitude < study.TOP_BOUND  # measured 1.2e-13 over the 1,000 tops of the study
-    assert rates < study.TOP_BOUND  # measured 8.4e-14
+    assert attitude < TOP_BOUND  # measured 1.2e-13 over the 1,000 tops of the study
+    assert rates < TOP_BOUND  # measured 8.4e-14
 
 
 def numbers(texts):
@@ -71,7 +72,7 @@ STARTS = {
 def test_special_starts_agree_with_multi_precision(name):
     moments, moment, R, w0 = STARTS[name]
     body, field = cv.RigidBody(moments), cv.UniformGravity(1.0, moment)
-    case = study.Trial(name, body, field, np.array(R, dtype=float), np.array(w0, dtype=float), np.array([0.3, 2.0, 8.0]))
+    case = Trial(body, field, np.array(R, dtype=float), np.array(w0, dtype=float), np.array([0.3, 2.0, 8.0]))
     attitude, rates = case.errors()
     assert attitude < 2e-14  # measured 1.2e-15 at most
     assert rates < 2e-14  # measured 1.3e-15 at most

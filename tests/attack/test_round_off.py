@@ -1,0 +1,160 @@
+"""Round-off over long runs: drifts of energy and momentum grow like the square root of the number of steps, and not linearly.
+
+An ensemble of bodies, each spun a little differently, takes the steps; the drift of each is read at equally spaced times. Short
+runs are in every run of the tests. `ATTACK_EFFORT=100 pytest --attack` takes 10^8 steps.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import conservative as cv
+from conservative.attitude import rotation_about
+from conservative.method import Grid
+
+from .effort import count
+
+BLOCKS = 64  # equal parts of a run between which drifts are read
+SPREAD = 1e-3  # of the members' rates at the start, relative
+LEVEL = 1e-6  # drifts are linear if a random walk looks like them with a smaller probability than this
+STEPS = BLOCKS * 4000
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Growth of drifts.
+
+    `rms` after all steps; `exponent` p of rms ~ N^p, fitted to changes over 1, 2, 4, ... blocks, and its standard error from
+    leaving out each member in turn; `bias`, the mean drift per step; `chance`, the probability that a walk, with steps of mean
+    zero in every member, looks as much like a line as this.
+    """
+
+    rms: float
+    exponent: float
+    stderr: float
+    bias: float
+    chance: float
+
+    @property
+    def linear(self):
+        return self.chance < LEVEL
+
+
+def fit_growth(drift, steps):
+    """Return the growth of drifts (members, blocks + 1), zero at first, over a number of steps.
+
+    The changes over blocks of a walk are independent and of mean zero, so that the t value of each member, as a normal deviate,
+    squared and summed over members, has a chi-square distribution. Members may drift in different directions.
+    """
+    # Sixteen blocks are enough for t, and long enough that what is periodic in the motion is not taken for dependence.
+    coarse = np.diff(drift[:, :: (drift.shape[1] - 1) // 16], axis=1)
+    scatter = np.maximum(coarse.std(axis=1, ddof=1), np.finfo(float).tiny)
+    t = np.abs(coarse.mean(axis=1)) / scatter * math.sqrt(coarse.shape[1])
+    deviates = stats.norm.isf(np.clip(stats.t.sf(t, coarse.shape[1] - 1), 1e-300, 0.5))
+    slopes = np.array([fit_exponent(np.delete(drift, k, axis=0)) for k in range(len(drift))])
+    return Growth(
+        rms=float(np.sqrt(np.mean(drift[:, -1] ** 2))),
+        exponent=fit_exponent(drift),
+        stderr=float(np.sqrt((len(slopes) - 1) * np.mean((slopes - slopes.mean()) ** 2))),
+        bias=float(drift[:, -1].mean() / steps),
+        chance=float(stats.chi2.sf(np.sum(deviates**2), len(drift))),
+    )
+
+
+def fit_exponent(drift):
+    """Return the slope of log(rms change) over log(blocks passed), over an eighth of the run at most."""
+    lags = 2 ** np.arange(int(math.log2((drift.shape[1] - 1) // 8)) + 1)
+    rms = [np.sqrt(np.mean((drift[:, lag:] - drift[:, :-lag]) ** 2)) for lag in lags]
+    return float(stats.linregress(np.log(lags), np.log(np.maximum(rms, np.finfo(float).tiny))).slope)
+
+
+def measure_growth(method, scene, dt, steps, members):
+    """Return the growth of each invariant's drift; of a vector, of its component along itself."""
+    steps -= steps % BLOCKS
+    draw, found = np.random.default_rng(0), {}
+    for _ in range(members):
+        member = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 * (1 + SPREAD * draw.normal(size=3)))
+        trajectory = method.solve(member, Grid(dt, steps, steps // BLOCKS))
+        assert trajectory.ok, trajectory.failure
+        for invariant in member.invariants:
+            drift = trajectory.drift(invariant)
+            start = invariant.evaluate(member.R_WB0[None], member.w_WB_B0[None])[0]
+            along = drift if drift.ndim == 1 else drift @ (start / np.linalg.norm(start))
+            found.setdefault(invariant.name, []).append(along - along[0])
+    return {name: fit_growth(np.array(drifts), steps) for name, drifts in found.items()}
+
+
+def walk(members=8, seed=1):
+    steps = np.random.default_rng(seed).normal(size=(members, BLOCKS))
+    return np.concatenate([np.zeros((members, 1)), np.cumsum(steps, axis=1)], axis=1)
+
+
+def test_a_walk_is_not_called_linear():
+    found = [fit_growth(walk(seed=seed), 1000) for seed in range(200)]
+    assert not any(grown.linear for grown in found)  # measured: smallest chance 1e-3
+    exponents = [grown.exponent for grown in found]
+    assert np.mean(exponents) == pytest.approx(0.5, abs=0.02)  # measured 0.501
+    assert np.mean([grown.stderr for grown in found]) == pytest.approx(np.std(exponents), rel=0.3)  # measured 0.032 and 0.035
+    for level in (0.1, 0.5, 0.9):
+        assert np.mean([grown.chance < level for grown in found]) == pytest.approx(level, abs=0.1)
+
+
+@pytest.mark.parametrize("signs", [1, -1])
+def test_a_line_under_a_walk_is_seen(signs):
+    # 64 blocks walk by 8 in all; a line that reaches four times that is seen in every ensemble, whatever its signs.
+    line = np.linspace(0, 32, BLOCKS + 1) * signs ** np.arange(8)[:, None]
+    assert all(fit_growth(walk(seed=seed) + line, 1000).linear for seed in range(50))  # measured: chances up to 1.5e-10
+    assert fit_growth(1e-3 * walk() + line, 1000).exponent == pytest.approx(1, abs=1e-3)  # measured 4e-6 off
+
+
+def test_what_stays_bounded_is_no_faster_than_a_walk():
+    grown = fit_growth(np.random.default_rng(2).normal(size=(8, BLOCKS + 1)), 1000)
+    assert not grown.linear
+    assert grown.exponent < 0.1  # measured 0.01
+
+
+def test_a_stopping_test_before_the_update_is_seen():
+    # The paper's own: Newton ends where the residual is small, and what is left of it has one sign.
+    grown = measure_growth(cv.Convected(tol=1e-6), cv.scenes.brick_flip(), 0.01, 640, 3)["energy"]
+    assert grown.linear, str(grown)
+    assert grown.exponent > 0.9  # measured 0.96
+
+
+def test_a_method_without_bias():
+    for grown in measure_growth(cv.MoserVeselov(), cv.scenes.brick_flip(), 0.01, STEPS, 6).values():
+        assert not grown.linear, str(grown)
+        assert grown.rms < 2e-15  # measured 2e-16
+
+
+def test_the_default_method_walks():
+    # After 10^8 steps energy has 8.5e-15 and momentum 4.4e-15.
+    for grown in measure_growth(cv.Reduced(), cv.scenes.brick_flip(), 0.01, 10_000_000, 4).values():
+        assert not grown.linear, str(grown)
+        assert grown.rms < 1e-14  # measured 3.2e-15 and 1.7e-15
+        assert abs(grown.bias) < 1e-21  # measured 1.6e-22; it was 7e-21 when L1 - L0 was formed from a rounded a
+
+
+def generic():
+    """A body, axes, spin and step without any special value; the spin is near the middle axis."""
+    turn = rotation_about((3, -1, 2), 1.3)
+    body = cv.RigidBody(turn @ np.diag([np.pi, np.e, np.sqrt(3.7)]) @ turn.T)
+    return cv.Scene("generic", body, rotation_about((1, 2, -1), 2.4), turn @ [0.3, 1.2, -1.3], 1.0)
+
+
+@pytest.mark.parametrize("order", [2, 4, 6])
+@pytest.mark.parametrize("dt", [0.1, 1 / 37])
+def test_no_special_value_makes_it_walk(order, dt):
+    for grown in measure_growth(cv.Reduced(order), generic(), dt, STEPS if order > 2 else 8 * STEPS, 6).values():
+        assert not grown.linear, str(grown)
+        assert grown.rms < 5e-15  # measured 3e-16 to 1.5e-15
+
+
+@pytest.mark.attack
+@pytest.mark.parametrize("method", [cv.Reduced(), cv.Reduced(4), cv.MoserVeselov(), cv.Gauss(2)], ids=lambda each: each.name)
+@pytest.mark.parametrize("scene", [cv.scenes.brick_flip(), generic()], ids=lambda each: each.name)
+def test_long_runs_walk(method, scene):
+    for grown in measure_growth(method, scene, 0.01, count(1_000_000), 6).values():
+        assert not grown.linear, str(grown)
