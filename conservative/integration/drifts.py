@@ -1,6 +1,6 @@
-"""What each of many bodies conserves, and how far the samples of a block are off it. Source: as `conservative.invariants`.
+"""Drifts of the invariants of many bodies, from the samples of a block.
 
-Drifts, and the rule of bounds, are those of one body: what `Trajectory.drift` and `conservative.trajectory.accept` say.
+The rules of drifts and bounds are those of one body: `Trajectory.drift` and `conservative.trajectory.accept`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..deferred_imports import kernels
-from ..invariants import MOMENTUM_UNIT, Invariant, sizes
+from ..invariants import MOMENTUM_UNIT, sizes
 from ..methods.many import Bodies
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning, static_part
@@ -20,7 +20,7 @@ from ..potentials.turning import Turning, static_part
 ORTHONORMALITY = "orthonormality"
 AXIAL = "axial momentum"
 NEARLY = 1e-11
-"""Relative difference of moments up to which a body is asked whether it is symmetric: more than what counts as equal."""
+"""Relative difference of moments up to which the symmetry of a body is checked in full: more than counts as equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Drifts:
         (n, k) by the names of `list_drifts`, relative to the scales of the invariants; nan where a body has no such invariant,
         or its samples are not finite.
     bounded
-        (n, k) relative to what the bounds of a method are relative to.
+        (n, k) relative to the scales of the bounds of a method.
     """
 
     values: Array
@@ -41,12 +41,12 @@ class Drifts:
 
 
 def list_drifts(bodies: Bodies) -> tuple[str, ...]:
-    """Return the names of what drifts: orthonormality, and the invariants of the scene."""
+    """Return the names of the columns of `Drifts`: orthonormality, and the invariants of the scene."""
     return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
 
 
 def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
-    """Return how far samples are off what each body conserves.
+    """Return the largest drifts of the invariants of each body.
 
     Parameters
     ----------
@@ -55,37 +55,27 @@ def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
     t, R_WB, w_WB_B
         Times (m,), s, attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     """
+    n, m = w_WB_B.shape[:2]
     inertia, axes, axial = inertia_of(bodies), find_axes(bodies), find_axial(bodies)
     expected, scales = find_start(bodies, inertia, axes, axial)
-    found, V = np.empty((len(bodies), 4)), field_energies(bodies, t, R_WB, w_WB_B)
+    found, V = np.empty((n, 4)), field_energies(bodies, t, R_WB, w_WB_B)
     kernels("drifts_of_many").measure(R_WB, w_WB_B, V, inertia, axes, expected, found)
-    values = np.stack([_drift_of(each, found, bodies, (R_WB, w_WB_B)) for each in (None, *bodies.scene.invariants)], axis=1)
-    bounded = values.copy()
-    for column, each in enumerate(bodies.scene.invariants, start=1):
-        if each.unit == MOMENTUM_UNIT and each not in bodies.scene.extra_invariants:
-            bounded[:, column] *= scales[:, 1] / scales[:, 2]
-        if each.name == AXIAL:
-            values[np.isnan(axial[:, 0]) & np.ones(len(bodies), dtype=bool), column] = np.nan
-    return Drifts(values, bounded)
-
-
-def _drift_of(invariant: Invariant | None, found: Array, bodies: Bodies, samples: tuple[Array, Array]) -> Array:
-    """Return the largest drift (n,) of an invariant, None for orthonormality, out of what the kernel found (n, 4)."""
-    if invariant is None:
-        return found[:, 0]
-    if invariant in bodies.scene.extra_invariants:
-        return _drift_of_extra(invariant, bodies, *samples)
-    if invariant.unit == "J":
-        return found[:, 1]
-    return found[:, 3] if invariant.name == AXIAL else found[:, 2]
-
-
-def _drift_of_extra(invariant: Invariant, bodies: Bodies, R_WB: Array, w_WB_B: Array) -> Array:
-    n, m = w_WB_B.shape[:2]
-    start = invariant.evaluate(bodies.R_WB0, bodies.w_WB_B0)
-    at = invariant.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
-    off = (at - start[:, None]) / invariant.scale
-    return sizes(off.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1)
+    skew, energy, momentum, axial_momentum = found.T
+    values, bounded = [skew], [skew]
+    for each in bodies.scene.invariants:
+        if each in bodies.scene.extra_invariants:
+            start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
+            at = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
+            off = (at - start[:, None]) / each.scale
+            drift = sizes(off.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1)
+        elif each.unit == "J":
+            drift = energy
+        else:
+            drift = axial_momentum if each.name == AXIAL else momentum
+        is_momentum = each.unit == MOMENTUM_UNIT and each not in bodies.scene.extra_invariants
+        bounded.append(drift * (scales[:, 1] / scales[:, 2]) if is_momentum else drift)
+        values.append(np.where(np.isnan(axial[:, 0]), np.nan, drift) if each.name == AXIAL else drift)
+    return Drifts(np.stack(values, axis=1), np.stack(bounded, axis=1))
 
 
 def inertia_of(bodies: Bodies) -> Array:
@@ -101,17 +91,18 @@ def momenta_of(bodies: Bodies) -> Array:
 
 
 def find_start(bodies: Bodies, inertia: Array, axes: Array, axial: Array) -> tuple[Array, Array]:
-    """Return what the start has of what is conserved, and what departures are relative to.
+    """Return the initial values of the invariants and their reference scales.
 
-    The rule is that of `Scene.energy_scale`, `invariants_of` and `kept_sizes`, and both are what
-    `conservative.kernels.drifts_of_many` says of `expected` (n, 10) and `scales` (n, 3), in SI units, kg, m and s. The inertia
-    is (n or 1, 3, 3), kg m^2, body axes, `axes` are those of `find_axes` (n or 1, 3, 3), `axial` those of `find_axial` (n or
-    1, 3).
+    The rules are those of `Scene.energy_scale`, `invariants_of` and `kept_sizes`. `conservative.kernels.drifts_of_many` defines
+    the columns of `expected` (n, 10) and `scales` (n, 3), in SI units. The inertia is (n or 1, 3, 3), kg m^2, body axes, `axes`
+    are those of `find_axes` (n or 1, 3, 3), `axial` those of `find_axial` (n or 1, 3).
     """
     n, potential = len(bodies), bodies.scene.potential
     R, w = np.ascontiguousarray(bodies.R_WB0), np.ascontiguousarray(bodies.w_WB_B0)
     V = field_energies(bodies, np.zeros(1), R[:, None], w[:, None])
-    of_field, largest = np.atleast_1d(np.asarray(field_scales(bodies), dtype=float)), largest_moments(bodies)
+    of_field = np.atleast_1d(np.asarray(field_scales(bodies), dtype=float))
+    moments = bodies.scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]
+    largest = moments.max(axis=1)
     expected, scales = np.zeros((n, 10)), np.empty((n, 3))
     fixed = inertia, axes, np.nan_to_num(axial), of_field, largest
     kernels("drifts_of_many").find_start(R, w, V[:, 0] if len(V) else np.zeros(n), *fixed, expected, scales)
@@ -122,11 +113,6 @@ def find_start(bodies: Bodies, inertia: Array, axes: Array, axial: Array) -> tup
     return expected, scales
 
 
-def largest_moments(bodies: Bodies) -> Array:
-    """Return the largest moment (n,) of each body, kg m^2; (1,) where all have the scene's."""
-    return bodies.scene.body.moments.max(keepdims=True) if bodies.inertia is None else bodies.principal[0].max(axis=1)
-
-
 def find_axial(bodies: Bodies) -> Array:
     """Return unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan where not."""
     none = np.full((1, 3), np.nan)
@@ -135,20 +121,16 @@ def find_axial(bodies: Bodies) -> Array:
     if bodies.inertia is None and not bodies.parameters:
         return bodies.scene.symmetry_axis_B[None]
     found = np.repeat(none, len(bodies), axis=0)
-    for i in np.flatnonzero(find_nearly_symmetric(bodies)).tolist():
+    J = np.sort(bodies.principal[0], axis=1)
+    nearly_symmetric = np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]
+    for i in np.flatnonzero(nearly_symmetric).tolist():
         axis = bodies.take(i).symmetry_axis_B
         found[i] = none[0] if axis is None else axis
     return found
 
 
-def find_nearly_symmetric(bodies: Bodies) -> Any:
-    """Return which of n bodies (n,) have two moments that differ by no more than `NEARLY` of the largest."""
-    J = np.sort(bodies.principal[0], axis=1)
-    return np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]
-
-
 def find_axes(bodies: Bodies) -> Array:
-    """Return unit vectors (n, 3, 3), or (1, 3, 3) for all, row by row, that momenta are conserved along; 0 is none."""
+    """Return unit vectors (n, 3, 3), or (1, 3, 3) for all, row by row, along which momentum is conserved; else 0."""
     if bodies.scene.potential is None:
         return np.eye(3)[None]
     axis = bodies.scene.potential.axis_W
@@ -167,7 +149,7 @@ def field_scales(bodies: Bodies) -> Any:
 
 
 def field_energies(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
-    """Return what makes the conserved energies (n, m), J, of the kinetic ones; (0, 0) where nothing does.
+    """Return the energies (n, m), J, that make conserved energies of the kinetic ones; (0, 0) if there is no such energy.
 
     Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
     """
