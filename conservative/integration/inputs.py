@@ -1,11 +1,13 @@
-"""Starts and bodies of many, checked before any work: which argument, which body, what was got and what is allowed.
+"""Checks of initial states and bodies of `integrate_many`, before any work.
 
-Source: the constructors of `Scene` and its parts, which are asked for what they say of the first bad one.
+Arrays are checked as a whole. The first body that does not pass is given to the constructor of `Scene` or of its parts, which
+raises the error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -25,14 +27,14 @@ RATES = "three finite rates (3,), rad/s"
 
 
 def only_body(scene: Scene) -> Bodies:
-    """Return the body of a scene as one of one."""
+    """Return the body of a scene as a batch of one."""
     return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
 
 
 def read_bodies(
     scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
 ) -> Bodies:
-    """Return the bodies that users give, those of the scene where they give nothing.
+    """Return n bodies, with the values of the scene for everything that is None.
 
     Attitudes are (n, 3, 3), rates (n, 3), rad/s, inertia (n, 3) or (n, 3, 3), kg m^2, and parameters those of the potential.
 
@@ -41,9 +43,11 @@ def read_bodies(
     BadInput
         An argument has another shape, or a body is one that `Scene` or its parts refuse.
     """
+    with suppress(Exception):  # not a Rotation: the checks below report the error
+        R_WB0 = R_WB0.as_matrix()
     given: dict[str, Array] = {}
     for name, value, shapes in (
-        ("R_WB0", _matrices_of(R_WB0), ((3, 3),)),
+        ("R_WB0", R_WB0, ((3, 3),)),
         ("w_WB_B0", w_WB_B0, ((3,),)),
         ("inertia", inertia, ((3,), (3, 3))),
     ):
@@ -54,7 +58,8 @@ def read_bodies(
     R = given.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
     w = given.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
     if "R_WB0" in given:
-        _refuse_first("R_WB0", R, ~_are_rotations(R), lambda each: rotation("R_WB0", each))
+        good = kernels("drifts_of_many").are_rotations(np.ascontiguousarray(R), ROTATION_TOLERANCE)
+        _refuse_first("R_WB0", R, ~good, lambda each: rotation("R_WB0", each))
     if "w_WB_B0" in given:
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
@@ -64,14 +69,6 @@ def read_bodies(
     if (J is not None or values) and scene.extra_invariants:
         scene = scene.rename(scene.name, extra_invariants=())  # which are of the scene's own body and field
     return Bodies(scene, R, w, J, values)
-
-
-def _matrices_of(value: Any) -> Any:
-    """Return the matrices of SciPy's `Rotation`; anything else as it is."""
-    try:
-        return value.as_matrix()
-    except Exception:  # what else it may be, and be wrong about, its check says
-        return value
 
 
 def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Mapping[str, Array]) -> Array:
@@ -103,25 +100,17 @@ def _are_in_range(values: Array) -> Any:
     return (largest == 0) | ((largest >= SMALLEST) & (largest <= LARGEST))
 
 
-def _are_rotations(R: Array) -> Any:
-    return kernels("drifts_of_many").are_rotations(np.ascontiguousarray(R), ROTATION_TOLERANCE)
-
-
 def _read_inertia(value: Array) -> Array:
     """Return tensors (n, 3, 3), kg m^2, of moments (n, 3) or tensors, as `RigidBody` has them."""
     tensors = value if value.ndim == 3 else value[:, :, None] * np.eye(3)
-    _refuse_first("inertia", value, ~_are_inertias(tensors), RigidBody)
-    return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
-
-
-def _are_inertias(tensors: Array) -> Any:
-    """Return which of n tensors (n, 3, 3), kg m^2, are taken without a closer look."""
     with np.errstate(all="ignore"):
-        off = np.abs(tensors - np.swapaxes(tensors, 1, 2)).max(axis=(1, 2))
-        good = _are_in_range(tensors) & (off <= 1e-13 * np.abs(tensors).max(axis=(1, 2)))
+        skew = np.abs(tensors - np.swapaxes(tensors, 1, 2)).max(axis=(1, 2))
+        good = _are_in_range(tensors) & (skew <= 1e-13 * np.abs(tensors).max(axis=(1, 2)))
         moments = np.full((len(tensors), 3), -1.0)
         moments[good] = np.linalg.eigvalsh(tensors[good])
-    return good & (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
+    good &= (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
+    _refuse_first("inertia", value, ~good, RigidBody)  # which looks closer, and takes most of them
+    return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
 
 
 def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> dict[str, Array]:
@@ -147,11 +136,8 @@ def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
     if not is_dataclass(potential) or isinstance(potential, type):
         return {}
     values = {field.name: getattr(potential, field.name) for field in fields(potential)}
-    return {name: np.shape(value) for name, value in values.items() if _is_numeric(value)}
-
-
-def _is_numeric(value: object) -> bool:
-    return isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype == np.float64)
+    arrays = {name: np.asarray(value) for name, value in values.items() if isinstance(value, float | np.ndarray)}
+    return {name: array.shape for name, array in arrays.items() if array.dtype == np.float64}
 
 
 def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
@@ -164,14 +150,10 @@ def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, A
         bad |= ~_are_in_range(values)
     found = {name: values.copy() for name, values in parameters.items()} if bad.any() else parameters
     for i in np.flatnonzero(bad).tolist():
-        potential = _take_potential(bodies, i)
+        try:
+            potential: Any = static_part(bodies.take_potential(i))
+        except BadInput as refusal:
+            raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None
         for name, values in found.items():
             values[i] = getattr(potential, name)  # which may be of another length, such as a direction
     return {name: read_only(values) for name, values in found.items()}
-
-
-def _take_potential(bodies: Bodies, i: int) -> Any:
-    try:
-        return static_part(bodies.take_potential(i))
-    except BadInput as refusal:
-        raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None
