@@ -100,6 +100,11 @@ def method(text: str) -> Method:
     return _call(family, f"method {name}", settings)
 
 
+def configure(family: type[Method], settings: str) -> Method:
+    """Return a method of a class with settings as a name has them, such as `RK4,threads=2`. Raise `BadInput` as `method`."""
+    return _call(family, f"method {family.family}", _split(f":{settings}")[1])
+
+
 def _load_method(name: str) -> type[Method]:
     """Return the class that runs in this process, or in an environment: where a version is named, or there is no other."""
     base, at, version = name.partition("@")

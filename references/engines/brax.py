@@ -6,13 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod, jax_variables
-
-PIPELINES = ("generalized", "positional", "spring")
+from ..environments.engine_method import EngineMethod, Orders, jax_variables
 
 
 @dataclass(frozen=True)
@@ -30,13 +25,6 @@ class Brax(EngineMethod):
     precision
         "f64" (JAX's `x64`) or "f32", which is JAX's default.
 
-    Raises
-    ------
-    BadInput
-        The pipeline or the precision is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Defaults: https://github.com/google/brax/blob/main/brax/io/mjcf.py
@@ -51,24 +39,10 @@ class Brax(EngineMethod):
     family: ClassVar[str] = "brax"
     distribution: ClassVar[Distribution] = Distribution("brax", "brax", oldest="0.14")
     free_only: ClassVar[str] = "Brax reads no ball joint"
-
-    def __post_init__(self) -> None:
-        choice("pipeline", self.pipeline, PIPELINES)
-        choice("precision", self.precision, ("f64", "f32"))
-        super().__post_init__()
+    orders: ClassVar[Orders] = {"generalized": 1, "positional": 1, "spring": 1}
+    as_installed_text = "precision=f32"
+    shown = ("generalized", "positional", "spring", "generalized,precision=f32")
 
     @property
     def variables(self) -> Mapping[str, str]:
         return jax_variables(self.precision)
-
-    @property
-    def order(self) -> int:
-        return 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls(precision="f32")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("generalized"), cls("positional"), cls("spring"), cls("generalized", "f32")

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice, finite_number
+from conservative.check import finite_number
 from conservative.errors import BadInput
-from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -29,13 +26,6 @@ class Basilisk(EngineMethod):
     tol
         Their absolute and relative tolerance, above 0 and below 1.
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown, or the tolerance out of range.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Spacecraft and its hub: https://avslab.github.io/basilisk/Documentation/simulation/dynamics/spacecraft/spacecraft.html
@@ -48,9 +38,12 @@ class Basilisk(EngineMethod):
     family: ClassVar[str] = "bsk"
     distribution: ClassVar[Distribution] = Distribution("bsk", "Basilisk.simulation.spacecraft", oldest="2.8")
     free_only: ClassVar[str] = "a spacecraft is free: nothing in Basilisk holds a point of its hub"
+    orders: ClassVar[Orders] = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
+    as_installed_text = "RK4"
+    shown = ("Euler", "RK2", "RK4", "RKF78")
+    suite = ("RK4", "RKF78")
 
     def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
             raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
         super().__post_init__()
@@ -58,19 +51,3 @@ class Basilisk(EngineMethod):
     @property
     def setting(self) -> str:
         return self.integrator + (f",tol={self.tol:g}" if self.order is None else "")
-
-    @property
-    def order(self) -> int | None:
-        return ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("RK4")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("Euler"), cls("RK2"), cls("RK4"), cls("RKF78")
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls("RK4"), cls("RKF78")

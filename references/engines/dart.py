@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
 
@@ -17,11 +15,6 @@ class Dart(EngineMethod):
 
     It has nothing to set, and nothing was switched off.
 
-    Raises
-    ------
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     World, whose integrator is semi-implicit Euler: https://dartsim.github.io/dart/v6.13.2/
@@ -30,15 +23,8 @@ class Dart(EngineMethod):
     family: ClassVar[str] = "dart"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("dartpy", "dartpy", oldest="6.19")
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls()
+    as_installed_text = ""
 
     @property
     def setting(self) -> str:
         return "semi-implicit Euler"
-
-    @property
-    def order(self) -> int:
-        return 1

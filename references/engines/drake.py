@@ -5,24 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice, finite_number
+from conservative.check import finite_number
 from conservative.errors import BadInput
-from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {
-    **{
-        "default": None,
-        "discrete": 1,
-        "explicit_euler": 1,
-        "semi_explicit_euler": 1,
-        "implicit_euler": 1,
-        "velocity_implicit_euler": 1,
-    },
-    **{"runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3, "radau1": 1, "radau3": 3},
-}
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -42,13 +29,6 @@ class Drake(EngineMethod):
     accuracy
         Relative accuracy, above 0 to 1, to which it chooses its own steps of at most dt; 0 for fixed steps of dt.
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown, or the accuracy out of range.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Simulator: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_simulator.html
@@ -64,9 +44,16 @@ class Drake(EngineMethod):
     family: ClassVar[str] = "drake"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("drake", "pydrake.all", oldest="1.40")
+    orders: ClassVar[Orders] = {
+        **{"default": None, "discrete": 1, "explicit_euler": 1, "semi_explicit_euler": 1, "implicit_euler": 1},
+        **{"velocity_implicit_euler": 1, "runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3},
+        **{"radau1": 1, "radau3": 3},
+    }
+    as_installed_text = "default"
+    shown = ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10")
+    suite = ("discrete", "runge_kutta5")
 
     def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
         allowed = "a number above 0 up to 1, or 0 for fixed steps"
         if not 0 <= finite_number("accuracy", self.accuracy, allowed) <= 1:
             raise BadInput("accuracy", repr(self.accuracy), allowed)
@@ -75,21 +62,5 @@ class Drake(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator + (f",accuracy={self.accuracy:g}" if self.accuracy else "")
-
-    @property
     def order(self) -> int | None:
-        return None if self.accuracy else ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("default")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("discrete"), cls("runge_kutta3"), cls("runge_kutta5"), cls("runge_kutta3", 1e-10)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls("discrete"), cls("runge_kutta5")
+        return None if self.accuracy else self.orders[self.integrator]

@@ -5,16 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {
-    **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
-    **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
-}
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -34,13 +26,6 @@ class Exudyn(EngineMethod):
         "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "GeneralizedAlpha", "TrapezoidalIndex2" or
         "default": the solver, the node's coordinates and all settings that Exudyn takes where nobody chooses.
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Solvers: https://github.com/jgerstmayr/EXUDYN/blob/master/docs/RST/SolversInExudyn.rst
@@ -53,23 +38,10 @@ class Exudyn(EngineMethod):
     family: ClassVar[str] = "exudyn"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("exudyn", "exudyn", oldest="1.9")
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
-        super().__post_init__()
-
-    @property
-    def order(self) -> int:
-        return ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("default")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(integrator) for integrator in ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"))
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls("RK44"), cls("RK67")
+    orders: ClassVar[Orders] = {
+        **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
+        **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
+    }
+    as_installed_text = "default"
+    shown = ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha")
+    suite = ("RK44", "RK67")

@@ -6,14 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.errors import BadInput
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2}
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -34,13 +28,6 @@ class Genesis(EngineMethod):
     as_installed
         Whether collisions and constraints stay on.
 
-    Raises
-    ------
-    BadInput
-        The integrator or the precision is unknown, or as_installed neither True nor False.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     RigidOptions: https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py
@@ -53,37 +40,14 @@ class Genesis(EngineMethod):
 
     family: ClassVar[str] = "genesis"
     distribution: ClassVar[Distribution] = Distribution("genesis-world", "genesis", ("torch",), oldest="1.4")
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
-        choice("precision", self.precision, ("f64", "f32"))
-        if not isinstance(self.as_installed, bool):
-            raise BadInput("as_installed", repr(self.as_installed), "True or False")
-        super().__post_init__()
+    orders: ClassVar[Orders] = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2}
+    as_installed_text = "approximate_implicitfast,precision=f32,as_installed=true"
+    shown = (
+        *("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32"),
+        as_installed_text,
+    )
 
     @property
     def variables(self) -> Mapping[str, str]:
         """Variables that no one reads: Genesis has one precision in a process, so that each precision has a process."""
         return {"CONSERVATIVE_PRECISION": self.precision}
-
-    @property
-    def setting(self) -> str:
-        return self.integrator + ",as installed" * self.as_installed
-
-    @property
-    def order(self) -> int:
-        return ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("approximate_implicitfast", "f32", as_installed=True)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return (
-            cls("Euler"),
-            cls("implicitfast"),
-            cls("approximate_implicitfast"),
-            cls("implicitfast", "f32"),
-            cls.user_defaults(),
-        )

@@ -6,13 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod, jax_variables
-
-ORDERS = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
+from ..environments.engine_method import EngineMethod, Orders, jax_variables
 
 
 @dataclass(frozen=True)
@@ -30,13 +25,6 @@ class JaxSim(EngineMethod):
     precision
         "f64", which is JaxSim's default, or "f32", which it calls experimental.
 
-    Raises
-    ------
-    BadInput
-        The integrator or the precision is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Integrators: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py
@@ -50,24 +38,10 @@ class JaxSim(EngineMethod):
     family: ClassVar[str] = "jaxsim"
     distribution: ClassVar[Distribution] = Distribution("jaxsim", "jaxsim", oldest="0.9")
     free_only: ClassVar[str] = "JaxSim's joints are revolute, prismatic or fixed"
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
-        choice("precision", self.precision, ("f64", "f32"))
-        super().__post_init__()
+    orders: ClassVar[Orders] = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
+    as_installed_text = "SemiImplicitEuler"
+    shown = ("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32")
 
     @property
     def variables(self) -> Mapping[str, str]:
         return jax_variables(self.precision)
-
-    @property
-    def order(self) -> int:
-        return ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("SemiImplicitEuler")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("SemiImplicitEuler"), cls("RungeKutta4"), cls("RungeKutta4", "f32")

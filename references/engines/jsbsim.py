@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from conservative.check import choice
-from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, Orders
 
 RATES = {"RectEuler": 1, "Trapezoidal": 1, "AB2": 2, "AB3": 2, "AB4": 2, "AB5": 2}
 """Order of each, about: what comes before the start is taken for constant, which leaves an error of second order."""
@@ -32,13 +31,6 @@ class JSBSim(EngineMethod):
         Integrator of the attitude (`simulation/integrator/position/rotational`): one of these, "Buss1", "Buss2" or
         "LocalLinearization"; empty for that of the rates.
 
-    Raises
-    ------
-    BadInput
-        An integrator is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     FGPropagate, the integrators: https://jsbsim-team.github.io/jsbsim/classJSBSim_1_1FGPropagate.html
@@ -50,24 +42,10 @@ class JSBSim(EngineMethod):
     family: ClassVar[str] = "jsbsim"
     distribution: ClassVar[Distribution] = Distribution("jsbsim", "jsbsim", oldest="1.3")
     free_only: ClassVar[str] = "an aircraft flies: nothing in JSBSim holds one of its points"
+    orders: ClassVar[Orders] = RATES
+    as_installed_text = "RectEuler"
+    shown = ("RectEuler", "Trapezoidal", "AB2", "AB5")
 
     def __post_init__(self) -> None:
-        choice("rate", self.rate, tuple(RATES))
         choice("attitude", self.attitude, ("", *ATTITUDES))
         super().__post_init__()
-
-    @property
-    def setting(self) -> str:
-        return self.rate + (f",attitude={self.attitude}" if self.attitude else "")
-
-    @property
-    def order(self) -> int:
-        return RATES[self.rate]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("RectEuler")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("RectEuler"), cls("Trapezoidal"), cls("AB2"), cls("AB5")

@@ -5,13 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-INTEGRATORS = ("Euler", "RK4", "implicitfast")
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -28,13 +23,6 @@ class MJWarp(EngineMethod):
     integrator
         "Euler", "RK4" or "implicitfast".
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     MuJoCo Warp, graph capture: https://mujoco.readthedocs.io/en/stable/mjwarp/index.html
@@ -48,20 +36,7 @@ class MJWarp(EngineMethod):
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("mujoco-warp", "mujoco_warp", oldest="3.10")
     takes_gravity: ClassVar[bool] = True
-    many = ({"integrator": "RK4"},)
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, INTEGRATORS)
-        super().__post_init__()
-
-    @property
-    def order(self) -> int:
-        return 4 if self.integrator == "RK4" else 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("Euler")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(integrator) for integrator in INTEGRATORS)
+    orders: ClassVar[Orders] = {"Euler": 1, "RK4": 4, "implicitfast": 1}
+    as_installed_text = "Euler"
+    shown = ("Euler", "RK4", "implicitfast")
+    many = ("RK4",)

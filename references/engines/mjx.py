@@ -6,13 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod, jax_variables
-
-INTEGRATORS = ("Euler", "RK4", "implicitfast")
+from ..environments.engine_method import EngineMethod, Orders, jax_variables
 
 
 @dataclass(frozen=True)
@@ -30,13 +25,6 @@ class MJX(EngineMethod):
     precision
         "f64" (JAX's `x64`) or "f32", which is JAX's default.
 
-    Raises
-    ------
-    BadInput
-        The integrator or the precision is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     MJX: https://mujoco.readthedocs.io/en/stable/mjx.html
@@ -49,26 +37,12 @@ class MJX(EngineMethod):
 
     family: ClassVar[str] = "mjx"
     takes_gravity: ClassVar[bool] = True
-    many = ({"integrator": "RK4"}, {"integrator": "RK4", "precision": "f32"})
     distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, INTEGRATORS)
-        choice("precision", self.precision, ("f64", "f32"))
-        super().__post_init__()
+    orders: ClassVar[Orders] = {"Euler": 1, "RK4": 4, "implicitfast": 1}
+    as_installed_text = "Euler,precision=f32"
+    shown = ("Euler", "implicitfast", "RK4", "RK4,precision=f32")
+    many = ("RK4", "RK4,precision=f32")
 
     @property
     def variables(self) -> Mapping[str, str]:
         return jax_variables(self.precision)
-
-    @property
-    def order(self) -> int:
-        return 4 if self.integrator == "RK4" else 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("Euler", "f32")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls("Euler"), cls("implicitfast"), cls("RK4"), cls("RK4", "f32")

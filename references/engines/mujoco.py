@@ -22,7 +22,7 @@ from conservative.trajectory import Trajectory
 
 from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
+from ..environments.engine_method import EngineMethod, Orders
 from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
 from .inside.mujoco import prepare_many_with, prepare_with
 
@@ -140,13 +140,6 @@ class MuJoCoVersion(EngineMethod):
     integrator
         "Euler", "RK4", "implicit", "implicitfast" or "discrete", which versions before 3.13 do not have.
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
@@ -157,28 +150,12 @@ class MuJoCoVersion(EngineMethod):
     family: ClassVar[str] = "mujoco"
     distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
     takes_gravity: ClassVar[bool] = True
-    many = ({"integrator": "RK4"},)
     colour: ClassVar[str] = "vermilion"
-
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, INTEGRATORS)
-        super().__post_init__()
-
-    @property
-    def order(self) -> int:
-        return 4 if self.integrator == "RK4" else 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("Euler")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(integrator) for integrator in INTEGRATORS)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls("Euler"), cls("RK4")
+    orders: ClassVar[Orders] = {name: 4 if name == "RK4" else 1 for name in INTEGRATORS}
+    as_installed_text = "Euler"
+    shown = INTEGRATORS
+    suite = ("Euler", "RK4")
+    many = ("RK4",)
 
 
 class _Quiet:

@@ -5,18 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.errors import BadInput
-from conservative.method import Method
 from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {
-    **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
-    **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
-}
+from ..environments.engine_method import EngineMethod, Orders
 
 FREE_ONLY = {
     "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
@@ -43,13 +35,6 @@ class Newton(EngineMethod):
     as_installed
         Whether Newton's own defaults stay: damping, contacts, the solver inside Kamino.
 
-    Raises
-    ------
-    BadInput
-        The solver is unknown, or as_installed neither True nor False.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Solvers: https://newton-physics.github.io/newton/stable/api/newton_solvers.html
@@ -65,28 +50,12 @@ class Newton(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     # Versions before 1.8 build and step models in other ways. Bare `newton` lacks MuJoCo.
     distribution: ClassVar[Distribution] = Distribution("newton[sim]", "newton", oldest="1.8")
-
-    def __post_init__(self) -> None:
-        choice("solver", self.solver, tuple(ORDERS))
-        if not isinstance(self.as_installed, bool):
-            raise BadInput("as_installed", repr(self.as_installed), "True or False")
-        super().__post_init__()
+    orders: ClassVar[Orders] = {
+        **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
+        **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
+    }
+    as_installed_text = "SemiImplicit,as_installed=true"
+    shown = (*orders, as_installed_text)
 
     def unsupported(self, scene: Scene) -> str | None:
         return super().unsupported(scene) or (FREE_ONLY.get(self.solver) if scene.potential is not None else None)
-
-    @property
-    def setting(self) -> str:
-        return self.solver + ",as installed" * self.as_installed
-
-    @property
-    def order(self) -> int:
-        return ORDERS[self.solver]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("SemiImplicit", as_installed=True)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return (*(cls(solver) for solver in ORDERS), cls("SemiImplicit", as_installed=True))

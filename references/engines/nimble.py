@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.method import Method
-
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
 
@@ -17,11 +15,6 @@ class Nimble(EngineMethod):
 
     It has nothing to set, and nothing was switched off. Its environment needs 5.6 GB, most of them for PyTorch.
 
-    Raises
-    ------
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     World, joints: https://nimblephysics.org/docs/
@@ -31,15 +24,8 @@ class Nimble(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     # With NumPy 2 it crashes.
     distribution: ClassVar[Distribution] = Distribution("nimblephysics", "nimblephysics", ("numpy<2",), oldest="0.10")
+    as_installed_text = ""
 
     @property
     def setting(self) -> str:
         return "semi-implicit Euler"
-
-    @property
-    def order(self) -> int:
-        return 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls()

@@ -5,17 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice, finite_number
+from conservative.check import finite_number
 from conservative.errors import BadInput
-from conservative.method import Method
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod
-
-ORDERS = {
-    **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "RungeKutta2": 2},
-    **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
-}
+from ..environments.engine_method import EngineMethod, Orders
 
 
 @dataclass(frozen=True)
@@ -35,13 +29,6 @@ class OpenSim(EngineMethod):
     accuracy
         Accuracy, above 0 to 1, to which it chooses its own steps; 1e-3 is OpenSim's default. 0 for fixed steps of dt.
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown, or the accuracy out of range.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Manager, integrators and their settings: https://simtk.org/api_docs/opensim/api_docs/classOpenSim_1_1Manager.html
@@ -53,26 +40,19 @@ class OpenSim(EngineMethod):
     family: ClassVar[str] = "opensim"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("opensim", "opensim", oldest="4.5")
+    orders: ClassVar[Orders] = {
+        **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "RungeKutta2": 2},
+        **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
+    }
+    as_installed_text = "RungeKuttaMerson,accuracy=1e-3"
+    shown = ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10")
 
     def __post_init__(self) -> None:
-        choice("integrator", self.integrator, tuple(ORDERS))
         allowed = "a number above 0 up to 1, or 0 for fixed steps"
         if not 0 <= finite_number("accuracy", self.accuracy, allowed) <= 1:
             raise BadInput("accuracy", repr(self.accuracy), allowed)
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator + (f",accuracy={self.accuracy:g}" if self.accuracy else "")
-
-    @property
     def order(self) -> int | None:
-        return None if self.accuracy else ORDERS[self.integrator]
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls("RungeKuttaMerson", 1e-3)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls(), cls("RungeKuttaFeldberg"), cls("Verlet"), cls(accuracy=1e-10)
+        return None if self.accuracy else self.orders[self.integrator]

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.check import choice
-from conservative.errors import BadInput
-from conservative.method import Method
 from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
-from ..environments.engine_method import EngineMethod, rate_limit_reason
+from ..environments.engine_method import EngineMethod, Orders, rate_limit_reason
 
 RATE_LIMIT = 100.0
 """Rate, rad/s, that Bullet keeps a body below as installed (`maxJointVelocity`)."""
@@ -32,13 +29,6 @@ class PyBullet(EngineMethod):
     as_installed
         Whether damping, sleeping and the limit of rates stay on.
 
-    Raises
-    ------
-    BadInput
-        The body is unknown, or as_installed neither True nor False.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControlMultiDof:
@@ -51,30 +41,11 @@ class PyBullet(EngineMethod):
     family: ClassVar[str] = "pybullet"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("pybullet", "pybullet", oldest="3.2.5")
-
-    def __post_init__(self) -> None:
-        choice("body", self.body, ("multibody", "maximal"))
-        if not isinstance(self.as_installed, bool):
-            raise BadInput("as_installed", repr(self.as_installed), "True or False")
-        super().__post_init__()
+    orders: ClassVar[Orders] = {"multibody": 1, "maximal": 1}
+    as_installed_text = "as_installed=true"
+    shown = ("", "maximal", "as_installed=true")
 
     def unsupported(self, scene: Scene) -> str | None:
         if self.body == "maximal" and scene.potential is not None:
             return "PyBullet has no joint to the world for a body in maximal coordinates"
         return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
-
-    @property
-    def setting(self) -> str:
-        return self.body + ",as installed" * self.as_installed
-
-    @property
-    def order(self) -> int:
-        return 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls(as_installed=True)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls(), cls("maximal"), cls(as_installed=True)

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from conservative.check import positive_integer
-from conservative.errors import BadInput
-from conservative.method import Method
 
 from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
@@ -28,13 +26,6 @@ class Rapier(EngineMethod):
     as_installed
         Whether sleeping and the limit of fast rotation stay on.
 
-    Raises
-    ------
-    BadInput
-        substeps is not an integer of 1 or more, or as_installed neither True nor False.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     Limit of fast rotation, substeps: https://rapier.rs/docs/user_guides/python/rigid_body_solver_settings
@@ -49,25 +40,13 @@ class Rapier(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("rapier3d", "rapier3d", oldest="0.36")
+    as_installed_text = "as_installed=true"
+    shown = ("", "substeps=1", "as_installed=true")
 
     def __post_init__(self) -> None:
         positive_integer("substeps", self.substeps)
-        if not isinstance(self.as_installed, bool):
-            raise BadInput("as_installed", repr(self.as_installed), "True or False")
         super().__post_init__()
 
     @property
     def setting(self) -> str:
         return f"substeps={self.substeps}" + ",as installed" * self.as_installed
-
-    @property
-    def order(self) -> int:
-        return 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls(as_installed=True)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls(), cls(1), cls(as_installed=True)

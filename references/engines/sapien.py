@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.errors import BadInput
-from conservative.method import Method
 from conservative.scene import Scene
 
 from ..environments.catalogue import Distribution
@@ -28,13 +26,6 @@ class Sapien(EngineMethod):
     as_installed
         Whether damping, sleeping and the limit stay on.
 
-    Raises
-    ------
-    BadInput
-        as_installed is neither True nor False.
-    MissingEngine
-        It is not installed: no environment has it.
-
     References
     ----------
     PhysX, damping, limit of rates, sleeping: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/RigidBodyDynamics.html
@@ -48,11 +39,8 @@ class Sapien(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("sapien", "sapien", oldest="3.0")
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.as_installed, bool):
-            raise BadInput("as_installed", repr(self.as_installed), "True or False")
-        super().__post_init__()
+    as_installed_text = "as_installed=true"
+    shown = ("", "as_installed=true")
 
     def unsupported(self, scene: Scene) -> str | None:
         return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
@@ -60,15 +48,3 @@ class Sapien(EngineMethod):
     @property
     def setting(self) -> str:
         return "PhysX" + ",as installed" * self.as_installed
-
-    @property
-    def order(self) -> int:
-        return 1
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        return cls(as_installed=True)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return cls(), cls(True)

@@ -9,11 +9,13 @@ from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter_ns
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from conservative import registry
+from conservative.check import choice
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.method import Grid, Method, Role, Run
 from conservative.methods.many import Bodies, RunMany
@@ -26,12 +28,17 @@ from .environment import Environment, find_environment
 from .plain_numbers import ManySamples, Samples, describe, describe_many, take_axes
 from .workers import worker_of
 
+Orders = Mapping[str, int | None]
+
 
 class EngineMethod(Method):
     """An engine in an environment of its own.
 
-    A subclass is a frozen dataclass of the engine's settings, which are plain values. What runs in the environment is the file
-    `inside/FAMILY.py` beside its own, with a function `prepare(given)`; `plain_numbers.describe` says what `given` has.
+    A subclass is a frozen dataclass of the engine's settings, which are plain values, with the attributes below. The file
+    `inside/FAMILY.py` beside its own runs in the environment. It has a function `prepare(given)`, where `given` has the fields
+    that `plain_numbers.describe` lists.
+
+    Settings in attributes are texts as in names of methods, such as "RK4,precision=f32"; "" stands for the default setting.
 
     Attributes
     ----------
@@ -40,13 +47,26 @@ class EngineMethod(Method):
     version
         Version of the engine; empty for the newest that is installed. `at_version` makes the class of another one.
     precision
-        Of its numbers: "f64" or "f32".
+        Of its numbers: "f64" or "f32". An engine that has both has it as a setting.
     takes_gravity
         Whether its adapter has bodies about a fixed point in uniform gravity, beside free ones.
     free_only
         Why it has free bodies only, where it is the engine that has no others.
-    many
-        Settings that run many bodies at once, by the function `prepare_many` of what runs in the environment; by default none.
+    orders
+        The values of its first setting, with their orders; empty if that is not a choice. An order is None if the engine
+        chooses its own steps.
+    as_installed_text
+        The engine as installed, with nothing set but the step; None if its user has to choose a setting.
+    shown, suite, many
+        Settings in tables, in the benchmark suite (by default all that are shown), and those that run many bodies at once, by
+        the function `prepare_many` of what runs in the environment.
+
+    Raises
+    ------
+    BadInput
+        A setting is unknown or out of range.
+    MissingEngine
+        It is not installed: no environment has it.
     """
 
     role: ClassVar[Role] = Role.ENGINE
@@ -55,10 +75,23 @@ class EngineMethod(Method):
     precision: ClassVar[str] = "f64"
     takes_gravity: ClassVar[bool] = False
     free_only: ClassVar[str] = ""
-    many: ClassVar[tuple[Mapping[str, Any], ...]] = ()
+    orders: ClassVar[Orders] = MappingProxyType({})
+    as_installed_text: ClassVar[str | None] = None
+    shown: ClassVar[tuple[str, ...]] = ("",)
+    suite: ClassVar[tuple[str, ...]] = ()
+    many: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        """Check that there is an environment. Raises `MissingEnvironment` if there is none."""
+        """Check the settings, and that there is an environment."""
+        settings = self._settings()
+        if self.orders:
+            first = next(iter(settings))
+            choice(first, settings[first], tuple(self.orders))
+        if "precision" in settings:
+            choice("precision", self.precision, ("f64", "f32"))
+        as_installed = settings.get("as_installed", False)
+        if not isinstance(as_installed, bool):
+            raise BadInput("as_installed", repr(as_installed), "True or False")
         self.environment  # noqa: B018 - for its exception
 
     @classmethod
@@ -88,9 +121,20 @@ class EngineMethod(Method):
 
     @property
     def setting(self) -> str:
-        """The settings as the label has them; by default the first."""
-        value: Any = self
-        return str(getattr(value, fields(value)[0].name))
+        """The settings as the label has them: the first, and those that are not defaults."""
+        (_, first), *others = self._settings().items()
+        defaults = {field.name: field.default for field in fields(self)}  # type: ignore[arg-type]  # subclasses are dataclasses
+        words = [first, *("as installed" for name, value in others if name == "as_installed" and value)]
+        named = [
+            (name, value) for name, value in others if name not in ("precision", "as_installed") and value != defaults[name]
+        ]
+        words += [f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}" for name, value in named]
+        return ",".join(words)
+
+    @property
+    def order(self) -> int | None:
+        """Order of convergence in dt: that of the first setting, or 1."""
+        return self.orders[next(iter(self._settings().values()))] if self.orders else 1
 
     def unsupported(self, scene: Scene) -> str | None:
         if self.takes_gravity:
@@ -102,7 +146,15 @@ class EngineMethod(Method):
     @classmethod
     def user_defaults(cls) -> Method | None:
         """Return the engine as installed, with nothing set but the step; None where its user has to choose a setting."""
-        return None
+        return None if cls.as_installed_text is None else registry.configure(cls, cls.as_installed_text)
+
+    @classmethod
+    def variants(cls) -> tuple[Method, ...]:
+        return tuple(registry.configure(cls, text) for text in cls.shown)
+
+    @classmethod
+    def suite_settings(cls) -> tuple[Method, ...]:
+        return tuple(registry.configure(cls, text) for text in cls.suite or cls.shown)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
@@ -129,7 +181,7 @@ class EngineMethod(Method):
 
     @classmethod
     def many_settings(cls) -> tuple[Method, ...]:
-        return tuple(cls(**settings) for settings in cls.many)
+        return tuple(registry.configure(cls, text) for text in cls.many)
 
     def _given(self, numbers: Mapping[str, Any]) -> dict[str, Any]:
         return {"adapter": str(_inside(type(self))), "settings": self._settings(), **numbers}
