@@ -141,9 +141,9 @@ def _compare_and_write(options: dict[str, Any]) -> Answer:
 def _text_of(answer: Answer, name: str) -> str:
     """Return the answer as `FILES` names it."""
     if name == "html":  # which needs jinja2, the others do not
-        from ..page.comparison import render
+        from ..page.versions import render_comparison
 
-        return render(answer)
+        return render_comparison(answer)
     texts: dict[str, Callable[[], str]] = {"junit": answer.junit_text, "markdown": answer.markdown_text}
     return texts[name]()
 

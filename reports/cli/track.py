@@ -84,12 +84,12 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     with ExitStack() as files:  # a place that cannot be written is an error before any work
         streams = {name: files.enter_context(text_file(*place)) for name, place in paths.items()}
         answer = _answer(engine, versions, scenes, settings, options)
-        from ..page.track import render
+        from ..page.versions import render_track
 
         contents: dict[str, Callable[[], str]] = {
             "junit": answer.junit_text,
             "markdown": answer.markdown_text,
-            "track.html": lambda: render(answer),
+            "track.html": lambda: render_track(answer),
             "track.md": answer.markdown_text,
             "track.json": answer.json_text,
         }

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from enum import StrEnum
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from enum import Enum, StrEnum
 from typing import Any
 
 from conservative.benchmarks.measures.drift_class import CONSERVED as CONSERVED
@@ -87,6 +87,19 @@ def outcome_text(outcome: Outcome) -> str:
 def finite_or_none(value: float) -> float | None:
     """Return the value, None where JSON has no number for it."""
     return value if math.isfinite(value) else None
+
+
+def plain(value: Any) -> Any:
+    """Return a value for JSON: dataclasses as dictionaries, enums as their values, NaN and infinite numbers as null."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, Enum):
+        return value.value
+    return finite_or_none(value) if isinstance(value, float) else value
 
 
 def outcome_record(outcome: Outcome) -> dict[str, Any]:

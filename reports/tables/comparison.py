@@ -10,11 +10,11 @@ from enum import StrEnum
 from typing import Any
 
 from conservative.benchmarks.comparison.compare import ComparedRow, Comparison, Found
-from conservative.benchmarks.comparison.times import CONFIDENCE, SLOWER, Ratio, TimeRow
+from conservative.benchmarks.comparison.times import CONFIDENCE, SLOWER, Ratio
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.measure import Measure
 
-from .cells import DASH, Cell, Grade, Row, Table, finite_or_none, markdown, number
+from .cells import DASH, Cell, Grade, Row, Table, markdown, number, plain
 from .junit import TestCase, junit_xml
 
 HEADER = (
@@ -29,16 +29,16 @@ HEADER = (
     "order",
 )
 SHOWN = (Measure.ATTITUDE_MAX.text, ENERGY_DRIFT, Measure.ORDER.text)
-"""Measures that the table has a column of; all are compared, and stand in the JSON."""
+"""Measures with a column in the table; all are compared, and all are in the JSON."""
 EXPLANATION = (
-    "Times are in times of the earlier version, each from several processes of both, which take turns; an interval holds at "
-    f"each end with {CONFIDENCE:.0%} confidence. A row fails if all of it is more than {SLOWER:.0%} slower, and is so again in "
-    "new processes, or if another value is worse than round-off explains."
+    "Times are relative to the earlier version, from several processes of both, which take turns. Both ends of an interval "
+    f"have {CONFIDENCE:.0%} confidence. A row fails if its whole interval is more than {SLOWER:.0%} slower, again so in new "
+    "processes, or if another value is worse than round-off explains."
 )
 
 
 class Standing(StrEnum):
-    """What became of a row."""
+    """The result of a row, in the order of the table."""
 
     SLOWER = "slower"
     WORSE = "worse"
@@ -49,11 +49,12 @@ class Standing(StrEnum):
 
 
 _GRADES = {Standing.SLOWER: Grade.BAD, Standing.WORSE: Grade.BAD, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE}
+_MARKS = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}
 
 
 @dataclass(frozen=True)
 class Line:
-    """A row as it is shown, its standing, and its ratio; None where it was not timed."""
+    """The cells of a row, its standing, and its ratio; None if it was not timed."""
 
     cells: Row
     standing: Standing
@@ -62,7 +63,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a comparison says; `made` says how and where it was measured."""
+    """A comparison, and how and where it was measured."""
 
     comparison: Comparison
     made: Mapping[str, str] = field(default_factory=dict)
@@ -74,30 +75,32 @@ class Answer:
 
     @property
     def title(self) -> str:
-        """What it is about."""
+        """Both versions."""
         return f"{self.comparison.head.title} against {self.comparison.base.title}"
 
     @property
     def verdict(self) -> str:
-        """How it ended, in a line."""
+        """The verdict in one line."""
         found = self.comparison
         timed = sum(row.time is not None for row in found.rows)
-        return (
-            f"gate: {'passed' if self.passed else 'FAILED'}, {_count(found.rows, 'row')}, {timed} timed, "
-            f"{_count(found.violations, 'violation')}"
-        )
+        counts = f"{_count(found.rows, 'row')}, {timed} timed, {_count(found.violations, 'violation')}"
+        return f"gate: {'passed' if self.passed else 'FAILED'}, {counts}"
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Each violation, in a line."""
+        """Each violation in one line."""
         return tuple(each.finding for each in self.comparison.violations)
 
     @property
     def lines(self) -> tuple[Line, ...]:
-        """The rows: those that failed first, then those whose time changed most."""
+        """The rows: failed ones first, then those with the largest change of time."""
         worse = {(each.scene, each.method) for each in self.comparison.violations}
         lines = [_line(row, (row.scene, row.method) in worse) for row in self.comparison.rows]
-        return tuple(sorted(lines, key=lambda line: (list(Standing).index(line.standing), -_change(line.ratio))))
+
+        def change(ratio: Ratio | None) -> float:
+            return 0.0 if ratio is None or math.isnan(ratio.value) else abs(math.log(ratio.value))
+
+        return tuple(sorted(lines, key=lambda line: (list(Standing).index(line.standing), -change(line.ratio))))
 
     @property
     def table(self) -> Table:
@@ -106,7 +109,7 @@ class Answer:
 
     @property
     def environments(self) -> Table:
-        """What both versions ran with."""
+        """Python and packages of both versions."""
         versions = (self.comparison.base, self.comparison.head)
         rows = [(each.title, each.environment.python, ", ".join(each.packages)) for each in versions]
         return ("version", "Python", "packages"), rows
@@ -116,7 +119,7 @@ class Answer:
         return "\n".join([self.verdict, *self.findings, *notes])
 
     def json_text(self) -> str:
-        """Return all that was measured as JSON; what could not be measured is null."""
+        """Return all measurements as JSON; null stands for a value that could not be measured."""
         found = self.comparison
         content = {
             "made": dict(self.made),
@@ -127,12 +130,12 @@ class Answer:
             },
             "violations": [asdict(each) for each in found.violations],
             "notes": found.notes,
-            "rows": [_record(row) for row in found.rows],
+            "rows": [plain(_record(row)) for row in found.rows],
         }
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
     def markdown_text(self) -> str:
-        """Return verdict, violations and the table as Markdown, as the summary of a workflow's run shows it."""
+        """Return verdict, violations and the table as Markdown, for the summary of a workflow."""
         violations = ["", *(f"- {text}" for text in self.findings)] if self.findings else []
         notes = ["", *(f"- {note}" for note in self.comparison.notes)] if self.comparison.notes else []
         head = [f"## {self.title}", "", f"**{self.verdict}**", *violations, "", markdown(self.table), "", EXPLANATION, *notes]
@@ -140,7 +143,7 @@ class Answer:
         return "\n".join([*head, "", "### Versions", "", markdown(self.environments), *made]) + "\n"
 
     def junit_text(self) -> str:
-        """Return a case for each row as JUnit has them, and one for what is no row's."""
+        """Return a case for each row in the format of JUnit, and one for each violation that belongs to no row."""
         own: dict[tuple[str, str], list[str]] = {(row.scene, row.method): [] for row in self.comparison.rows}
         for each in self.comparison.violations:
             own.setdefault((each.scene, each.method), []).append(each.finding)
@@ -148,17 +151,19 @@ class Answer:
 
 
 def _line(row: ComparedRow, failed: bool) -> Line:
-    ratio = None if row.time is None else row.time.again or row.time.first
+    time = row.time
+    ratio = None if time is None else time.again or time.first
     standing = _standing(row, failed)
-    mark = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}.get(_GRADES.get(standing, Grade.NONE), "")
-    values = [_pair(row.was, row.now, name) for name in SHOWN]
+    grade = _GRADES.get(standing)
+    timed = ratio is not None and not math.isnan(ratio.value)
     cells = (
         row.scene,
         row.method,
-        Cell(f"{mark}{standing}", _GRADES[standing]) if standing in _GRADES else standing.value,
-        *_ratio_cells(ratio),
-        _step_cell(row.time),
-        *values,
+        standing.value if grade is None else Cell(f"{_MARKS.get(grade, '')}{standing}", grade),
+        f"{ratio.value:.3f}" if ratio and timed else DASH,
+        f"{ratio.low:.3f} to {ratio.high:.3f}" if ratio and timed else DASH,
+        DASH if time is None else f"{number(1e6 * time.was, 3)} → {number(1e6 * time.now, 3)}",
+        *(_pair(row.was, row.now, name) for name in SHOWN),
     )
     return Line(cells, standing, ratio)
 
@@ -173,53 +178,22 @@ def _standing(row: ComparedRow, failed: bool) -> Standing:
     return Standing.FASTER if row.time.first.high < 1 / (1 + SLOWER) else Standing.SAME
 
 
-def _ratio_cells(ratio: Ratio | None) -> tuple[str, str]:
-    if ratio is None or math.isnan(ratio.value):
-        return DASH, DASH
-    return f"{ratio.value:.3f}", f"{ratio.low:.3f} to {ratio.high:.3f}"
-
-
-def _step_cell(time: TimeRow | None) -> str:
-    return DASH if time is None else f"{number(1e6 * time.was, 3)} → {number(1e6 * time.now, 3)}"
-
-
 def _pair(was: Found | None, now: Found | None, name: str) -> str:
     before, after = (number(found.row.values.get(name, math.nan), 3) if found else DASH for found in (was, now))
     return before if before == after else f"{before} → {after}"
 
 
-def _change(ratio: Ratio | None) -> float:
-    return 0.0 if ratio is None or math.isnan(ratio.value) else abs(math.log(ratio.value))
-
-
 def _record(row: ComparedRow) -> dict[str, Any]:
-    return {
-        "scene": row.scene,
-        "method": row.method,
-        "was": _found(row.was),
-        "is": _found(row.now),
-        "time": None if row.time is None else _time(row.time),
-    }
-
-
-def _found(found: Found | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    row = found.row
-    return {"status": row.status.value, "reason": found.reason, "values": dict(row.values), "spreads": dict(row.spreads)}
-
-
-def _time(time: TimeRow) -> dict[str, Any]:
-    ratios = {name: _plain(each) for name, each in (("first", time.first), ("again", time.again)) if each is not None}
-    return {**_finite({"was_s": time.was, "is_s": time.now}), **ratios, "reason": time.reason, "failed": time.failed}
-
-
-def _plain(ratio: Ratio) -> dict[str, Any]:
-    return _finite(vars(ratio))
-
-
-def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: finite_or_none(value) if isinstance(value, float) else value for name, value in values.items()}
+    record: dict[str, Any] = {"scene": row.scene, "method": row.method, "was": None, "is": None, "time": None}
+    for when, found in (("was", row.was), ("is", row.now)):
+        if found is not None:
+            values = {"values": found.row.values, "spreads": found.row.spreads}
+            record[when] = {"status": found.row.status, "reason": found.reason, **values}
+    if (time := row.time) is not None:
+        again = {} if time.again is None else {"again": time.again}
+        ratios = {"was_s": time.was, "is_s": time.now, "first": time.first, **again}
+        record["time"] = {**ratios, "reason": time.reason, "failed": time.failed}
+    return record
 
 
 def _count(found: Sequence[object], what: str) -> str:

@@ -1,4 +1,4 @@
-"""Reports in JUnit's format, which continuous integration reads."""
+"""Reports in the format of JUnit, which continuous integration reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 @dataclass(frozen=True)
 class TestCase:
-    """A case: the group that it is in, its name, what there is to say of it, and why it failed; empty if it did not."""
+    """A case: its group and name, its output, and the reason why it failed; empty if it did not."""
 
     group: str
     name: str
@@ -24,19 +24,15 @@ def junit_xml(suite: str, cases: Sequence[TestCase]) -> str:
     root = ElementTree.Element("testsuites")
     element = ElementTree.SubElement(root, "testsuite", {"name": suite, **counts})
     for case in cases:
-        _add(element, case)
+        child = ElementTree.SubElement(element, "testcase", {"classname": case.group, "name": case.name})
+        if failure := _printable(case.failure):
+            ElementTree.SubElement(child, "failure", {"message": failure}).text = failure
+        if case.output:
+            ElementTree.SubElement(child, "system-out").text = _printable(case.output)
     ElementTree.indent(root)
     return ElementTree.tostring(root, "unicode", xml_declaration=True) + "\n"
 
 
-def _add(suite: ElementTree.Element, case: TestCase) -> None:
-    element = ElementTree.SubElement(suite, "testcase", {"classname": case.group, "name": case.name})
-    if case.failure:
-        ElementTree.SubElement(element, "failure", {"message": _printable(case.failure)}).text = _printable(case.failure)
-    if case.output:
-        ElementTree.SubElement(element, "system-out").text = _printable(case.output)
-
-
 def _printable(text: str) -> str:
-    """Return a text without the characters that XML has no place for, which engines may have in their messages."""
+    """Return a text without the characters that XML does not allow, which messages of engines can contain."""
     return "".join(char if char.isprintable() or char in "\n\t" else "?" for char in text)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from conservative.benchmarks.measures.drift_class import DriftClass, classify
-from conservative.benchmarks.tracking.observation import Fit, Observation, Spread
+from conservative.benchmarks.tracking.observation import Observation, Spread
 from conservative.benchmarks.tracking.track import History, Line, Transition
 from conservative.outcome import Outcome, OutcomeKind
 
-from .cells import DASH, Cell, Grade, Row, Table, finite_or_none, markdown, number, outcome_cell, outcome_record
+from .cells import DASH, Cell, Grade, Row, Table, markdown, number, outcome_cell, plain
 from .changes import drift_text, order_text, sentence
 from .junit import TestCase, junit_xml
 
@@ -25,17 +25,7 @@ _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a history says.
-
-    Attributes
-    ----------
-    history
-        What was found.
-    gated
-        Whether something that the last version lost is a failure.
-    made
-        How and where it was measured: command, date, machine, by what they are called.
-    """
+    """A history, whether a loss in the last version is a failure (`gated`), and how and where it was measured (`made`)."""
 
     history: History
     gated: bool = False
@@ -43,12 +33,12 @@ class Answer:
 
     @property
     def passed(self) -> bool:
-        """Whether the last version, where it is gated, lost nothing and reaches an end at all."""
+        """Whether the last version lost nothing and reaches the end of a run; True if it is not gated."""
         return not list(self.failures)
 
     @property
     def failures(self) -> Iterator[str]:
-        """Why it is not passed; nothing where it is not gated."""
+        """Why the last version does not pass."""
         if not self.gated:
             return
         yield from (sentence(each) for each in self.history.lost_last)
@@ -62,12 +52,12 @@ class Answer:
 
     @property
     def title(self) -> str:
-        """What it is about."""
+        """The engine and its versions."""
         return f"{self.history.plan.engine}: {', '.join(self.history.plan.versions)}"
 
     @property
     def verdict(self) -> str:
-        """Whether it is passed, in a line; empty where it is not gated."""
+        """The verdict in one line; empty if the last version is not gated."""
         if not self.gated:
             return ""
         was, now = self.history.plan.versions[-2:]
@@ -76,21 +66,24 @@ class Answer:
     @property
     def tables(self) -> tuple[tuple[str, Table], ...]:
         """For each scene its caption and table: a row for each setting and version."""
-        return tuple((_caption(scene, lines), _table(lines)) for scene, lines in _by_scene(self.history).items())
+        by_scene: dict[str, list[Line]] = {}
+        for line in self.history.lines:
+            by_scene.setdefault(line.scene, []).append(line)
+        return tuple((f"{scene}, dt = {lines[0].observations[0].dt:g} s", _table(lines)) for scene, lines in by_scene.items())
 
     @property
     def unfinished(self) -> tuple[str, ...]:
-        """The runs that did not reach their end or show no order: setting, scene, versions, and why that of the last one."""
+        """Runs that did not reach their end or have no order: setting, scene, versions, and the reason in the last one."""
         return tuple(text for line in self.history.lines for text in _unfinished(line))
 
     @property
     def environments(self) -> Table:
-        """What each version ran with."""
+        """Python and packages of each version."""
         rows = [(each.version, each.python, ", ".join(each.packages)) for each in self.history.plan.environments]
         return ("version", "Python", "packages"), rows
 
     def json_text(self) -> str:
-        """Return all that was measured, and what changed, as JSON; what could not be measured is null."""
+        """Return all measurements and changes as JSON; null stands for a value that could not be measured."""
         plan = self.history.plan
         content = {
             "made": dict(self.made),
@@ -100,7 +93,7 @@ class Answer:
             "versions": [
                 {"version": each.version, "python": each.python, "packages": each.packages} for each in plan.environments
             ],
-            "rows": [_record(line, each) for line in self.history.lines for each in line.observations],
+            "rows": [plain(_record(line, each)) for line in self.history.lines for each in line.observations],
             "changes": [_change_record(each) for each in self.history.transitions if each.changes],
         }
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
@@ -120,29 +113,17 @@ class Answer:
         return "\n".join([*head, *tables, "", "### Versions", "", markdown(self.environments), *made]) + "\n"
 
     def junit_text(self) -> str:
-        """Return a case for each setting on each scene and two versions that follow each other, as JUnit has them."""
-        cases = [self._case(each) for each in self.history.transitions]
+        """Return a case for each setting, scene and pair of consecutive versions in the format of JUnit."""
+        cases = []
+        for each in self.history.transitions:
+            text = sentence(each)
+            name = f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
+            failed = self.gated and each in self.history.lost_last
+            cases.append(TestCase(each.now.scene, name, text or NOTHING_CHANGED, text if failed else ""))
         last = self.history.plan.versions[-1]
         if not self.passed and not self.history.lost_last:
             cases.append(TestCase("all", last, failure="\n".join(self.failures)))
         return junit_xml(f"conservative track {self.history.plan.engine}", cases)
-
-    def _case(self, transition: Transition) -> TestCase:
-        was, now, text = transition.was, transition.now, sentence(transition)
-        failed = self.gated and transition in self.history.lost_last
-        name = f"{now.setting or 'default'}: {was.version} to {now.version}"
-        return TestCase(now.scene, name, text or NOTHING_CHANGED, text if failed else "")
-
-
-def _by_scene(history: History) -> dict[str, list[Line]]:
-    found: dict[str, list[Line]] = {}
-    for line in history.lines:
-        found.setdefault(line.scene, []).append(line)
-    return found
-
-
-def _caption(scene: str, lines: list[Line]) -> str:
-    return f"{scene}, dt = {lines[0].observations[0].dt:g} s"
 
 
 def _unfinished(line: Line) -> Iterator[str]:
@@ -154,7 +135,7 @@ def _unfinished(line: Line) -> Iterator[str]:
 
 
 def _reason(seen: Observation) -> tuple[str, str]:
-    """Return what is lacking, as the kind that versions have in common, and in full; both empty where nothing is."""
+    """Return the kind of a failure, which versions can have in common, and its full text; both empty if there is none."""
     if not seen.outcome.ok:
         return seen.outcome.kind.value, str(seen.outcome)
     reason = seen.attitude_order.reason
@@ -170,21 +151,15 @@ def _table(lines: list[Line]) -> Table:
 
 def _row(line: Line, seen: Observation, quantities: list[str]) -> Row:
     drifts = [_drift_cell(seen.drifts[name].value if name in seen.drifts else math.nan) for name in quantities]
-    orders = (_order_cell(seen.attitude_order), _order_cell(seen.rates_order))
-    times = (number(1e6 * _step_time(line, seen)), _ratio_cell(line, seen))
-    return (
-        seen.setting or "default",
-        seen.version,
-        *orders,
-        *drifts,
-        number(seen.error.value),
-        _outcome_cell(seen.outcome),
-        *times,
-    )
-
-
-def _order_cell(fit: Fit) -> str:
-    return DASH if math.isnan(fit.slope) else order_text(fit.slope)
+    fits = (seen.attitude_order, seen.rates_order)
+    orders = [DASH if math.isnan(fit.slope) else order_text(fit.slope) for fit in fits]
+    ratio, step_time = _ratio(line, seen), min(line.times.get(seen.version, (math.nan,)))
+    ratio_text = DASH if ratio is None else number(ratio.value)
+    if ratio is not None and ratio.low != ratio.high:
+        ratio_text += f" ({number(ratio.low)} to {number(ratio.high)})"
+    outcome = outcome_cell(Outcome(seen.outcome.kind))  # the kind alone; the reason is below the tables
+    names = (seen.setting or "default", seen.version)
+    return (*names, *orders, *drifts, number(seen.error.value), outcome, number(1e6 * step_time), ratio_text)
 
 
 def _drift_cell(drift: float) -> Cell:
@@ -195,44 +170,21 @@ def _drift_cell(drift: float) -> Cell:
     return Cell(f"{symbol} {drift_text(drift)}", colour)
 
 
-def _outcome_cell(outcome: Outcome) -> Cell:
-    """Return the kind alone: how and why is said below the tables."""
-    return outcome_cell(Outcome(outcome.kind))
-
-
-def _step_time(line: Line, seen: Observation) -> float:
-    """Return the shortest time of a step, s."""
-    return min(line.times.get(seen.version, (math.nan,)))
-
-
 def _ratio(line: Line, seen: Observation) -> Spread | None:
-    """Return the time beside that of the first version that has one, without a unit."""
+    """Return the time of a step divided by that in the first version that has one."""
     first = next((each.version for each in line.observations if each.version in line.times), "")
     return line.time_ratio(seen.version, first)
 
 
-def _ratio_cell(line: Line, seen: Observation) -> str:
-    ratio = _ratio(line, seen)
-    if ratio is None:
-        return DASH
-    return (
-        number(ratio.value)
-        if ratio.low == ratio.high
-        else f"{number(ratio.value)} ({number(ratio.low)} to {number(ratio.high)})"
-    )
-
-
 def _record(line: Line, seen: Observation) -> dict[str, Any]:
-    ratio = _ratio(line, seen)
     return {
-        **{name: getattr(seen, name) for name in ("scene", "setting", "version", "label", "dt")},
-        "outcome": outcome_record(seen.outcome),
-        "attitude_order": _fields(seen.attitude_order),
-        "rates_order": _fields(seen.rates_order),
-        "attitude_error_rad": _fields(seen.error),
-        "drifts": {name: _fields(drift) for name, drift in seen.drifts.items()},
-        "step_times_s": [finite_or_none(time) for time in line.times.get(seen.version, ())],
-        "time_ratio": None if ratio is None else _fields(ratio),
+        **{name: getattr(seen, name) for name in ("scene", "setting", "version", "label", "dt", "outcome")},
+        "attitude_order": seen.attitude_order,
+        "rates_order": seen.rates_order,
+        "attitude_error_rad": seen.error,
+        "drifts": seen.drifts,
+        "step_times_s": line.times.get(seen.version, ()),
+        "time_ratio": _ratio(line, seen),
     }
 
 
@@ -241,7 +193,3 @@ def _change_record(transition: Transition) -> dict[str, Any]:
     names = {"scene": now.scene, "setting": now.setting, "from": was.version, "to": now.version}
     aspects = [{"aspect": each.aspect.value, "quantity": each.quantity, "lost": each.lost} for each in transition.changes]
     return {**names, "sentence": sentence(transition), "lost": bool(transition.lost), "changes": aspects}
-
-
-def _fields(value: Fit | Spread) -> dict[str, Any]:
-    return {name: finite_or_none(each) if isinstance(each, float) else each for name, each in asdict(value).items()}

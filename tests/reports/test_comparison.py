@@ -13,7 +13,7 @@ from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.comparison.times import Ratio
 from conservative.benchmarks.gate.results import Status
 from conservative.reports.cli.main import main
-from conservative.reports.page.comparison import WIDEST, bar, place, render
+from conservative.reports.page.versions import WIDEST, bar, place, render_comparison
 from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
@@ -94,13 +94,13 @@ def test_markdown_and_junit_have_the_violations():
 
 
 def test_the_page_has_rows_ratios_and_filters():
-    page = render(SLOWER)
+    page = render_comparison(SLOWER)
     assert 'data-standing="slower"' in page
     assert 'aria-label="1.100, 1.080 to 1.120"' in page
     assert re.findall(r'name="standing" value="(\w+)"', page) == ["slower"]
     assert "conservative gate --against was" in page
     assert not re.search(r'(?:src|href)="(?!data:)', page)  # it opens without a network
-    assert 'role="img"' not in render(STANDINGS[Standing.NOTHING])
+    assert 'role="img"' not in render_comparison(STANDINGS[Standing.NOTHING])
 
 
 def test_a_ratio_lies_where_it_belongs():
@@ -136,7 +136,7 @@ def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     assert code == 1
     assert text == f"{SLOWER}\n"
     assert files["markdown"].read_text() == SLOWER.markdown_text()
-    assert files["html"].read_text() == render(SLOWER)
+    assert files["html"].read_text() == render_comparison(SLOWER)
     assert files["junit"].read_text() == SLOWER.junit_text()
     assert gate("--against", "main", ended=answer())[0] == 0
 
@@ -167,7 +167,7 @@ def test_junit_has_violations_that_belong_to_no_row():
 
 def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)  # an import of it fails
-    monkeypatch.delitem(sys.modules, "conservative.reports.page.comparison")
+    monkeypatch.delitem(sys.modules, "conservative.reports.page.versions")
     monkeypatch.setattr("conservative.errors.find_spec", lambda name: None if name == "jinja2" else name)
     markdown = tmp_path / "gate.md"
     assert gate("--against", "main", "--markdown", markdown) == (1, f"{SLOWER}\n")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from conservative.benchmarks.comparison.compare import judge
-from conservative.reports.page.comparison import render
+from conservative.reports.page.versions import render_comparison
 from conservative.reports.tables.comparison import Answer
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, found, timed
@@ -27,7 +27,7 @@ def opened(tmp_path_factory):
     """A page with three rows: one slower, one faster, one as it was."""
     rows = {name: replace(found(), row=replace(found().row, id=name, method=name)) for name in TIMES}
     file = tmp_path_factory.mktemp("page") / "gate.html"
-    file.write_text(render(Answer(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
+    file.write_text(render_comparison(Answer(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
     browser = start(tmp_path_factory.mktemp("profile"))
     try:
         browser.get(file.as_uri())

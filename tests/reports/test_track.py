@@ -8,7 +8,7 @@ import pytest
 
 from conservative.benchmarks.tracking.observation import Fit
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.reports.page.track import render
+from conservative.reports.page.versions import render_track
 from conservative.reports.tables.changes import drift_text, order_text
 from conservative.reports.tables.track import NO_END, NOTHING_CHANGED, Answer
 
@@ -145,7 +145,7 @@ def test_what_has_no_order_says_why_once_for_all_versions():
     chaotic = replace(GOOD, attitude_order=Fit(reason="2 points between the coarsest steps and the floor"))
     answer = Answer(history(chaotic, chaotic, GOOD))
     assert answer.unfinished == ("midpoint on brick in 1.0, 2.0: no order (2 points between the coarsest steps and the floor)",)
-    assert answer.unfinished[0] in render(answer)
+    assert answer.unfinished[0] in render_track(answer)
 
 
 def test_json_has_every_figure_and_change():
@@ -170,7 +170,7 @@ def test_what_was_not_measured_is_null_in_json():
 def test_the_page_stands_alone_and_says_what_the_markdown_says():
     failed = replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "<script>alert(1)</script>"))
     answer = Answer(history(BAD, GOOD, failed), gated=True)
-    page = render(answer)
+    page = render_track(answer)
     assert "the orders of attitude and rates rose from 1 to 2" in page
     assert "3.0 against 2.0: FAILED" in page
     assert "<script" not in page
