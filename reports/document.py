@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,11 @@ from typing import Any
 from conservative import files
 from conservative.errors import BadInput
 
-from .page import engines, markdown, page, random_bodies, scene_charts
 from .run import checkpoint
 from .run.measure import measure
 from .run.plan import Plan
 from .run.provenance import provenance
-from .terminal.progress import Step
+from .terminal.progress import Step, announce
 from .terminal.report_folder import MANIFEST, report_folder
 from .view import View, build
 
@@ -38,12 +36,13 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     source = provenance()  # before any work: files, and the commit, can change while that goes on
     progress = checkpoint.begin(plan, out, source, resume)
     source = replace(source, resumed=progress.describe_earlier(), environments=plan.locks)
-    spans = plan.spans(name for name in plan.names if name not in progress.results)
     try:
         with report_folder(out) as folder:
             measurements = measure(plan, step, progress)
             view = build(plan, measurements, source)
-            render(view, folder, plan.png, lambda what: step(spans[what][0], what))
+            step(1.0, "pictures and page")
+            announce("pictures and page")
+            render(view, folder, plan.png)
     except BaseException as error:
         if progress.results or not isinstance(error, BadInput):
             error.add_note(progress.summary)
@@ -52,14 +51,14 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
     return view
 
 
-def render(view: View, folder: Path, png: bool, announce: Callable[[str], None]) -> None:
-    """Write pictures, tables, page, CSV, and last the JSON that lists them; `announce` is told what comes next."""
-    announce("pictures")
+def render(view: View, folder: Path, png: bool) -> None:
+    """Write pictures, tables, page, CSV, and last the JSON that lists them."""
+    from .page import engines, markdown, page, random_bodies, scene_charts  # here, as altair takes a second to import
+
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     of_engines, of_random = engines.charts(view.engines), random_bodies.chart(view.random)
     text = markdown.render(view, charts, of_engines, lambda name, chart: draw(chart, folder / name, png), of_random)
     files.write_text(folder / "report.md", text, "out")
-    announce("page")
     files.write_text(folder / "index.html", page.render(view, charts, of_engines, of_random), "out")
     files.write_text(folder / "measurements.csv", view.table.to_csv(index=False, lineterminator="\n"), "out")
     names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})

@@ -14,6 +14,7 @@ from .run.measure import Measurements
 from .run.plan import Plan
 from .run.provenance import Provenance
 from .tables import (
+    closing,
     each_step,
     engine_scenes,
     engine_tables,
@@ -26,8 +27,10 @@ from .tables import (
     random_summary,
     runs,
     throughput,
+    work_precision,
 )
 from .tables.cells import Table
+from .tables.classes import with_classes
 from .tables.scene_views import SceneView as SceneView
 from .tables.scene_views import SceneViews
 from .tables.summary import Summary
@@ -67,6 +70,8 @@ class View:
         What of ours failed at the steps of the paper, one line each.
     hard_cases, stability
         None where the report has no such study.
+    closing, verdict
+        The end of the command on the terminal: a table per scene, by name, and one sentence about the scenes.
     engines, versions
         What the studies of engines found on each scene, empty without them, and the version of each engine in them.
     """
@@ -84,12 +89,13 @@ class View:
     paper: PaperView
     hard_cases: hard_cases.HardCases | None
     stability: Table | None
-    imports: Table
     truths: Table
     failures: Table
     unsupported: Table
     engines: tuple[engine_scenes.EngineScene, ...]
     versions: Table
+    closing: tuple[tuple[str, Table], ...]
+    verdict: str
 
 
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
@@ -97,7 +103,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     every, samples = with_names(measurements.table), with_names(measurements.samples)
     of_engines = every["study"].isin(ENGINES)
     table = every[~every["study"].isin((*ENGINES, RANDOM, THROUGHPUT))].reset_index(drop=True)
-    builder = SceneViews.of(table, samples, plan.methods)
+    builder = SceneViews.of(table, samples, plan.methods, work_precision.all_points(every))
     scenes = tuple(builder.scene(value) for value in plan.scenes)
     contests = random_contests.contests(every) if RANDOM in plan.names else ()
     first, about = _first(scenes, every, contests, builder.long_drifts)
@@ -117,12 +123,13 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         paper=_paper(table, samples),
         hard_cases=hard_cases.hard_cases(table),
         stability=hard_cases.stability(table),
-        imports=runs.imports(table),
         truths=runs.truths(table),
         failures=runs.failures(table),
         unsupported=runs.unsupported(table),
         engines=engine_scenes.engine_scenes(every[of_engines], plan.scenes) if plan.engines else (),
         versions=_versions(plan, source),
+        closing=tuple((scene.name, closing.scene_table(every, scene.points, scene.name)) for scene in scenes),
+        verdict=closing.verdict(with_classes(builder.points), [scene.name for scene in scenes]),
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.benchmarks.studies import hard_cases, import_time, selection, sphere_curves
+from conservative.benchmarks.studies import hard_cases, selection, sphere_curves
 from conservative.benchmarks.suite import points
 from conservative.methods import search
 from conservative.reports.charts import style
@@ -117,14 +117,6 @@ def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
     assert list(style.order_lines(lines)) == ["reduced", "borrowed parts=2", "heyoka 7.13.2 body"]  # ours before engines
     methods = selection.methods(["borrowed", "reduced:order=4"])
     assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
-
-
-def test_the_import_of_an_engine_is_timed(installed):
-    before = import_time.modules()
-    installed(
-        SOURCE.replace("Role.OURS", "Role.ENGINE").replace("    colour:", '    module: ClassVar[str] = "json"\n    colour:')
-    )
-    assert import_time.modules() == before | {"json": cv.Role.ENGINE}
 
 
 def test_a_method_need_not_say_anything(installed):

@@ -37,7 +37,6 @@ class Measure(Enum):
     TIME_MEDIAN = "time per simulated second median", "s/s"
     PREPARE = "prepare time", "s"
     FIRST_CALL = "first call time", "s"
-    IMPORT = "import time", "s"
     AGREEMENT = "truth agreement", "rad"
     LONGEST_STEP = "largest |w| dt that works", "rad"
     FAILING_STEP = "first |w| dt that does not", "rad"

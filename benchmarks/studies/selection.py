@@ -12,6 +12,24 @@ from conservative.method import Grid, Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
+MAIN_METHODS = {
+    "convected": ("convected",),
+    "gauss": ("gauss",),
+    "lame": ("lame",),
+    "moser_veselov": ("moser_veselov:order=10", "moser_veselov"),
+    "projected": ("projected",),
+    "reduced": ("reduced", "reduced:order=8"),
+    "substepped": ("substepped",),
+    "taylor": ("taylor:order=12",),
+    "heyoka": ("heyoka", "heyoka:frame=non_spinning", "heyoka:frame=lean"),
+    "mujoco": ("mujoco:integrator=Euler", "mujoco"),
+    "pinocchio": ("pinocchio",),
+    "scipy": ("scipy",),
+    "exact": (),
+    "precise": (),
+}
+"""Settings that a report takes of each family by default: the paper's, a family's own default, and the fastest on the default
+scenes (brick_flip, lagrange_top). Of a family that is not listed here, such as one from another package, it takes all."""
 TOLERANCES = ("tol", "rtol", "tolerance")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
 
@@ -90,6 +108,14 @@ def methods(
     for name in wanted:
         found.update(dict.fromkeys(_resolve(name, skip_missing, settings)))
     return tuple(sorted(found, key=lambda method: list(Role).index(Role(method.role))))
+
+
+def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
+    """Return the methods that a report takes by default: `MAIN_METHODS`, and all of other families. Raises as `methods`."""
+    listed = [name for names in MAIN_METHODS.values() for name in names]
+    chosen = methods(listed, skip_missing, lambda method: (method,))
+    others = [family for family in registry.list_methods() if family not in MAIN_METHODS]
+    return tuple(dict.fromkeys((*chosen, *methods(others, skip_missing)))) if others else chosen
 
 
 def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:

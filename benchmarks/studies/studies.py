@@ -1,12 +1,12 @@
 """The table of studies by name, and those that a report is made of.
 
-for study in studies.cross_studies(selection.scenes(), selection.methods()):
+for study in studies.cross_studies(studies.MAIN, selection.scenes(), selection.methods()):
     for finding in studies.findings(study): ...
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from conservative.check import choice
@@ -20,7 +20,6 @@ from . import (
     engines_at_one_step,
     engines_over_steps,
     hard_cases,
-    import_time,
     long_runs,
     paper,
     paper_figures,
@@ -45,7 +44,6 @@ MAKERS: Mapping[str, Maker] = {
     "long_runs": long_runs.findings,
     "sphere_curves": sphere_curves.findings,
     "paper_figures": paper_figures.findings,
-    "import_time": import_time.findings,
     "engines_at_one_step": engines_at_one_step.findings,
     "engines_over_steps": engines_over_steps.findings,
     "stability": stability.findings,
@@ -62,32 +60,23 @@ RANDOM = "random"
 """Study of bodies that are drawn for it."""
 THROUGHPUT = "throughput"
 """Study of many bodies, which are drawn for it."""
-CROSSED = tuple(name for name in MAKERS if name not in (*HARD, *ENGINES, RANDOM, THROUGHPUT))
-"""Studies of the scenes and methods that are chosen."""
+MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
+"""Studies of the scenes and methods that are chosen: what every report measures."""
+MORE = ("each_step", "sphere_curves", "paper_figures")
+"""Studies of the same scenes and methods that only a full report measures."""
 
 
 def cross_studies(
+    names: Iterable[str],
     scenes: tuple[Scene, ...],
     methods: tuple[Method, ...],
     quick: bool = False,
     skip_missing: bool = False,
     time_limit: float | None = None,
 ) -> tuple[Study, ...]:
-    """Return the studies of the same scenes and methods, in the order of `CROSSED`; they share their truths."""
+    """Return the named studies of the same scenes and methods; they share their reference solutions."""
     truths = Truths()
-    return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in CROSSED)
-
-
-def list_engine_studies(
-    scenes: tuple[Scene, ...],
-    engines: tuple[Method, ...],
-    quick: bool = False,
-    skip_missing: bool = False,
-    time_limit: float | None = None,
-) -> tuple[Study, ...]:
-    """Return the studies of engines (see `engine_selection.select_engines`) on some scenes; they share their truths."""
-    truths = Truths()
-    return tuple(Study(name, scenes, engines, quick, skip_missing, truths, time_limit) for name in ENGINES)
+    return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in names)
 
 
 def list_hard_studies(

@@ -5,47 +5,56 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from conservative.attitude import Array
+
 from .style import GREY, colours
 from .vega_embed import Spec, as_csv
 
-SIDES = (("datum.near < 0", 0.3), ("datum.near >= 0", 1.0))
-"""Which points are behind the sphere and which before it, and their opacity; `near` is towards the eye."""
-TURN, TILT = 35, 25
-"""Where the spheres are looked at from at first, degrees."""
+TURN, TILT = np.deg2rad(35.0), np.deg2rad(25.0)
+"""Where the spheres are looked at from, rad: about the vertical axis, and above the horizontal plane."""
+BEHIND = 0.3
+"""Opacity of points behind the sphere."""
 
 
 def chart(curve: pd.DataFrame) -> Spec:
     """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    The samples are dots, as a line between them would cut corners: a turn of the brick has but few. The sphere has parameters
-    `turn` and `tilt`, degrees.
+    The samples are dots, as a line between them would cut corners: a turn of the brick has but few.
     """
     name, family = curve[["name", "family"]].iloc[0]
-    points = [{"x": x, "y": y, "z": z} for x, y, z in curve[["x", "y", "z"]].round(3).to_numpy().tolist()]
+    colour = colours({name: family})[name]
+    across, up, near = _project(curve[["x", "y", "z"]].to_numpy())
+    sides = ((near < 0, BEHIND), (near >= 0, 1.0))
+    layers = [_great_circles(), *(_dots(across[side], up[side], colour, opacity) for side, opacity in sides)]
     return {
         "usermeta": {"name": name},
         "width": 190,
         "height": 190,
-        "params": [{"name": "turn", "value": TURN}, {"name": "tilt", "value": TILT}],
-        "layer": [
-            {
-                "data": _grid(),
-                "transform": _project(),
-                "mark": _line(GREY, 0.6, 0.5),
-                "encoding": _encoding() | {"detail": {"field": "part"}},
-            },
-            *(_dots(points, colours({name: family})[name], *side) for side in SIDES),
-        ],
+        "layer": layers,
         "config": {"view": {"stroke": None}},
     }
 
 
-def _dots(points: list[dict[str, float]], colour: str, side: str, opacity: float) -> Spec:
-    """Return the points on one side as dots of one line: it breaks before each of them, and its caps are round."""
+def _project(points: Array) -> Array:
+    """Return the parallel projection (3, n) of points (n, 3): across and up on the paper, and towards the eye."""
+    x, y, z = points.T
+    ahead = np.cos(TURN) * x + np.sin(TURN) * y
+    return np.stack(
+        [
+            np.cos(TURN) * y - np.sin(TURN) * x,
+            np.cos(TILT) * z - np.sin(TILT) * ahead,
+            np.cos(TILT) * ahead + np.sin(TILT) * z,
+        ]
+    ).round(3)
+
+
+def _dots(across: Array, up: Array, colour: str, opacity: float) -> Spec:
+    """Return points as dots of one line: it breaks before each of them, and its caps are round."""
+    points = [{"across": x, "up": y} for x, y in zip(across.tolist(), up.tolist(), strict=True)]
     breaks = [{"calculate": "[null, datum.across]", "as": "across"}, {"flatten": ["across"]}]
     return {
-        "data": as_csv(points, ("x", "y", "z")),
-        "transform": [*_project(), {"filter": side}, *breaks],
+        "data": as_csv(points, ("across", "up")),
+        "transform": breaks,
         "mark": _line(colour, 2.4, opacity) | {"strokeCap": "round", "invalid": "break-paths-show-domains"},
         "encoding": _encoding(),
     }
@@ -55,28 +64,21 @@ def _line(colour: str, width: float, opacity: float) -> Spec:
     return {"type": "line", "color": colour, "strokeWidth": width, "opacity": opacity, "order": False}  # of points: their own
 
 
-def _grid() -> Spec:
-    """Return the outline-like circles of a unit sphere: three great circles."""
+def _great_circles() -> Spec:
+    """Return three great circles of the unit sphere."""
     angles = np.linspace(0, 2 * np.pi, 61)
     c, s, zero = np.cos(angles), np.sin(angles), np.zeros_like(angles)
-    circles = [(c, s, zero), (c, zero, s), (zero, c, s)]
+    circles = [np.stack(circle, axis=1) for circle in ((c, s, zero), (c, zero, s), (zero, c, s))]
     rows = [
-        {"part": f"p{number}", "k": k, "x": round(float(x), 3), "y": round(float(y), 3), "z": round(float(z), 3)}
+        {"part": f"p{number}", "k": k, "across": x, "up": y}
         for number, circle in enumerate(circles)
-        for k, (x, y, z) in enumerate(zip(*circle, strict=True))
+        for k, (x, y, _) in enumerate(_project(circle).T.tolist())
     ]
-    return as_csv(rows, ("part", "k", "x", "y", "z"))
-
-
-def _project() -> list[Spec]:
-    """Return the parallel projection: across and up on the paper, and towards the eye."""
-    a, e = "(turn * PI / 180)", "(tilt * PI / 180)"
-    ahead = f"(cos{a} * datum.x + sin{a} * datum.y)"
-    return [
-        {"calculate": f"cos{a} * datum.y - sin{a} * datum.x", "as": "across"},
-        {"calculate": f"cos{e} * datum.z - sin{e} * {ahead}", "as": "up"},
-        {"calculate": f"cos{e} * {ahead} + sin{e} * datum.z", "as": "near"},
-    ]
+    return {
+        "data": as_csv(rows, ("part", "k", "across", "up")),
+        "mark": _line(GREY, 0.6, 0.5),
+        "encoding": _encoding() | {"detail": {"field": "part"}},
+    }
 
 
 def _encoding() -> Spec:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,11 +12,15 @@ from conservative.errors import require_extra
 from . import completion
 from .options import FilePath, epilog, split_list, split_names
 
+if TYPE_CHECKING:
+    from ..view import View
+
 
 @click.command(
-    short_help="Measure everything and write a report.",
+    short_help="Measure the paper's two scenes and write a report.",
     epilog=epilog(
         "conservative report",
+        "conservative report --full                   everything, in about five minutes",
         "conservative report --quick --out quick_report",
         "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
         "conservative report --engines all --methods reduced",
@@ -24,7 +28,9 @@ from .options import FilePath, epilog, split_list, split_names
     ),
 )
 @click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the paper's two]")
-@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
+@click.option(
+    "--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: a selection; all with --full]"
+)
 @click.option(
     "--engines",
     multiple=True,
@@ -37,9 +43,15 @@ from .options import FilePath, epilog, split_list, split_names
     "--bodies",
     type=click.IntRange(0),
     metavar="N",
-    help="Random bodies in each of four fields.  [default: 3; 1 with --quick, 0 with --scenes]",
+    help="Random bodies in each of four fields.  [default: 0; with --full 3]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the random bodies.")
+@click.option(
+    "--full",
+    is_flag=True,
+    help="Measure all methods and everything else as well: random bodies, many bodies, hard cases, stability, each step, "
+    "and the paper's figures.",
+)
 @click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
 @click.option(
@@ -53,34 +65,64 @@ from .options import FilePath, epilog, split_list, split_names
 @click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
 @click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
 @click.option("--out", type=FilePath(), default="report", show_default=True, help="Folder, replaced as a whole.")
-def report(out: Path, resume: bool, as_json: bool, scenes: tuple[str, ...], methods: tuple[str, ...], **extent: Any) -> None:
-    """Run our methods beside every engine and leave tables, pictures and measurements in a folder.
+def report(
+    out: Path,
+    resume: bool,
+    as_json: bool,
+    scenes: tuple[str, ...],
+    methods: tuple[str, ...],
+    engines: tuple[str, ...],
+    bodies: int | None,
+    seed: int,
+    full: bool,
+    quick: bool,
+    skip_missing: bool,
+    time_limit: float | None,
+    png: bool,
+) -> None:
+    """Measure our methods beside MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes.
 
-    The folder is there whole or not at all; until then, what is finished is in a file beside it, OUT.partial.json.
+    Drift of energy and momentum, attitude error, order of convergence, time per step, and time against error. Tables,
+    pictures and measurements are in the folder OUT, replaced as a whole. Until then, finished studies are in OUT.partial.json.
     A family's bare name, such as mujoco, stands for all its variants.
     """
     require_extra("conservative report", "report")
     from .. import document
+    from ..run.checkpoint import find_unfinished
     from ..run.plan import plan_report
     from ..terminal.progress import progress
     from ..terminal.report_folder import MANIFEST
 
-    extent["engines"] = split_list("engines", extent["engines"])
-    plan = plan_report(split_names("scenes", scenes), split_names("methods", methods), **extent)
-    _announce(out, resume)
+    plan = plan_report(
+        split_names("scenes", scenes),
+        split_names("methods", methods),
+        split_list("engines", engines),
+        full=full,
+        quick=quick,
+        skip_missing=skip_missing,
+        png=png,
+        time_limit=time_limit,
+        bodies=bodies,
+        seed=seed,
+    )
+    if not resume and (unfinished := find_unfinished(out)):
+        click.echo(f"{unfinished}: replacing an unfinished report. With --resume its studies are not measured again.", err=True)
     with progress() as step:
         view = document.write(plan, out, step, resume)
-    click.echo((out / MANIFEST).read_text(encoding="utf-8") if as_json else out / "report.md")
-    for statement in view.random.statements if view.random else ():
-        click.echo(statement, err=True)
+    if as_json:
+        click.echo((out / MANIFEST).read_text(encoding="utf-8"))
+    else:
+        _show(view)
+        click.echo(out / "report.md")
     if view.failed:
         raise click.ClickException("; ".join(view.failed))
 
 
-def _announce(out: Path, resume: bool) -> None:
-    """Say which unfinished work a report that begins anew replaces."""
-    from ..run.checkpoint import path_for
+def _show(view: View) -> None:
+    """Print a table per scene, and the verdict."""
+    from ..tables.closing import LEGEND
+    from ..terminal.tables import TerminalTable, print_tables, print_text
 
-    path = path_for(out)
-    if not resume and path.exists():
-        click.echo(f"{path}: unfinished work that --resume goes on with; without it, to be replaced", err=True)
+    print_tables(TerminalTable(name, header, [list(map(str, row)) for row in rows]) for name, (header, rows) in view.closing)
+    print_text(LEGEND + "\n")
+    print_text(view.verdict)

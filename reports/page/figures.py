@@ -39,7 +39,7 @@ class SceneFigures(NamedTuple):
     work_precision: PageFigure
     drift: PageFigure
     convergence: PageFigure
-    sphere: PageFigure
+    sphere: PageFigure | None
 
 
 def scene_figures(scene: SceneView, charts: SceneCharts) -> SceneFigures:
@@ -48,7 +48,7 @@ def scene_figures(scene: SceneView, charts: SceneCharts) -> SceneFigures:
         first(scene.summary, f"work_precision_{scene.name}", scene.name),
         drift(scene),
         convergence(scene, charts.convergence),
-        sphere(scene),
+        sphere(scene) if len(scene.curves) else None,
     )
 
 

@@ -12,14 +12,13 @@ from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
 from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
-from ..tables.cells import CONSERVED, SMALL, Table, markdown
+from ..tables.cells import CONSERVED, SMALL, markdown
 from ..view import PaperView, View
 from . import many_bodies, random_bodies
 from .scene_charts import SceneCharts
 
 Draw = Callable[[str, Any], str]
 """Draws a chart under a name, and returns the name of its file."""
-NO_STUDY = "Not part of this run: a full report, without `--quick` and `--scenes`, has it."
 
 
 def render(
@@ -33,7 +32,7 @@ def render(
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
     )
-    environment.filters["table"] = _table
+    environment.filters["table"] = markdown
     return environment.get_template("report.md.j2").render(
         view=view,
         random_picture=draw(random_bodies.NAME, of_random) if of_random is not None else "",
@@ -54,10 +53,6 @@ def render(
         small=f"{SMALL:.0e}",
         paper=list(_paper(view.paper, draw)),
     )
-
-
-def _table(table: Table | None) -> str:
-    return NO_STUDY if table is None else markdown(table)
 
 
 def _pictures(scene: str, charts: SceneCharts, draw: Draw) -> dict[str, str]:

@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 
 from conservative.benchmarks.studies import long_runs, step_ladder
 
-from ..charts import contrast, spheres
+from ..charts import contrast
 from ..charts.vega_embed import PageFigure
 from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, tolerance
@@ -38,8 +38,8 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
     many = many_bodies.chart(view.throughput)
     many_figure = many_bodies.figure(view.throughput, many) if view.throughput and many is not None else None
     first_figure, paper_figures = first(view.first, "first", view.about), paper.figures(view.paper)
-    drawn = [first_figure, *chain.from_iterable(figures.values()), *engine_figures.values(), *paper_figures]
-    alone = [figure for figure in (random_figure, many_figure) if figure is not None]
+    of_scenes = chain.from_iterable(figures.values())
+    drawn = [first_figure, *of_scenes, *engine_figures.values(), *paper_figures, random_figure, many_figure]
     return _template().render(
         view=view,
         first_figure=first_figure,
@@ -59,10 +59,8 @@ def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[st
         conserved=tolerance(CONSERVED),
         small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
-        charts=libraries.pack(json.dumps(_charts([*drawn, *alone]), separators=(",", ":"))),
+        charts=libraries.pack(json.dumps(_charts(filter(None, drawn)), separators=(",", ":"))),
         libraries=libraries.packed(),
-        turn=spheres.TURN,
-        tilt=spheres.TILT,
     )
 
 

@@ -26,6 +26,8 @@ from .provenance import Provenance
 from .terms import differences, terms
 
 FORMAT = 2
+_BEGINNING = '{"format": '
+"""How every file of unfinished work begins."""
 _MOST_DIFFERENCES = 3
 """How many differences a complaint has at most."""
 
@@ -102,23 +104,41 @@ def path_for(out: Path) -> Path:
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
-def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint:
-    """Return what to begin with: nothing, or with `resume` what an earlier process has done.
+def find_unfinished(out: Path) -> Path | None:
+    """Return the file of an unfinished report into the folder `out`, whole or damaged; None if there is none.
 
     Raises
     ------
     BadInput
-        There is nothing to resume, or it was measured on other terms; or the file is none of ours, so that it must stay.
+        The file was not written by a report, so that it must not be replaced.
     """
     path = path_for(out)
-    process = Origin(source.command, source.date, source.commit)
-    fresh = Checkpoint(path, plan.names, terms(plan, source), process)
     if not path.exists():
-        if resume:
-            raise BadInput("resume", f"no {str(path)!r}", "the folder --out of a report that was interrupted")
-        return fresh
-    before, results = read(path)
+        return None
+    try:
+        with path.open("rb") as stream:
+            if stream.read(len(_BEGINNING)) != _BEGINNING.encode():
+                raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file beside it")
+    except OSError as error:
+        raise BadInput("out", f"{str(path)!r} ({error.strerror})", "a file that can be read, or none of this name") from None
+    return path
+
+
+def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint:
+    """Return the checkpoint to begin with: empty, or with `resume` with the studies of an unfinished report.
+
+    Raises
+    ------
+    BadInput
+        There is nothing to resume, or it was measured on other terms or is damaged; or the file was not written by a report.
+    """
+    path = find_unfinished(out)
+    process = Origin(source.command, source.date, source.commit)
+    fresh = Checkpoint(path_for(out), plan.names, terms(plan, source), process)
     if resume:
+        if path is None:
+            raise BadInput("resume", f"no {str(fresh.path)!r}", "the folder --out of a report that was interrupted")
+        before, results = read(path)
         _require_same_terms(path, before, fresh.terms)
         fresh.results.update(results)
     return fresh
@@ -174,5 +194,5 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, StudyResult]]:
         results = {name: _result(record) for name, record in content["pieces"].items()}
         return {"command": str(content["command"]), "terms": dict(content["terms"])}, results
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        allowed = "unfinished work that an interrupted report left, or no such file: remove it"
-        raise BadInput("out", f"{str(path)!r} ({type(error).__name__}: {error})", allowed) from None
+        got = f"{str(path)!r}, which is damaged ({type(error).__name__}: {error})"
+        raise BadInput("resume", got, "a file that an interrupted report of this version left, or no --resume") from None

@@ -10,7 +10,7 @@ from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Progress
 
-from ..terminal.progress import Step
+from ..terminal.progress import Step, announce
 from .checkpoint import Checkpoint
 from .plan import Plan
 
@@ -26,12 +26,15 @@ class Measurements:
 def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
     """Return rows and samples in the order of the plan.
 
-    What the checkpoint has is not measured again; what is measured is kept there.
+    Studies in the checkpoint are not measured again; the others are stored there. `step` gets the share that is done.
     """
-    left = [study for study in plan.studies if study.name not in checkpoint.results]
-    spans = plan.spans(study.name for study in left)
-    for study in left:
-        checkpoint.keep(study.name, studies.findings(study, _progress(step, study.name, spans[study.name])))
+    for i, study in enumerate(plan.studies):
+        if study.name in checkpoint.results:
+            continue
+        title = f"study {i + 1} of {len(plan.studies)}, {study.name.replace('_', ' ')}"
+        announce(title)
+        progress = _progress(step, title, i, len(plan.studies))
+        checkpoint.keep(study.name, studies.findings(study, progress))
     results = [checkpoint.results[name] for name in plan.names]
     return Measurements(
         measurement.frame(row for result in results for row in result.rows),
@@ -39,7 +42,5 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
     )
 
 
-def _progress(step: Step, name: str, span: tuple[float, float]) -> Progress:
-    """Return a study's progress as a share of the whole."""
-    start, end = span
-    return lambda done, total, what: step(start + (end - start) * done / total, f"{name.replace('_', ' ')}: {what}")
+def _progress(step: Step, title: str, i: int, n: int) -> Progress:
+    return lambda done, total, what: step((i + done / total) / n, f"{title}: {what}")

@@ -13,7 +13,7 @@ from .cells import Table, number, outcome_text
 from .rows import of_study, outcomes, with_outcome, without_outcome
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
-_ELSEWHERE = (*HARD, *ENGINES, "import_time")
+_ELSEWHERE = (*HARD, *ENGINES)
 """Studies with tables of their own."""
 
 
@@ -50,12 +50,6 @@ def truths(table: pd.DataFrame) -> Table:
     rows = table[table["measure"] == Measure.AGREEMENT.text]
     body = [[row["scene"], f"{row['dt']:g}", row["label"], number(row["value"])] for _, row in rows.iterrows()]
     return ["scene", "dt, s", "truths", "largest angle between them, rad"], body
-
-
-def imports(table: pd.DataFrame) -> Table:
-    """Return what importing each library costs."""
-    rows = of_study(table, "import_time").to_dict("records")
-    return ["library", "role", "import, ms"], [[row["label"], row["role"], number(row["value"] * 1e3, 3)] for row in rows]
 
 
 def failures_of_ours(table: pd.DataFrame) -> list[str]:

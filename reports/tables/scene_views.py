@@ -84,9 +84,9 @@ class SceneViews:
     pictures: tuple[Method, ...]
 
     @classmethod
-    def of(cls, table: pd.DataFrame, samples: pd.DataFrame, methods: Sequence[Method]) -> SceneViews:
+    def of(cls, table: pd.DataFrame, samples: pd.DataFrame, methods: Sequence[Method], points: pd.DataFrame) -> SceneViews:
         """Return what all scenes share."""
-        points, errors = work_precision.points(table), orders.errors(table, Measure.ATTITUDE_MAX)
+        errors = orders.errors(table, Measure.ATTITUDE_MAX)
         return cls(
             table,
             points,

@@ -73,6 +73,14 @@ def points(table: pd.DataFrame, study: str = "work_precision", time: Measure = M
     return _name_lines(wide.dropna(subset=["error", "time"]).reset_index(drop=True))
 
 
+def all_points(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the points of the work-precision study, and those of engines that only their own study has."""
+    ours, engines = points(table), points(table, "engines_over_steps")
+    known = set(zip(ours["scene"], ours["name"], strict=True))
+    new = [key not in known for key in zip(engines["scene"], engines["name"], strict=True)]
+    return pd.concat([ours, engines[new]], ignore_index=True) if any(new) else ours
+
+
 def truth_resolution(table: pd.DataFrame) -> dict[str, float]:
     """Return, for scenes whose truth is approximate (see `Truth`), how far two of its kind agree, rad."""
     rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)]

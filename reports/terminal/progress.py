@@ -19,6 +19,12 @@ def has_terminal() -> bool:
     return sys.stderr.isatty()
 
 
+def announce(what: str) -> None:
+    """Write a line about the next piece of work to stderr, where no bar shows it."""
+    if not has_terminal():
+        print(what, file=sys.stderr, flush=True)
+
+
 @contextmanager
 def progress() -> Iterator[Step]:
     """Yield the function to call before each step."""

@@ -1,7 +1,5 @@
 """The studies that yield lines of pictures, and the one that starts interpreters."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -10,9 +8,8 @@ from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement
 from conservative.benchmarks.measures.samples import Samples
-from conservative.benchmarks.studies import import_time, long_runs, paper_figures, sphere_curves, studies
+from conservative.benchmarks.studies import long_runs, paper_figures, sphere_curves, studies
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 BRICK = registry.scene("brick_flip:t_end=1")
@@ -61,13 +58,3 @@ def test_the_papers_figures_are_those_of_its_scenes():
     rates = {line.quantity for line in lines if line.method == paper_figures.PAPER_MAP}
     assert rates == {*paper_figures.RATES, paper_figures.ENERGY, paper_figures.MOMENTUM}
     assert findings("paper_figures", cv.Reduced(), scenes=(registry.scene("needle"),)) == ([], [])
-
-
-def test_imports_are_timed_and_what_is_not_there_says_so(monkeypatch):
-    monkeypatch.setattr(import_time, "modules", lambda: {"json": Role.OURS, "no_such_library": Role.ENGINE})
-    (there, missing), lines = findings("import_time", cv.Reduced())
-    assert lines == []
-    assert (there.method, there.measure, there.role, there.outcome.ok) == ("json", Measure.IMPORT, Role.OURS, True)
-    assert there.value >= 0
-    assert missing.outcome.kind is OutcomeKind.MISSING
-    assert math.isnan(missing.value)

@@ -27,10 +27,10 @@ def test_a_motion_is_found_once_by_the_studies_that_share_it():
 
 
 def test_the_studies_of_a_report_share_their_truths():
-    found = studies.cross_studies((SCENE,), (cv.Reduced(),))
-    assert [study.name for study in found] == list(studies.CROSSED)
+    found = studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))
+    assert [study.name for study in found] == list(studies.MAIN)
     assert len({id(study.truth) for study in found}) == 1
-    assert studies.cross_studies((SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
+    assert studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
 
 
 def test_truths_keep_a_bounded_number_of_motions():

@@ -31,7 +31,7 @@ def built(plan, *tables):
 @pytest.fixture(scope="module")
 def folder(plan, tmp_path_factory):
     place = tmp_path_factory.mktemp("random")
-    document.render(built(plan, ROWS), place, png=False, announce=lambda what: None)
+    document.render(built(plan, ROWS), place, png=False)
     return place
 
 
@@ -55,7 +55,7 @@ def test_the_picture_is_there(folder):
 def test_a_report_without_random_bodies_does_not_mention_them(tmp_path):
     without = plan_report(["brick_flip"], METHODS, quick=True)
     found = built(without)
-    document.render(found, tmp_path, png=False, announce=lambda what: None)
+    document.render(found, tmp_path, png=False)
     assert found.random is None
     assert SECTION not in (tmp_path / "report.md").read_text() + (tmp_path / "index.html").read_text()
 
@@ -69,8 +69,9 @@ def test_rows_of_random_bodies_are_nowhere_else(plan):
 
 def test_how_many_bodies_a_report_has():
     assert plan_report(["brick_flip"], METHODS).bodies == 0
-    assert plan_report([], METHODS).bodies == BODIES
-    assert plan_report([], METHODS, quick=True).bodies == QUICK_BODIES
+    assert plan_report([], METHODS).bodies == plan_report(["brick_flip"], METHODS, full=True).bodies == 0
+    assert plan_report([], METHODS, full=True).bodies == BODIES
+    assert plan_report([], METHODS, full=True, quick=True).bodies == QUICK_BODIES
     first = plan_report(["brick_flip"], METHODS, bodies=1).studies[0]
     assert (first.name, len(first.scenes)) == ("random", 4)
     assert plan_report([], METHODS, bodies=0).studies[0].name != "random"
@@ -85,9 +86,3 @@ def test_a_report_is_not_resumed_on_other_bodies(plan):
     other = plan_report(["brick_flip"], METHODS, quick=True, bodies=2, seed=8)
     assert terms(plan, source) != terms(other, source)
     assert terms(plan, source) == terms(plan_report(["brick_flip"], METHODS, quick=True, bodies=2, seed=7), source)
-
-
-def test_progress_counts_the_bodies(plan):
-    start, end = plan.spans(plan.names)["random"]
-    assert start == 0
-    assert 0 < end < 1

@@ -3,7 +3,6 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,12 +12,11 @@ from click.testing import CliRunner
 
 from conservative import BadInput, MissingEngine, NotConverged, Reduced, registry
 from conservative.benchmarks.measures.measurement import COLUMNS
-from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies import selection, studies
 from conservative.reports import document
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import split_names
-from conservative.reports.run import plan
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import runs
@@ -40,28 +38,57 @@ def made(tmp_path_factory):
 def test_report_has_its_files_and_lists_them(made):
     folder, done = made
     names = {path.name for path in folder.iterdir()}
-    pictures = {f"{kind}_brick_flip.svg" for kind in ("work_precision", "drift", "convergence")} | {"paper_figure_1.svg"}
+    pictures = {f"{kind}_brick_flip.svg" for kind in ("work_precision", "drift", "convergence")}
     assert names == pictures | {"report.md", "index.html", "measurements.csv", "measurements.json"}
     assert set(json.loads((folder / "measurements.json").read_text())["files"]) == names
     assert done.stdout.strip().endswith("report.md")
 
 
-def test_progress_is_off_where_there_is_no_terminal(made):
-    assert made[1].stderr == ""
+def test_a_line_per_study_tells_the_progress_where_there_is_no_terminal(made):
+    lines = made[1].stderr.splitlines()
+    assert [line.partition(", ")[2] for line in lines[:5]] == [name.replace("_", " ") for name in studies.MAIN]
 
 
-def test_progress_never_goes_back_and_ends_near_the_whole():
-    made = plan_report([], ["reduced", "mujoco:RK4"], quick=True)
-    spans = list(made.spans(made.names).values())
-    assert spans[0][0] == 0
-    assert spans[-1][1] == pytest.approx(1, abs=1e-15)  # measured 0
-    assert all(before[1] == after[0] < after[1] for before, after in pairwise(spans))
+def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
+    folder, done = made
+    lines = done.stdout.strip().splitlines()
+    table = pd.read_csv(folder / "measurements.csv")
+    assert max(map(len, lines[:-1])) <= 80
+    assert lines[-1] == str(folder / "report.md")
+    cells = [re.split(r"\s{2,}", line.strip()) for line in lines]
+    ours, engine = (next(row for row in cells if row[0] == name) for name in ("reduced", "mujoco RK4"))
+    paper = table[(table["study"] == "paper") & (table["method"] == "reduced")]
+    drift = paper[paper["quantity"] == "energy"]["value"].iloc[0]
+    assert float(ours[1]) == pytest.approx(drift, rel=0.06)  # two digits are shown
+    assert float(ours[4]) == pytest.approx(2, abs=0.05)
+    assert float(engine[4]) == pytest.approx(4, abs=0.5)
+    verdict = " ".join(lines[-5:-1])
+    assert "brick_flip" in verdict
+    assert "mujoco 4" in verdict
 
 
-def test_the_studies_of_a_plan_are_built_once_and_share_their_truths():
-    made = plan_report(["brick_flip"], ["reduced"], quick=True)
-    assert made.studies is made.studies
-    assert len({id(study.truth) for study in made.studies}) == 1
+def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_everything():
+    default, full = plan_report(), plan_report(full=True)
+    assert default.names == studies.MAIN
+    assert set(full.names) == set(studies.MAKERS) - set(studies.ENGINES)
+    assert set(default.methods) < set(full.methods)
+    assert {method.family for method in default.methods} == set(selection.MAIN_METHODS) - {"exact", "precise"}
+    assert plan_report(bodies=2).names == ("random", *studies.MAIN)
+    assert plan_report(engines=["scipy"]).names == (*studies.MAIN, *studies.ENGINES)
+    assert set(plan_report(["lagrange_top"], full=True).names) == {*studies.MAIN, *studies.MORE}
+
+
+def test_methods_of_other_packages_are_part_of_the_default_report(monkeypatch):
+    monkeypatch.delitem(selection.MAIN_METHODS, "gauss")
+    assert [method.name for method in selection.main_methods() if method.family == "gauss"] == [
+        method.name for method in registry.method("gauss").variants()
+    ]
+
+
+def test_a_quick_report_with_random_bodies_ends_well(tmp_path):
+    options = ["--quick", "--scenes", "brick_flip", "--methods", "taylor:order=12,scipy", "--bodies", "1"]
+    done = CliRunner().invoke(main, ["report", *options, "--out", str(tmp_path / "report")])
+    assert done.exit_code == 0, done.output
 
 
 def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
@@ -72,17 +99,13 @@ def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
     assert written.source.commit == "before"
 
 
-def test_progress_knows_how_long_every_study_takes():
-    assert set(plan.SECONDS) == set(studies.MAKERS)
-
-
 def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     folder, _ = made
     table = pd.read_csv(folder / "measurements.csv")
     stored = json.loads((folder / "measurements.json").read_text())
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
-    assert {"paper", "convergence", "speed", "work_precision", "each_step", "long_runs", "import_time"} == set(table["study"])
+    assert {"paper", "convergence", "speed", "work_precision", "long_runs"} == set(table["study"])
     assert stored["schema"] == document.SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]
@@ -195,7 +218,9 @@ def test_failure_of_ours_is_told(monkeypatch):
     ]
     failed = runs.failures_of_ours(frame(found))
     assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
-    monkeypatch.setattr(document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed, random=None))
+    monkeypatch.setattr(
+        document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed, closing=(), verdict="")
+    )
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr

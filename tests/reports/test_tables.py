@@ -104,11 +104,6 @@ def test_errors_have_the_unit_that_they_are_measured_in():
     )
 
 
-def test_imports_are_in_milliseconds():
-    found = [row("import_time", Measure.IMPORT, 0.25, math.nan, method="mujoco", role="engine")]
-    assert runs.imports(frame(found)) == (["library", "role", "import, ms"], [["mujoco", "engine", "250"]])
-
-
 def order_table(found):
     table = frame(found)
     return scene.order(*(orders.fits(orders.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX)))

@@ -105,10 +105,10 @@ def test_what_did_not_run_has_its_reason():
 
 
 def test_the_report_has_a_section_with_a_picture(tmp_path):
-    plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], bodies=1), measurements()
+    plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], full=True, bodies=1), measurements()
     assert plan.names[-1] == "throughput"
     built = view.build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
-    document.render(built, tmp_path, png=False, announce=lambda what: None)
+    document.render(built, tmp_path, png=False)
     for name in ("report.md", "index.html"):
         assert "heyoka is 2.00 times as fast as ours" in (tmp_path / name).read_text(encoding="utf-8").replace("&#39;", "'")
     assert (tmp_path / "many_bodies.svg").read_text(encoding="utf-8").count("<path") > 20
@@ -117,5 +117,5 @@ def test_the_report_has_a_section_with_a_picture(tmp_path):
 
 
 def test_a_report_of_scenes_alone_and_a_quick_one_have_no_such_section():
-    for extent in ({}, {"quick": True, "bodies": 1}):
+    for extent in ({"full": True}, {"full": True, "quick": True, "bodies": 1}, {"bodies": 1}):
         assert "throughput" not in plan_report(["brick_flip"], ["reduced", "heyoka:tol=1e-9"], **extent).names

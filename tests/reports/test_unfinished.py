@@ -92,7 +92,7 @@ def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", ["mine", "[]", '{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}'])
+@pytest.mark.parametrize("content", ["mine", "[]", ""])
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
 def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -101,6 +101,21 @@ def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypa
     assert done.exit_code == 2
     assert "out: got 'report.partial.json'" in done.stderr
     assert (tmp_path / "report.partial.json").read_text() == content
+
+
+@pytest.mark.parametrize(
+    "content", ['{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}', '{"format": 2, "comm']
+)
+def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kept = tmp_path / "report.partial.json"
+    kept.write_text(content)
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert (done.exit_code, kept.read_text()) == (2, content)
+    assert "resume: got 'report.partial.json', which is damaged" in done.stderr
+    again = CliRunner().invoke(main, [*SMALL[:-1], "moser_veselov:order=2"])
+    assert again.exit_code == 0, again.output
+    assert not kept.exists()
 
 
 def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finished(unfinished):
@@ -117,13 +132,13 @@ def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finish
 
 def test_an_error_keeps_what_is_finished_too(tmp_path):
     def fail(share, what):
-        if what.startswith("convergence"):
+        if "convergence" in what:
             raise BadInput("dt", "0", "above 0")
 
     made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
         document.write(made, tmp_path / "report", fail)
-    assert "1 of 9 studies are finished (paper)" in caught.value.__notes__[0]
+    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
     assert list(json.loads((tmp_path / "report.partial.json").read_text())["pieces"]) == ["paper"]
 
 

@@ -9,7 +9,7 @@ import pytest
 from conservative import Method, Reduced, registry
 from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.measures.samples import Samples
-from conservative.benchmarks.studies import import_time, studies
+from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Study
 from conservative.reports import document, view
 from conservative.reports.charts import figures
@@ -57,9 +57,7 @@ def report():
 
 
 def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):
-    shown = []
-    document.render(view.build(*report), tmp_path, png=False, announce=shown.append)
-    assert shown == ["pictures", "page"]
+    document.render(view.build(*report), tmp_path, png=False)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"report.md", "index.html", "measurements.json", "paper_figure_1.svg", "paper_figure_2.svg"} < names
     assert "sphere_lagrange_top" in (tmp_path / "index.html").read_text()
@@ -70,7 +68,7 @@ def test_engines_and_locks_are_rendered_from_the_view_alone(report, nothing_is_m
     rows = [*at_step("exudyn==1.0", "RK44", 1e-6), *over_steps("exudyn==1.0", "RK44", (1e-1, 1e-2, 1e-3, 1e-4), 4.0)]
     named = dataclasses.replace(plan, engines=(registry.method("pinocchio"),))
     locked = dataclasses.replace(source, environments=(Lock("exudyn==1.0", "3.11.7", ("exudyn==1.0", "numpy==2.0")),))
-    document.render(view.build(named, Measurements(measurement.frame(rows), measured.samples), locked), tmp_path, False, print)
+    document.render(view.build(named, Measurements(measurement.frame(rows), measured.samples), locked), tmp_path, False)
     text, page = ((tmp_path / name).read_text() for name in ("report.md", "index.html"))
     for part in ("exudyn==1.0/RK44", "4.00 ± 0.01 (4)", "exudyn==1.0, numpy==2.0"):
         assert part in text
@@ -80,11 +78,11 @@ def test_engines_and_locks_are_rendered_from_the_view_alone(report, nothing_is_m
 
 def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_methods(report, nothing_is_measured, tmp_path):
     plan, measured, source = report
-    document.render(view.build(plan, measured, source), tmp_path, False, print)
+    document.render(view.build(plan, measured, source), tmp_path, False)
     without = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
     assert not any("## Engines" in text or 'id="engines"' in text or "Environments of engines" in text for text in without)
     locked = dataclasses.replace(source, environments=(Lock("exudyn==1.0", "3.11.7", ("numpy==2.0",)),))
-    document.render(view.build(plan, measured, locked), tmp_path, False, print)
+    document.render(view.build(plan, measured, locked), tmp_path, False)
     for name in ("report.md", "index.html"):
         text = (tmp_path / name).read_text()
         assert "Environments of engines" in text
@@ -97,9 +95,8 @@ def test_a_report_without_engines_has_no_section_of_them_but_locks_of_its_method
     [
         lambda: curves(registry.scene("brick_flip"), Reduced()),
         lambda: list(studies.findings(Study("paper_figures", (registry.scene("brick_flip"),), (Reduced(),)))),
-        lambda: import_time.import_time("json"),
     ],
-    ids=["curves", "figures of the paper", "imports"],
+    ids=["curves", "figures of the paper"],
 )
 def test_what_rendering_once_measured_would_be_noticed(measure, nothing_is_measured):
     with pytest.raises(pytest.fail.Exception, match=r"runs on|a process starts"):
@@ -111,7 +108,7 @@ def test_the_view_is_computed_once_for_all_scenes(report, monkeypatch):
     for module, name in ((work_precision, "points"), (orders, "errors"), (orders, "fits")):
         monkeypatch.setattr(module, name, counting(getattr(module, name), calls))
     view.build(*report)
-    assert calls.count("points") == 1
+    assert calls.count("points") == 2  # of work against precision, and of engines
     assert calls.count("errors") == 2  # of the attitude, and of the rates
     assert calls.count("fits") == 2
 
@@ -132,7 +129,7 @@ def test_each_chart_is_built_once_for_the_report_and_its_page(report, monkeypatc
     calls = []
     for name in ("work_precision", "convergence", "drift"):
         monkeypatch.setattr(figures, name, counting(getattr(figures, name), calls))
-    document.render(view.build(*report), tmp_path, png=False, announce=lambda what: None)
+    document.render(view.build(*report), tmp_path, png=False)
     scenes = len(report[0].scenes)
     assert calls.count("work_precision") == calls.count("convergence") == scenes
     assert calls.count("drift") == 2 * scenes  # the page's has fewer samples
