@@ -27,16 +27,18 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Wr
 )
 @click.argument("scene", shell_complete=completion.scenes)
 @click.option("--error", type=float, default=1e-6, show_default=True, help="Largest attitude error over the duration, rad.")
-@click.option("--duration", type=float, help="s.  [default: the scene's]")
-@click.option("--engine", multiple=True, metavar="A,B", shell_complete=completion.methods, help="[default: all installed]")
+@click.option("--duration", type=float, help="Duration, s.  [default: the scene's]")
 @click.option(
-    "--cost-limit", type=float, default=1.0, show_default=True, help="Wall time per simulated second, s, that may be spent."
+    "--engine",
+    multiple=True,
+    metavar="A,B",
+    shell_complete=completion.methods,
+    help="Engines to probe.  [default: all installed]",
 )
-@click.option(
-    "--time-limit", type=float, default=60.0, show_default=True, help="Time, s, after which an engine's run is ended."
-)
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-@click.option("--out", type=OutputFolder(FILES), help="Folder for recommendation.json and recommendation.svg.")
+@click.option("--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time per simulated second, s.")
+@click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("--out", type=OutputFolder(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
 def recommend(
     scene: str,
     error: float,

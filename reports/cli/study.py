@@ -24,7 +24,7 @@ COLUMNS = 7
 
 @click.command(
     cls=OutputCommand,
-    short_help="Make one study: random bodies, work against precision, ...",
+    short_help="Run one study: random bodies, work-precision, ...",
     epilog=epilog(
         "conservative study random --bodies 40 --seed 7",
         "conservative study random --bodies 5 --methods projected,gauss,heyoka --csv rows.csv",
@@ -35,28 +35,37 @@ COLUMNS = 7
     ),
 )
 @click.argument("name", shell_complete=completion.studies)
-@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the study's own]")
-@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: all registered]")
 @click.option(
-    "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="Engines in environments, too."
+    "--scenes",
+    multiple=True,
+    metavar="A,B",
+    shell_complete=completion.scenes,
+    help="Scenes to measure.  [default: the study's own]",
+)
+@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="Methods.  [default: all]")
+@click.option(
+    "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="More engines, in environments."
 )
 @click.option(
-    "--bodies", type=click.IntRange(1), metavar="N", help="Random bodies in each field, or of each kind.  [default: 10, 64]"
+    "--bodies",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Number of random bodies per field (or kind, in throughput).  [default: 10, 64]",
 )
-@click.option("--seed", type=click.IntRange(0), metavar="S", help="Of the random bodies.  [default: 0]")
-@click.option("--sizes", multiple=True, metavar="N,M", help="Of throughput: numbers of bodies.  [default: 1,10,...,1e6]")
-@click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
-@click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
-@click.option("--time-limit", type=float, metavar="S", help="Longest run to plan for, s.  [default: 0.6, with --quick 0.15]")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that finds the rows of a study without times.")
-@click.option("--json", "as_json", is_flag=True, help="Rows and samples as JSON on stdout.")
+@click.option("--seed", type=click.IntRange(0), metavar="S", help="Seed of the random bodies.  [default: 0]")
+@click.option("--sizes", multiple=True, metavar="N,M", help="For throughput: batch sizes.  [default: 1,10,...,1e6]")
+@click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
+@click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
+@click.option("--time-limit", type=float, metavar="S", help="Time budget per run, s.  [default: 0.6, with --quick 0.15]")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on this Dask scheduler; only for studies without times.")
+@click.option("--json", "as_json", is_flag=True, help="Print rows and samples as JSON.")
 @click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
-@click.option("--out", type=OutputFolder(FILES), help=f"Folder for {', '.join(FILES)}.")
+@click.option("--out", type=OutputFolder(FILES), help=f"Write {', '.join(FILES)} into this folder.")
 def study(name: str, as_json: bool, **options: Any) -> None:
-    """Make the study NAME and show what it finds: of random bodies the ratios of times, of any other study its rows.
+    """Run the study NAME and show its rows, or the time ratios of random bodies.
 
-    The names are those of the studies that a report is made of; `random` and `throughput` draw bodies that nobody chose.
+    Names are those of the studies in a report. `random` and `throughput` use random bodies.
     """
     require_extra("conservative study", "report")
     with ExitStack() as files:

@@ -38,9 +38,9 @@ SVG_MARK = "<!-- Written by conservative -->"
     help="Standard deviations: attitude=5deg or any; rate=0.1 (rad/s), 5deg/s, 10% or any; inertia=1%; potential.weight=2%.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")
-@click.option("--method", "-m", shell_complete=completion.methods, help="Name, with settings.  [default: by the scene]")
-@click.option("--dt", type=float, help="Step, s.  [default: the scene's]")
-@click.option("--error", type=float, help="Attitude error over the run, rad, instead of a method and a step.")
+@click.option("--method", "-m", shell_complete=completion.methods, help="Method with settings.  [default: chosen by the scene]")
+@click.option("--dt", type=float, help="Step size, s.  [default: the scene's]")
+@click.option("--error", type=float, help="Target attitude error, rad; chooses method and step size.")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option(
     "--samples",
@@ -51,11 +51,11 @@ SVG_MARK = "<!-- Written by conservative -->"
     help="Samples kept of each body, at most: 2 are the initial and the final state. Each takes 96 bytes.",
 )
 @click.option("--out", type=FilePath(), help="Write the samples to a new folder (Zarr).")
-@click.option("--resume", is_flag=True, help="Compute what is missing or damaged in the folder --out; all else as it was.")
+@click.option("--resume", is_flag=True, help="Compute missing and damaged blocks of the folder --out, with the same options.")
 @click.option("--picture", type=OutputFile(SVG_MARK), help="Draw how attitudes spread and drifts are distributed (SVG).")
-@click.option("--threads", type=click.IntRange(1), metavar="N", help="[default: one a processor]")
+@click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads.  [default: one per processor]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
-@click.option("--json", "as_json", is_flag=True, help="The summary as JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def sweep(
     scene: str,
     starts: int,

@@ -57,14 +57,22 @@ SHORT = {
     "--against",
     type=FilePath(),
     metavar="WHEEL|FOLDER",
-    help="Compare a build of your own with the last version, by default the newest; exit code 1 if it lost something.",
+    help="Compare your own build with the last version; exit code 1 if an order, an invariant or a run is lost.",
 )
-@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: a report's]")
-@click.option("--settings", multiple=True, metavar="A,B", help="Such as RK4.  [default: all that tables show]")
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option(
+    "--scenes",
+    multiple=True,
+    metavar="A,B",
+    shell_complete=completion.scenes,
+    help="Scenes to run.  [default: those of a report]",
+)
+@click.option(
+    "--settings", multiple=True, metavar="A,B", help="Settings of the engine, such as RK4.  [default: those in tables]"
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--junit", type=OutputFile('name="conservative track '), help="Write a JUnit report.")
 @click.option("--markdown", type=OutputFile(PAGE["track.md"]), help="Write tables and changes as Markdown.")
-@click.option("--out", type=OutputFolder(PAGE), help=f"Folder for {', '.join(PAGE)}.")
+@click.option("--out", type=OutputFolder(PAGE), help=f"Write {', '.join(PAGE)} into this folder.")
 @find_links_option
 @allow_build_option
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
