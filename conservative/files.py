@@ -1,8 +1,8 @@
-"""The one writer of files: what it writes is there whole or not at all.
+"""Files that are written as a whole or not at all.
 
-A file is written under a temporary name beside its place, which it takes once all of it is on the disk. A full disk, an
-exception or a kill leaves what was there before. Whoever makes a temporary holds a lock on it, which ends with the process,
-however that ends: a temporary that nobody holds is left over, and goes when the same place is written next.
+A file is written under a temporary name next to its place, and renamed once all of it is on the disk. A full disk, an exception
+or a kill leaves the previous file. The process that makes a temporary file holds a lock on it, which ends with the process. A
+temporary file without a lock is left over from a kill, and is removed when the same place is written next.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ except ImportError:  # not POSIX: no locks, and nothing is known to be left over
 def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
     """Yield a text stream whose contents become the file `target` when the block ends well.
 
-    A place that cannot be written is an error before the block. A link stays one, a file keeps its permissions, and what is no
-    file, such as /dev/null, is written as it is.
+    A place that cannot be written is an error before the block. A link stays a link, a file keeps its permissions, and a device
+    or a pipe, such as /dev/null, is written directly.
 
     Raises
     ------
@@ -110,10 +110,21 @@ def lock(path: Path) -> int | None:
     """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
     with suppress(OSError):
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
-        if _try_lock(handle) and _is_at(handle, path):
+        if try_lock(handle, without=False) and _is_at(handle, path):
             return handle
         os.close(handle)
     return None
+
+
+def try_lock(handle: int, without: bool = True) -> bool:
+    """Lock a file or a folder, and return False if another process has the lock, `without` if the file system has no locks."""
+    try:
+        if fcntl is None:
+            return without
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return without and not isinstance(error, BlockingIOError)
+    return True
 
 
 def release(handle: int) -> None:
@@ -135,10 +146,12 @@ def remove(path: Path) -> None:
 
 def sync(path: Path) -> None:
     """Have a file, or the names in a folder, on the disk, where the file system can."""
-    with suppress(OSError), ExitStack() as stack:
+    with suppress(OSError):
         handle = os.open(path, os.O_RDONLY)
-        stack.callback(os.close, handle)
-        os.fsync(handle)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 class _RawFile(io.FileIO):
@@ -204,20 +217,9 @@ def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:
     while True:
         fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
         handle = make(fresh)
-        if _try_lock(handle, without=True) and _is_at(handle, fresh):
+        if try_lock(handle) and _is_at(handle, fresh):
             return fresh, handle
         os.close(handle)
-
-
-def _try_lock(handle: int, without: bool = False) -> bool:
-    """Lock a file or a folder if no other process has; `without` is the answer where the file system has no locks."""
-    try:
-        if fcntl is None:
-            return without
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return without and not isinstance(error, BlockingIOError)
-    return True
 
 
 def _is_at(handle: int, path: Path) -> bool:

@@ -1,7 +1,7 @@
-"""Values as bytes for another process: functions and classes of scripts and notebooks too, and frozen values as they were.
+"""Values as bytes for another process, including functions and classes of scripts and notebooks.
 
-What a cached property keeps stays behind, as compiled code and addresses mean nothing elsewhere, and an array that is closed to
-writing stays closed, because compiled code for it is another one. Source: our own.
+Cached properties are left out, because compiled code and addresses mean nothing elsewhere. A read-only array stays read-only,
+because compiled code for it is different.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import io
 import pickle
 import sys
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import cache, cached_property
 from typing import Any
 
@@ -21,7 +21,7 @@ from ..attitude import Array
 from ..errors import require_extra
 
 LOCK = threading.Lock()
-"""Held while bytes are made: which modules are taken by value is a setting of the whole process."""
+"""Held by `dump`: which modules are pickled by value is a setting of the whole process."""
 
 
 class NotTransferable(TypeError):
@@ -36,28 +36,34 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     value
         Anything.
     shared
-        Objects that the other side has as well: of those the value refers to, only the place in this list is in the bytes.
+        Objects that the other side has as well. The bytes only contain their places in this list.
     by_value
-        Modules that the other side cannot import: what the value takes from them is in the bytes.
+        Modules that the other side cannot import: the bytes contain the functions and classes that the value takes from them.
 
     Raises
     ------
     NotTransferable
-        A part of the value cannot be made bytes of.
+        A part of the value cannot be pickled.
     MissingExtra
         cloudpickle, of the extra `report`, is not installed.
     """
-    stream = io.BytesIO()
-    with LOCK, _register_by_value(by_value):
+    stream, pickler = io.BytesIO(), _pickler()
+    import cloudpickle
+
+    with LOCK, ExitStack() as stack:
+        known = cloudpickle.list_registry_pickle_by_value() if by_value else ()
+        for module in (sys.modules[name] for name in by_value if name not in known):
+            cloudpickle.register_pickle_by_value(module)
+            stack.callback(cloudpickle.unregister_pickle_by_value, module)
         try:
-            _pickler()(stream, shared).dump(value)
+            pickler(stream, shared).dump(value)
         except (pickle.PicklingError, TypeError, AttributeError, RecursionError, ValueError) as error:
             raise NotTransferable(f"{type(error).__name__}: {error}") from error
     return stream.getvalue()
 
 
 def load(content: bytes, shared: Sequence[object] = ()) -> Any:
-    """Return what bytes were made of, with the objects `shared` in their places."""
+    """Return the value of `dump`, with the objects `shared` in their places."""
     return _Unpickler(io.BytesIO(content), shared).load()
 
 
@@ -72,7 +78,7 @@ class _Unpickler(pickle.Unpickler):
 
 @cache
 def _pickler() -> Any:
-    """Return the class that makes bytes; its base is imported when it is first needed."""
+    """Return the pickler; cloudpickle is imported when it is first needed."""
     require_extra("a limit on the time of a run", "report", "cloudpickle")
     from cloudpickle import CloudPickler
 
@@ -92,17 +98,17 @@ def _pickler() -> Any:
 
 
 def _reduce(value: Any) -> Any:
-    """Return how a value is made again, as pickle wants it told; NotImplemented where pickle's own way is right."""
+    """Return how pickle restores a value; NotImplemented if pickle's own way is right."""
     if isinstance(value, type):
         return NotImplemented
     if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
         return _close_array, (value.copy(order="K"),)
-    if isinstance(value, BaseException):
-        return _make_exception, (type(value), value.args, vars(value))
+    if isinstance(value, BaseException):  # as it was, whatever arguments its constructor takes
+        return _make, (type(value), value.args, vars(value))
     kind: Any = type(value)
     kept = _names_kept(kind)
     if not kept.isdisjoint(getattr(value, "__dict__", ())):
-        return _make_value, (type(value), {name: part for name, part in vars(value).items() if name not in kept})
+        return _make, (kind, (), {name: part for name, part in vars(value).items() if name not in kept})
     return NotImplemented
 
 
@@ -117,35 +123,9 @@ def _close_array(array: Array) -> Array:
     return array
 
 
-def _make_value(kind: type, state: dict[str, Any]) -> Any:
-    value: Any = object.__new__(kind)
-    vars(value).update(state)
-    return value
-
-
-def _make_exception(kind: type[BaseException], args: tuple[Any, ...], state: dict[str, Any]) -> BaseException:
-    """Return an exception as it was, whatever arguments its `__init__` takes."""
-    error = kind.__new__(kind, *args)
-    error.args = args
-    vars(error).update(state)
-    return error
-
-
-@contextmanager
-def _register_by_value(names: Sequence[str]) -> Iterator[None]:
-    """Take functions and classes of modules by value within the block."""
-    modules = [sys.modules[name] for name in names]
-    if not modules:
-        yield
-        return
-    import cloudpickle
-
-    known = cloudpickle.list_registry_pickle_by_value()
-    fresh = [module for module in modules if module.__name__ not in known]
-    try:
-        for module in fresh:
-            cloudpickle.register_pickle_by_value(module)
-        yield
-    finally:
-        for module in fresh:
-            cloudpickle.unregister_pickle_by_value(module)
+def _make(kind: type, args: tuple[Any, ...], state: dict[str, Any]) -> Any:
+    made: Any = kind.__new__(kind, *args)
+    if isinstance(made, BaseException):
+        made.args = args
+    vars(made).update(state)
+    return made

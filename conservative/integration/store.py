@@ -197,7 +197,8 @@ def write_store(path: str | Path, label: str, bodies: Bodies, grid: Grid, resume
         raise BadInput("path", got, "one of the same run")
     handle = os.open(place, os.O_RDONLY)
     try:
-        _lock(place, handle)
+        if not files.try_lock(handle):
+            raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own")
         for leftover in place.rglob("*.partial"):  # what a kill has left of a chunk
             files.remove(leftover)
         yield _open(place, record, "r+")
@@ -236,18 +237,6 @@ def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
         got = f"{str(place)!r}, where an ensemble is"
         raise BadInput("path", got, "a new folder, or resume=True to go on with this one")
     return found
-
-
-def _lock(place: Path, handle: int) -> None:
-    """Lock the folder, where the file system can. Raise `BadInput` if another process has the lock."""
-    if files.fcntl is None:
-        return
-    try:
-        files.fcntl.flock(handle, files.fcntl.LOCK_EX | files.fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own") from None
-    except OSError:
-        return
 
 
 def _make_folder(fresh: Path) -> int:
