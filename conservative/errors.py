@@ -235,6 +235,6 @@ def require_extra(what: str, extra: str, *packages: str) -> None:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return what to say is allowed instead of an unknown `name`: the nearest known one first."""
     known = sorted(known)
-    close = get_close_matches(name, known, n=1, cutoff=0.4)
+    close = get_close_matches(name, known, n=1)
     listing = ", ".join(known)
     return f"{close[0]!r} (nearest), or one of {listing}" if close else f"one of {listing}"

@@ -1,5 +1,9 @@
 """What is said of a run beside its samples: its work, how far it was good, and that long ones have every sample."""
 
+from types import SimpleNamespace
+
+import mujoco
+import mujoco.rollout
 import numpy as np
 import pytest
 
@@ -8,9 +12,11 @@ from conservative.attitude import angle_between
 from conservative.method import Grid
 from conservative.references.engine import principal_axes
 from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.inside.mujoco import prepare_with
 from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.motion import _BLOCK
 from conservative.trajectory import Counters
@@ -51,3 +57,33 @@ def test_a_closed_form_has_every_sample_of_many(top):
         alone = Exact().prepare(top, Grid(float(many.t[k]), 1))()
         assert angle_between(alone.R_WB[-1], many.R_WB[k]) < 1e-13, k  # measured 1e-16
         np.testing.assert_allclose(alone.w_WB_B[-1], many.w_WB_B[k], atol=1e-13)
+
+
+class Counted:
+    """A module whose function `mj_step` is counted: the steps of each call."""
+
+    def __init__(self, module):
+        self.module, self.steps = module, []
+
+    def __getattr__(self, name):
+        return getattr(self.module, name)
+
+    def mj_step(self, model, data, nstep=1):
+        self.steps.append(nstep)
+        return self.module.mj_step(model, data, nstep)
+
+
+def test_mujoco_makes_the_steps_between_samples_in_one_call(free):
+    """A loop over `mj_step` in Python has the same states and takes many times as long."""
+    mj, grid = Counted(mujoco), Grid(0.01, 60, 20)
+    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
+    assert mj.steps == [20, 20, 20]
+
+
+def test_mujoco_makes_close_samples_in_one_call(free, monkeypatch):
+    mj, grid, calls = Counted(mujoco), Grid(0.01, 60, 2), []
+    rollout = mujoco.rollout.rollout
+    monkeypatch.setattr(mujoco.rollout, "rollout", lambda *args, **how: calls.append(how["nstep"]) or rollout(*args, **how))
+    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
+    assert calls == [60]
+    assert mj.steps == []
