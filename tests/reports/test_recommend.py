@@ -63,8 +63,8 @@ def test_text_lists_all_integrators_and_what_stands_behind_it():
         "implicitf",
         "discrete",
         "probe runs",
-        "Truth:",
-        "rates off by",
+        "Reference solution:",
+        "change of the initial rates",
     ):
         assert part in done.stdout
     assert done.stderr == ""  # progress is for terminals
@@ -80,8 +80,16 @@ def test_what_cannot_reach_an_error_says_how_far_it_gets():
 
 def test_an_unstable_motion_is_said_to_be_one():
     text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20").stdout.split())
-    assert "and by anything after that" in text
+    assert "and by any angle after that" in text
     assert "the motion is unstable and amplifies errors" in text
+
+
+def test_a_file_of_somebody_else_is_not_replaced(tmp_path):
+    (tmp_path / "recommendation.json").write_text("mine")
+    done = conservative("brick_flip", *COMMON, "--engine", "mujoco", "--out", tmp_path)
+    assert done.exit_code == 2
+    assert (tmp_path / "recommendation.json").read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == ["recommendation.json"]
 
 
 @pytest.mark.parametrize(
