@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, Orders, jax_variables
+from ..environments.environment import Distribution
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import ClassVar
 from conservative.check import finite_number
 from conservative.errors import BadInput
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, Orders
+from ..environments.environment import Distribution
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from conservative.check import choice
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, Orders
+from ..environments.environment import Distribution
 
 RATES = {"RectEuler": 1, "Trapezoidal": 1, "AB2": 2, "AB3": 2, "AB4": 2, "AB5": 2}
 """Order of each, about: what comes before the start is taken for constant, which leaves an error of second order."""

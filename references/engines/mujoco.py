@@ -21,8 +21,8 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, Orders
+from ..environments.environment import Distribution
 from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
 from .inside.mujoco import prepare_many_with, prepare_with
 

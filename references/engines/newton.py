@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from conservative.scene import Scene
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, Orders
+from ..environments.environment import Distribution
 
 FREE_ONLY = {
     "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
+from ..environments.environment import Distribution
 
 
 @dataclass(frozen=True)

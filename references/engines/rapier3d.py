@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from conservative.check import positive_integer
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod
+from ..environments.environment import Distribution
 
 
 @dataclass(frozen=True)

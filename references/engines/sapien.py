@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from conservative.scene import Scene
 
-from ..environments.catalogue import Distribution
 from ..environments.engine_method import EngineMethod, rate_limit_reason
+from ..environments.environment import Distribution
 
 RATE_LIMIT = 100.0
 """Rate, rad/s, that PhysX keeps a body below as installed (`max_angular_velocity`)."""

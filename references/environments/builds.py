@@ -1,4 +1,4 @@
-"""Environments of builds that are no release: of a wheel, or of a folder of sources, each under a version of its own."""
+"""Environments of several releases of an engine, and of builds that are no release: of a wheel, or of a folder of sources."""
 
 from __future__ import annotations
 
@@ -6,14 +6,24 @@ import hashlib
 import os
 import re
 import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from conservative.errors import BadInput
 
-from .catalogue import distribution_of
-from .environment import BUILD, folder_of_all, read_environment, temporary_folder
-from .install import Installation, import_trouble, make
-from .lock import Source, normal_name, resolve_wheel
+from .environment import (
+    BUILD,
+    Environment,
+    distribution_of,
+    find_environment,
+    folder_of_all,
+    read_environment,
+    temporary_folder,
+    version_key,
+)
+from .failures import MissingEnvironment
+from .install import Installation, check, import_trouble, install, make
+from .lock import Source, list_versions, normal_name, resolve_wheel
 from .uv_command import UvFailed, run_uv
 
 _ALLOWED = "a wheel, or a folder with pyproject.toml or setup.py"
@@ -74,3 +84,45 @@ def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> P
     except UvFailed as failure:
         raise BadInput("against", repr(str(path)), f"a folder that uv can build ({failure.summary})") from None
     return next(folder.glob("*.whl"))
+
+
+def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
+    """Return the newest versions of an engine that there are wheels for and that its adapter is meant for, oldest first.
+
+    Raises
+    ------
+    BadInput
+        The engine is unknown, or where packages come from does not say which versions there are.
+    """
+    distribution = distribution_of(engine)
+    known = list_versions(distribution.package, source)
+    if not known:
+        got = f"no list of versions of {distribution.package} from where packages come from"
+        raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
+    meant = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
+    return tuple(sorted(meant, key=version_key)[-count:])
+
+
+def install_releases(
+    engine: str, versions: Iterable[str], source: Source, tell: Callable[[str], None]
+) -> tuple[Environment, ...]:
+    """Return the environment of each version, in this order; what is not there is installed, and `tell` is told before.
+
+    Raises
+    ------
+    BadInput
+        The engine or a version is unknown, or cannot be had here and now.
+    """
+    names = [f"{engine}=={version}" for version in versions]
+    for name in names:
+        check(name)  # all of them, before the first takes minutes
+    return tuple(_find_or_install(name, source, tell) for name in names)
+
+
+def _find_or_install(name: str, source: Source, tell: Callable[[str], None]) -> Environment:
+    engine, _, version = name.partition("==")
+    try:
+        return find_environment(engine, version)
+    except MissingEnvironment:
+        tell(f"installing {name}")
+        return install(name, source).environment

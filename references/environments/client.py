@@ -7,7 +7,9 @@ an engine's loop would share the interpreter with.
 
 from __future__ import annotations
 
+import atexit
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -20,8 +22,8 @@ from time import monotonic
 from typing import IO, Any
 
 from . import worker as program
+from .environment import Environment, temporary_folder
 from .failures import EngineCrashed, EngineTimeout, describe_exit
-from .pipes import read_exactly, write_all
 
 TIME_LIMIT = 600.0
 """Time, s, after which a run that nobody has set another limit for is ended."""
@@ -230,3 +232,58 @@ def _stop(process: subprocess.Popen[bytes], at_once: bool) -> None:
 def _memory() -> int:
     """Return three quarters of the machine's memory, bytes."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
+
+
+_workers: dict[tuple[tuple[object, ...], int], Worker] = {}
+_lock = Lock()
+
+
+def worker_of(environment: Environment, variables: Mapping[str, str] | None = None) -> Worker:
+    """Return the worker of an environment whose process has some variables beside ours.
+
+    A forked process has workers of its own, as two cannot share a pipe.
+    """
+    key = (environment.folder, *sorted((variables or {}).items())), os.getpid()
+    with _lock:
+        if key not in _workers:
+            home = environment.folder / "home"
+            _workers[key] = Worker(environment.interpreter, home, temporary_folder(), variables)
+        return _workers[key]
+
+
+@atexit.register
+def close_workers(folder: Path | None = None) -> None:
+    """End the workers of an environment, by default all of this process; each is started again when it is asked."""
+    for ((place, *_), process), worker in list(_workers.items()):
+        if process == os.getpid() and folder in (None, place):
+            worker.close()
+
+
+def _wait(descriptor: int, event: int, deadline: float) -> None:
+    """Wait until a pipe can be read or written, or its other end is gone."""
+    poll = select.poll()
+    poll.register(descriptor, event)
+    while not poll.poll(max(0.0, deadline - monotonic()) * 1000):
+        if monotonic() >= deadline:
+            raise TimeoutError
+
+
+def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
+    """Return so many bytes until a deadline, in s. Raises EOFError where there are no more, and TimeoutError."""
+    descriptor, parts = pipe.fileno(), []
+    while count:
+        _wait(descriptor, select.POLLIN, deadline)
+        part = os.read(descriptor, min(count, 1 << 20))
+        if not part:
+            raise EOFError
+        parts.append(part)
+        count -= len(part)
+    return b"".join(parts)
+
+
+def write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
+    """Write bytes until a deadline, in s. Raises BrokenPipeError where nobody reads them, and TimeoutError."""
+    descriptor, rest = pipe.fileno(), memoryview(data)
+    while rest:
+        _wait(descriptor, select.POLLOUT, deadline)
+        rest = rest[os.write(descriptor, rest[: select.PIPE_BUF]) :]

@@ -22,11 +22,9 @@ from conservative.methods.many import Bodies, RunMany
 from conservative.scene import Scene
 
 from ..engine import gravity_or_free, mass_model_reason, principal_axes
-from .catalogue import Distribution
-from .client import Worker
-from .environment import Environment, find_environment
+from .client import Worker, worker_of
+from .environment import Distribution, Environment, find_environment
 from .plain_numbers import ManySamples, Samples, describe, describe_many, take_axes
-from .workers import worker_of
 
 Orders = Mapping[str, int | None]
 

@@ -10,14 +10,71 @@ FOLDER is `engines` in the user's cache folder of this package, as platformdirs 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from conservative import registry
 from conservative.errors import require_extra
 from conservative.files import write_text
 
 from .failures import MissingEnvironment
-from .versions import version_key
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """What is installed for an engine.
+
+    Attributes
+    ----------
+    package
+        Its name where packages come from, with extras where it needs some.
+    module
+        What is imported of it.
+    requirements
+        What it needs beside NumPy, such as `numpy<2`.
+    oldest
+        Oldest version that its adapter is meant for; where no version is asked for, none below it is taken.
+    """
+
+    package: str
+    module: str
+    requirements: tuple[str, ...] = ()
+    oldest: str = ""
+
+
+def distribution_of(engine: str) -> Distribution:
+    """Return what is installed for an engine.
+
+    Raises
+    ------
+    BadInput
+        The engine is unknown.
+    NotLoadable
+        It is registered, but importing what is registered fails.
+    """
+    found: Distribution = registry.engine(engine).distribution
+    return found
+
+
+Key = tuple[tuple[int, int, str], ...]
+
+
+def version_key(version: str) -> Key:
+    """Return what sorts versions: numbers by value, and 4.0.0rc1 before 4.0.0."""
+    parts = re.findall(r"\d+|[a-z]+", version.lower().partition("+")[0])
+    keys = [(1, int(part), "") if part.isdigit() else (2 if part == "post" else -1, 0, part) for part in parts]
+    return (*keys, (0, 0, ""))
+
+
+def describe_versions(version: str, known: list[str]) -> str:
+    """Return what to say is allowed instead of a version that does not exist: the nearest one first."""
+    if not known:
+        return "a version that exists"
+    newest = sorted(known, key=version_key, reverse=True)
+    nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
+    return f"{nearest} (nearest), or one of {', '.join(newest)}"
+
 
 RECORD, LOCK = "record.json", "lock.txt"
 """What is written last into an environment, and the versions of all that is in it, with their hashes."""

@@ -14,10 +14,12 @@ from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
 from conservative.files import remove_leftovers, temporary
 
-from .catalogue import Distribution, distribution_of
+from .client import close_workers, worker_of
 from .environment import (
     LOCK,
+    Distribution,
     Environment,
+    distribution_of,
     find_environment,
     folder_of_all,
     folder_of_projects,
@@ -29,7 +31,6 @@ from .environment import (
 from .failures import EngineCrashed, EngineTimeout, MissingEnvironment
 from .lock import Lock, Source, find_python, resolve, split_requirement
 from .uv_command import UvFailed, run_uv
-from .workers import close_workers, worker_of
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,8 @@ from pathlib import Path
 
 from conservative.errors import BadInput
 
-from .catalogue import Distribution
+from .environment import Distribution, describe_versions, version_key
 from .uv_command import UvFailed, run_uv
-from .versions import describe_versions, version_key
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
 _VERSION = re.compile(r"[0-9]+(?:[.!+a-z0-9_-]*[a-z0-9])?")

@@ -21,11 +21,10 @@ from conservative.errors import BadInput
 from conservative.files import make_folder, write_bytes
 
 from .builds import build_wheel
-from .catalogue import Distribution
-from .environment import LOCK, RECORD, Environment, folder_of_projects, read_environment, temporary_folder
+from .client import close_workers
+from .environment import LOCK, RECORD, Distribution, Environment, folder_of_projects, read_environment, temporary_folder
 from .install import clear_leftovers, drop, import_trouble, make
 from .lock import Source, normal_name, resolve_wheel
-from .workers import close_workers
 
 KEPT = 8
 """Environments of a project that are kept: those used last."""

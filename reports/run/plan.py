@@ -11,7 +11,7 @@ from conservative.check import positive_number
 from conservative.method import Method
 from conservative.scene import Scene
 
-from .locks import Lock, locks_of
+from .provenance import Lock, locks_of
 
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""

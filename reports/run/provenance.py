@@ -5,17 +5,34 @@ from __future__ import annotations
 import platform
 import shlex
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import distributions
 from pathlib import Path
 
 from conservative.benchmarks.measures.origin import commit, git, machine
-
-from .locks import Lock
+from conservative.method import Method
+from conservative.references.environments.engine_method import EngineMethod
 
 COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy", "numba", "mpmath", "pandas", "altair")
 """Packages whose versions can change a number; a report names them first."""
+
+
+@dataclass(frozen=True)
+class Lock:
+    """What an engine's environment has: `name`, as `exudyn==1.13.6`, its `python`, and all `packages`, as `name==version`."""
+
+    name: str
+    python: str
+    packages: tuple[str, ...]
+
+
+def locks_of(methods: Iterable[Method]) -> tuple[Lock, ...]:
+    """Return the locks of the environments that some methods run in, each once, by name."""
+    found = {method.environment.folder: method.environment for method in methods if isinstance(method, EngineMethod)}
+    locks = (Lock(f"{each.engine}=={each.version}", each.python, each.packages) for each in found.values())
+    return tuple(sorted(locks, key=lambda lock: lock.name))
 
 
 @dataclass(frozen=True)

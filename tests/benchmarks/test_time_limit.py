@@ -18,7 +18,7 @@ from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_he
 from conservative.method import Grid, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
-from conservative.references.environments.workers import close_workers
+from conservative.references.environments.client import close_workers
 
 from .foreign_engines import Fast, Harmful, Slow
 from .generic_study import SCENE, truth

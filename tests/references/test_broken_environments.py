@@ -11,7 +11,7 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.references.environments import environment, install, workers
+from conservative.references.environments import client, environment, install
 from conservative.references.environments.lock import Source
 
 from ..environments import ROOT, variables
@@ -32,7 +32,7 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
     before = installed(wheels, "trial==1.9").environment
     for module in before.folder.glob("lib/python*/site-packages/numpy*"):
         shutil.rmtree(module) if module.is_dir() else module.unlink()
-    workers.close_workers()  # the running one has imported the package
+    client.close_workers()  # the running one has imported the package
     assert installed(wheels, "trial==1.9").trouble
     rebuilt = install.install("trial", Source(wheels), force=True)  # not 1.10, the newest in the folder of wheels
     assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")

@@ -7,9 +7,8 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.references.environments import environment, install
-from conservative.references.environments.builds import install_build
+from conservative.references.environments.builds import install_build, install_releases, newest_releases
 from conservative.references.environments.lock import Source
-from conservative.references.environments.releases import install_releases, newest_releases
 
 from .local_wheels import write_numpy, write_wheel
 

@@ -5,8 +5,8 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.errors import MissingEngine
-from conservative.references.environments import environment, install, uv_command, versions
-from conservative.references.environments.catalogue import Distribution
+from conservative.references.environments import environment, install, uv_command
+from conservative.references.environments.environment import Distribution
 from conservative.references.environments.lock import Source, split_requirement
 
 from .local_wheels import write_numpy, write_sdist, write_wheel
@@ -102,7 +102,7 @@ def test_an_unknown_engine_names_the_nearest(cache):
 def test_an_unknown_version_names_those_that_exist(cache, wheels):
     with pytest.raises(cv.BadInput, match=r"'trial==1.9.5'; allowed: 1.9 \(nearest\), or one of 1.10, 1.9, 1.0"):
         installed(wheels, "trial==1.9.5")
-    assert versions.describe_versions("0.1", ["1.0", "2.0"]).startswith("1.0 (nearest)")
+    assert environment.describe_versions("0.1", ["1.0", "2.0"]).startswith("1.0 (nearest)")
 
 
 def test_a_version_for_other_pythons_alone_is_refused(cache, tmp_path):

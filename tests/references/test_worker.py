@@ -16,7 +16,7 @@ import pytest
 import conservative as cv
 from conservative.integration.pickling import NotTransferable, dump, load
 from conservative.references import worker
-from conservative.references.environments.workers import close_workers
+from conservative.references.environments.client import close_workers
 from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
 
 from ..environments import run_python

@@ -16,7 +16,7 @@ from conservative.benchmarks.studies.case import Case, Failure, attempt
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.method import grid_for
 from conservative.outcome import OutcomeKind
-from conservative.references.environments import environment, worker, workers
+from conservative.references.environments import client, environment, worker
 from conservative.references.environments.client import Worker, time_limit
 from conservative.references.environments.failures import EngineCrashed, EngineTimeout
 
@@ -109,7 +109,7 @@ def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
 
 def test_what_it_writes_goes_with_it(folder):
     assert run("leave").ok
-    workers.close_workers()
+    client.close_workers()
     assert not list(folder.rglob("left_behind"))
     assert not list(environment.temporary_folder().iterdir())
 
@@ -141,7 +141,7 @@ def test_integrate_raises_what_failed():
 
 def test_a_process_that_is_killed_while_it_runs_is_a_crash():
     run("integrate")
-    process = workers.worker_of(Trial().environment).pid
+    process = client.worker_of(Trial().environment).pid
     threading.Timer(0.3, os.kill, (process, signal.SIGKILL)).start()
     assert str(run("hang").outcome) == "crashed (signal 9 (SIGKILL))"
     assert run("integrate").ok
@@ -178,12 +178,12 @@ def test_runs_in_threads_do_not_mix():
 
 
 def _in_child(queue):
-    queue.put((workers.worker_of(Trial().environment).pid, len(run("integrate"))))
+    queue.put((client.worker_of(Trial().environment).pid, len(run("integrate"))))
 
 
 def test_a_forked_process_has_a_worker_of_its_own():
     run("integrate")
-    mine = workers.worker_of(Trial().environment)
+    mine = client.worker_of(Trial().environment)
     starts = mine.starts
     context = multiprocessing.get_context("fork")
     queue = context.Queue()

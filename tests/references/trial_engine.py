@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy
 
-from conservative.references.environments.catalogue import Distribution
 from conservative.references.environments.engine_method import EngineMethod
+from conservative.references.environments.environment import Distribution
 
 from ..environments import Environment
 

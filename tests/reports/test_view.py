@@ -13,10 +13,9 @@ from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Study
 from conservative.reports import document, view
 from conservative.reports.charts import figures
-from conservative.reports.run.locks import Lock
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
-from conservative.reports.run.provenance import provenance
+from conservative.reports.run.provenance import Lock, provenance
 from conservative.reports.tables import orders, work_precision
 
 from .made_up import curves, measurements
