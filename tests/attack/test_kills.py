@@ -22,7 +22,7 @@ from conservative import registry
 from conservative.benchmarks.studies.case import Case, Failure, attempt
 from conservative.method import grid_for
 from conservative.references.environments import worker
-from conservative.references.environments.workers import worker_of
+from conservative.references.environments.client import worker_of
 
 from ..environments import ROOT, programs, variables
 from ..references.conftest import trial_cache, trial_home, trial_registered  # noqa: F401
