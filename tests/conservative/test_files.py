@@ -26,7 +26,6 @@ except files.NotWritten as error:
 WRITERS = {
     "text": "files.write_text(Path(sys.argv[1]), 'x' * 9000, 'csv')",
     "bytes": "files.write_bytes(Path(sys.argv[1]), b'x' * 9000, 'csv')",
-    "stream, in the block": "with files.text_file(Path(sys.argv[1]), 'csv') as s: s.write('x' * 9000); s.flush()",
     "stream, at its end": "with files.text_file(Path(sys.argv[1]), 'csv') as s: s.write('x' * 6000)",
     "stream, line by line": "with files.text_file(Path(sys.argv[1]), 'csv') as s: [s.write('x' * 99) for _ in range(999)]",
 }
@@ -98,6 +97,19 @@ def test_a_file_takes_the_place_of_the_one_before_and_is_not_written_over_it(tmp
         files.write_text(path, "after", "out")
         assert reader.read() == "before"
     assert path.read_text() == "after"
+
+
+def test_contents_are_on_the_disk_before_they_take_their_place(tmp_path, monkeypatch):
+    target, seen, synchronise = tmp_path / "samples.csv", [], os.fsync
+    target.write_text("before")
+
+    def record(handle):
+        seen.append((os.fstat(handle).st_size, target.read_text()))
+        synchronise(handle)
+
+    monkeypatch.setattr(os, "fsync", record)
+    files.write_text(target, "contents", "csv")
+    assert seen[0] == (len("contents"), "before")
 
 
 def test_a_link_stays_one(tmp_path):

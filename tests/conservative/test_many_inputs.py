@@ -25,16 +25,13 @@ SHAPES = {
         {"R_WB0": R, "w_WB_B0": W[:7]},
         r"^w_WB_B0: got shape \(7, 3\); allowed: .* \(1000, 3\): 1000 bodies, as R_WB0 has",
     ),
-    "n of inertia": ({"w_WB_B0": W, "inertia": J[:2]}, r"^inertia: got shape \(2, 3, 3\); .* 1000 bodies, as w_WB_B0 has"),
     "n of a number": (
         {"w_WB_B0": W, "parameters": {"weight": [1.0, 2.0]}},
         r"^parameters\['weight'\]: got shape \(2,\); allowed: numbers of shape \(1000,\): 1000 bodies",
     ),
     "one start": ({"w_WB_B0": W[0]}, r"^w_WB_B0: got shape \(3,\); allowed: numbers of shape \(n, 3\)"),
-    "two axes": ({"w_WB_B0": W[:, :2]}, r"^w_WB_B0: got shape \(1000, 2\)"),
     "no body": ({"w_WB_B0": np.empty((0, 3))}, r"^w_WB_B0: got shape \(0, 3\)"),
     "a text": ({"w_WB_B0": "fast"}, r"^w_WB_B0: got 'fast'"),
-    "a number": ({"inertia": 3.0}, r"^inertia: got shape \(\)"),
     "unknown number": ({"parameters": {"wieght": [1.0]}}, r"^parameters: got 'wieght'; allowed: 'weight' \(nearest\)"),
     "no mapping": ({"parameters": [1.0]}, r"^parameters: got \[1.0\]; allowed: a mapping"),
 }
@@ -49,12 +46,10 @@ def test_shapes_that_do_not_match(what):
 
 ONE_BAD = {
     "nan": ({"w_WB_B0": changed(W, 7, np.nan)}, r"^w_WB_B0\[7\]: got \[nan, nan, nan\], not finite"),
-    "infinite": ({"w_WB_B0": changed(W, 999, (0, np.inf, 0))}, r"^w_WB_B0\[999\]: got .*inf.*, not finite"),
     "too fast": ({"w_WB_B0": changed(W, 5, (0, 1e101, 0))}, r"^w_WB_B0\[5\]: got .*1e\+101.* the largest 0 or of magnitude"),
     "too slow": ({"w_WB_B0": changed(W, 5, (0, 1e-101, 0))}, r"^w_WB_B0\[5\]: got .*1e-101.* the largest 0 or of magnitude"),
     "no rotation": ({"R_WB0": changed(R, 500, np.diag([1, 1, 1.1]))}, r"^R_WB0\[500\]: got a matrix with \|R'R - 1\| = 0.21"),
     "a reflection": ({"R_WB0": changed(R, 0, -np.eye(3))}, r"^R_WB0\[0\]: got a reflection"),
-    "nan in R": ({"R_WB0": changed(R, 3, np.nan)}, r"^R_WB0\[3\]: got .*nan.*, not finite"),
     "not positive": (
         {"inertia": changed(J, 4, np.diag([1.0, -1, 1]))},
         r"^inertia\[4\]: got principal moments .* not all positive",
@@ -67,7 +62,6 @@ ONE_BAD = {
         {"inertia": changed(J, 4, BODY.R_BP @ np.diag([1e-14, 1, 1]) @ BODY.R_BP.T)},
         r"^inertia\[4\]: got principal moments .*(ratio up to 1e\+13|not all positive)",
     ),
-    "zero moment": ({"inertia": [(1.0, 2.0, 3.0), (1.0, 0.0, 3.0)]}, r"^inertia\[1\]: got principal moments"),
     "nan weight": ({"parameters": {"weight": changed(np.ones(N), 8, np.nan)}}, r"^parameters\['weight'\]\[8\]: got nan"),
     "huge lever": ({"parameters": {"com_B": changed(W, 8, 1e101)}}, r"^parameters\['com_B'\]\[8\]: got \[1e\+101"),
 }
@@ -83,8 +77,6 @@ def test_one_bad_body_is_named(what, monkeypatch):
 
 FIELDS = {
     "stiffness": ("spring", "stiffness", 0.0, r"^parameters\['stiffness'\]\[2\]: got 0.0"),
-    "rest length": ("rest length", "rest_length", -1.0, r"^parameters\['rest_length'\]\[2\]: got -1.0"),
-    "strength": ("attraction", "strength", 0.0, r"^parameters\['strength'\]\[2\]: got 0.0"),
     "rate": ("gradient", "rate", -1.0, r"^parameters\['rate'\]\[2\]: got -1.0"),
     "inertia of a field": ("gradient", "inertia", -np.eye(3), r"^parameters\['inertia'\]\[2\]: got principal moments"),
     "direction": ("gradient", "direction_W", 0.0, r"^parameters\['direction_W'\]\[2\]: got \[0.0, 0.0, 0.0\]"),
@@ -108,12 +100,8 @@ def test_numbers_of_a_field_are_those_that_it_makes_of_them():
 
 
 OTHERS = {
-    "scene": ({"scene": "brick_flip"}, r"^scene: got 'brick_flip'"),
     "threads": ({"threads": 0}, r"^threads: got 0"),
-    "no threads": ({"threads": True}, r"^threads: got True"),
     "progress": ({"progress": 3}, r"^progress: got 3"),
-    "method": ({"method": 3}, r"^method: got 3"),
-    "dt": ({"dt": -1.0}, r"^dt: got -1"),
     "error": ({"error": 0.0}, r"^error: got 0"),
     "no numbers": (
         {"scene": scene(), "parameters": {"weight": [1.0]}},

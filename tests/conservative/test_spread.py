@@ -81,13 +81,10 @@ def test_inertia_is_that_of_a_body_whose_second_moments_of_mass_vary(share):
     assert not all(kstest(column, "norm", (1, 1.05 * share)).pvalue > LEAST for column in shares.T)
 
 
-def test_a_plate_stays_one_and_a_needle_too():
+def test_a_plate_stays_one():
     plate = cv.Scene("plate", cv.RigidBody((1.0, 2.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
     J = spread(plate, 1000, inertia="5%")["inertia"]
     assert J[:, 0] + J[:, 1] == pytest.approx(J[:, 2], rel=1e-15)
-    needle = cv.Scene("needle", cv.RigidBody((1.0, 1.0, 1e-6)), np.eye(3), (0, 0, 1), 1.0)
-    J = spread(needle, 1000, inertia="5%")["inertia"]
-    assert np.abs(J[:, 0] - J[:, 1]).max() < 1e-6
 
 
 def test_parameters_of_the_potential():
@@ -110,13 +107,6 @@ def test_directions_stay_unit_vectors_and_gravity_gradients_have_the_inertia_of_
     assert list_parameters(scene) == ["rate", "direction_W"]
 
 
-def test_what_is_not_given_is_the_scenes():
-    found = spread(TOP, 3)
-    assert set(found) == {"R_WB0", "w_WB_B0"}
-    assert (found["R_WB0"] == TOP.R_WB0).all()
-    assert (found["w_WB_B0"] == TOP.w_WB_B0).all()
-
-
 ALL = {"attitude": "5deg", "rate": 0.1, "inertia": "60%", "parameters": {"weight": "60%", "com_B": "1%"}}
 
 
@@ -137,6 +127,8 @@ def test_the_first_of_many_are_those_of_few_and_seeds_differ(monkeypatch):
 def test_the_spread_of_one_quantity_changes_no_other():
     alone, together = spread(TOP, 50, rate=0.1), spread(TOP, 50, **ALL)
     np.testing.assert_array_equal(alone["w_WB_B0"], together["w_WB_B0"])
+    assert set(alone) == {"R_WB0", "w_WB_B0"}
+    assert (alone["R_WB0"] == TOP.R_WB0).all()
 
 
 REST = cv.Scene("rest", BODY, np.eye(3), (0, 0, 0), 1.0)
@@ -148,26 +140,17 @@ ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
     ("scene", "given", "argument", "got", "allowed"),
     [
         (TOP, {"attitude": "5dge"}, "attitude", "'5dge'", "5deg, or any"),
-        (TOP, {"attitude": "5%"}, "attitude", "'5%'", "5deg, or any"),
-        (TOP, {"attitude": 0}, "attitude", "0", "above 0"),
         (TOP, {"attitude": math.nan}, "attitude", "nan", "above 0"),
-        (TOP, {"attitude": True}, "attitude", "True", "above 0"),
-        (TOP, {"attitude": [0.1] * 3}, "attitude", "[0.1", "above 0"),
         (TOP, {"rate": -0.1}, "rate", "-0.1", "10% (of its size)"),
-        (TOP, {"rate": "all"}, "rate", "'all'", "or any"),
         (REST, {"rate": "10%"}, "rate", "'10%' of 0", "in rad/s"),
         (REST, {"rate": "any"}, "rate", "'any' of 0", "in rad/s"),
-        (TOP, {"inertia": 0.01}, "inertia", "0.01", "such as 1%"),
         (TOP, {"inertia": "101%"}, "inertia", "'101%'", "up to 100%"),
         (ODD, {"inertia": "1%"}, "inertia", "[1.0, 1.0, 3.0]", "none is larger than the sum"),
         (ORBIT, {"inertia": "1%"}, "inertia", "a field that turns", "none"),
         (TOP, {"parameters": {"wieght": "1%"}}, "parameters", "'wieght'", "'weight' (nearest)"),
         (TOP, {"parameters": {"weight": "1kg"}}, "potential.weight", "'1kg'", "its own SI unit"),
-        (REST, {"parameters": {"weight": "1%"}}, "parameters", "'weight'", "none"),
         (TOP, {"seed": -1}, "seed", "-1", "0 or more"),
-        (TOP, {"n": 0}, "n", "0", "1 or more"),
         (TOP, {"n": 10**12}, "n", "1000000000000", "fit in memory"),
-        ("brick_flip", {}, "scene", "'brick_flip'", "a Scene"),
     ],
 )
 def test_mistakes(scene, given, argument, got, allowed):

@@ -13,7 +13,7 @@ from conservative.integration.distributions import angle_quantiles, mean_attitud
 from conservative.outcome import ProgressOfMany
 from conservative.reports.cli.main import main
 from conservative.reports.run import sweep as work
-from conservative.reports.run.sweep import rate_text, summary_text
+from conservative.reports.run.sweep import rate_text
 
 SPREAD = ("--spread", "attitude=5deg,rate=2%", "--seed", "3")
 COMMON = ("brick_flip", "--starts", "1500", *SPREAD, "--dt", "0.1", "--t-end", "1.15", "--samples", "5")
@@ -106,11 +106,6 @@ def test_another_sweep_is_not_resumed(answered, change):
     assert "an ensemble of another run" in done.stderr
 
 
-def test_the_default_keeps_few_samples():
-    done = conservative("brick_flip", "--starts", "2", "--spread", "rate=1%", "--json")
-    assert json.loads(done.stdout)["samples"] == 6
-
-
 def test_an_interrupted_sweep_says_what_is_kept_and_resume_does_the_rest(answered, tmp_path, monkeypatch):
     _, folder = answered
 
@@ -148,14 +143,7 @@ def test_an_error_instead_of_a_step():
     assert content["error"]["asked"] == 1e-3
     assert content["error"]["estimate"] < 1e-3
     assert content["error"]["reached"]
-    assert content["samples"] == 6
-
-
-def test_an_estimate_that_is_not_reached_is_said_to_be_one():
-    summary = json.loads(conservative("brick_flip", "--starts", "2", "--spread", "rate=1%", "--dt", "0.2", "--json").stdout)
-    missed = summary | {"error": {"asked": 1e-20, "estimate": 2e-16, "reached": False, "bodies": 2}}
-    expected = "2e-16 rad at most, estimated on 2 bodies; asked: 1e-20 rad, which is not what was asked for"
-    assert expected in summary_text(missed)
+    assert content["samples"] == 6  # by default
 
 
 def test_progress_is_told_with_rates():
@@ -173,14 +161,9 @@ def test_progress_is_told_with_rates():
         (["brick_flip", "--spread", "attitude"], ["spread: got 'attitude'", "attitude=5deg"]),
         (["brick_flip", "--spread", "atitude=5deg"], ["spread: got 'atitude'", "'attitude' (nearest)", "potential."]),
         (["brick_flip", "--spread", "rate=1,rate=2"], ["spread: got 'rate=2' after rate=1", "once"]),
-        (["brick_flip", "--spread", "rate=fast"], ["rate: got 'fast'", "10% (of its size)"]),
         (["brick_flip", "--spread", "potential.weight=2%"], ["parameters: got 'weight'", "none"]),
-        (["lagrange_top", "--spread", "potential.wight=2%"], ["parameters: got 'wight'", "'weight' (nearest)"]),
         (["brick_flip", *SPREAD, "--starts", "1e11"], ["starts: got 100000000000", "fit in memory"]),
-        (["brick_flip", *SPREAD, "--dt", "-1"], ["dt: got -1.0", "above 0"]),
         (["brick_flip", *SPREAD, "--error", "1e-6", "--dt", "0.1"], ["dt: got 0.1", "none together with --error"]),
-        (["brick_flip", *SPREAD, "--error", "1e-6", "-m", "reduced"], ["method: got 'reduced'", "error"]),
-        (["brick_flip", *SPREAD, "--error", "-1"], ["error: got -1.0", "above 0"]),
         (["brick_flip", *SPREAD, "--resume"], ["resume: got no folder", "--out"]),
         (["brick_flip", *SPREAD, "--out", "missing/sweep.zarr"], ["out: got", "missing/sweep.zarr'", "No such file"]),
         (["brick_flip", *SPREAD, "--out", "a.svg", "--picture", "a.svg"], ["picture: got 'a.svg'", "another name"]),
@@ -210,10 +193,3 @@ def test_samples_that_do_not_fit_in_memory(monkeypatch):
         "Error: samples: got 18 samples of 3 bodies; allowed: fewer samples or starts, or a folder for them, --out:"
         in done.stderr
     )
-
-
-@pytest.mark.parametrize("count", ["0", "5.5", "many", "nan", "inf"])
-def test_a_number_of_starts_is_an_integer_above_0(count):
-    done = conservative("brick_flip", *SPREAD, "--starts", count)
-    assert done.exit_code == 2
-    assert f"got '{count}'; allowed: an integer of 1 or more, such as 1000 or 1e6" in done.stderr
