@@ -185,12 +185,13 @@ class PotentialFailed(_Error, RuntimeError):
 
 
 class AccuracyNotReached(UserWarning):
-    """The requested error is smaller than round-off allows for the scene. Attributes: `error`, `estimate` (rad)."""
+    """The requested error is not reached, as rounding causes a larger one. Attributes: `error`, `estimate` (rad)."""
 
     def __init__(self, error: float, estimate: float) -> None:
         self.error, self.estimate = error, estimate
         super().__init__(
-            f"error: got {error:g} rad; allowed: what round-off leaves on this scene, an estimated {estimate:.2g} rad"
+            f"an error of {error:g} rad is not reached, {estimate:.2g} rad is estimated: rounding has an effect as large as "
+            "that on this motion. Ask for a larger error, or for a shorter t_end"
         )
 
 

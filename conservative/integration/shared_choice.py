@@ -109,4 +109,4 @@ def cut_step(bodies: Bodies, chosen: Sequence[int], method: Method, dt: float, g
 
 def find_worst(bodies: Bodies, numbers: Sequence[int], method: Method, grid: Grid) -> tuple[float, int]:
     """Return the largest estimated error, rad, of the bodies of these numbers, and the number; 0 and -1 of none."""
-    return max(((trials_of(bodies.take(i)).estimate(method, grid).error, i) for i in numbers), default=(0.0, -1))
+    return max(((trials_of(bodies.take(i)).estimate_all(method, grid).total, i) for i in numbers), default=(0.0, -1))

@@ -3,7 +3,7 @@
 1. The candidates are tried over a short while (`search`), by trial runs that are remembered (`trials`).
 2. The one that is chosen makes the whole run, once more with twice the step. Their difference, not that of a trial, is the
    estimate that is reported: a trial cannot see how much a scene amplifies errors later on. Where it is above what was asked
-   for, the step is cut and the run repeated.
+   for, the step is cut and the run repeated, as long as that is not what rounding the scene causes.
 
 Which families are candidates, and what their work costs, they say themselves: `Method.candidacy`, `Method.cost`.
 
@@ -17,14 +17,15 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..check import require_memory
 from ..errors import AccuracyNotReached, BadInput
-from ..method import Grid, Method
+from ..method import Grid
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
 from .between import Samples, divide_step, sample_between, spread
 from .search import Attempts, even_grid, find_cheapest, stalls, step_factor
-from .trials import Trials, trials_of
+from .trials import ASYMPTOTIC, trials_of
 
 ATTEMPTS = 12
 MOST_STEPS = 10**10
@@ -50,29 +51,33 @@ def integrate_to_error(
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
     dt = dt if samples.at is None else divide_step(scene, method, dt)
+    grid = grid_of(dt, t_end, samples)
     attempts: Attempts = ()
-    for _ in range(ATTEMPTS):
-        grid = grid_of(dt, t_end, samples)
-        found, trajectory = _recall_or_run(trials, method, grid)
-        attempts = (*attempts, (grid.dt, found))
-        if found <= error or stalls(attempts):
+    best: tuple[float, Grid, Trajectory | None] = (math.inf, grid, None)
+    while True:
+        known = trials.known.get((method, grid))
+        made: Trajectory | None = None
+        if known is None or known.sensitivity is None:
+            known, made = trials.make(method, grid, sensitivity=True)
+        attempts = (*attempts, (grid.dt, known.total))
+        if known.total <= best[0]:
+            best = known.total, grid, made
+        moved = known.sensitivity or 0.0
+        within = error - moved if moved < error else moved  # no step helps against what rounding the scene causes
+        if known.error <= within or moved >= ASYMPTOTIC or stalls(attempts) or len(attempts) == ATTEMPTS:
             break
-        dt = grid.dt * step_factor(found, error, method)
-    best = Choice(method, grid.dt, error, found, attempts)
+        try:
+            grid = grid_of(grid.dt * step_factor(known.error, within, method), t_end, samples)
+        except BadInput:  # more steps or samples than can be: what there is has to do
+            break
+    estimate, grid, trajectory = best
+    choice = Choice(method, grid.dt, error, estimate, attempts)
     trajectory = method.solve(scene, grid) if trajectory is None else trajectory
     if samples.at is not None:
         trajectory = sample_between(trajectory, method, grid, samples.at)
-    if trajectory.ok and not best.reached:
-        warnings.warn(AccuracyNotReached(error, found), stacklevel=4)
-    return replace(trajectory, choice=best)
-
-
-def _recall_or_run(trials: Trials, method: Method, grid: Grid) -> tuple[float, Trajectory | None]:
-    """Return the estimated error, rad, of a run, and the run; None for a run whose estimate is known."""
-    if (method, grid) in trials.known:
-        return trials.estimate(method, grid).error, None
-    found, trajectory = trials.make(method, grid)
-    return found.error, trajectory
+    if trajectory.ok and not choice.reached:
+        warnings.warn(AccuracyNotReached(error, estimate), stacklevel=4)
+    return replace(trajectory, choice=choice)
 
 
 def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
@@ -81,14 +86,16 @@ def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
     Raises
     ------
     BadInput
-        They are more than `MOST_STEPS`.
+        They are more than `MOST_STEPS`, or their samples do not fit in memory.
     """
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"what takes {t_end / dt:.3g} steps", f"what {MOST_STEPS:g} steps reach: a larger one")
     if samples.at is not None:
         return even_grid(t_end, dt, spread(int(t_end / dt)))
     if samples.spacing is None:
+        require_memory("sample_every", math.ceil(t_end / dt), samples.every)
         return even_grid(t_end, dt, samples.every)
     each = 2 * max(1, math.ceil(samples.spacing / dt / 2 * (1 - 1e-9)))
     n = each * math.ceil(t_end / samples.spacing * (1 - 1e-9))
+    require_memory("sample_every", n, min(each * samples.every, n))
     return Grid(samples.spacing / each, n, min(each * samples.every, n))

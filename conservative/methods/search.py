@@ -42,6 +42,8 @@ LENIENCY = 3.0
 """How much less work than predicted a candidate may turn out to need: it is not given up before."""
 PENALTY = 10.0
 """How much dearer a candidate counts that stalls above the error: it is taken where no other gets there for less."""
+RESOLVED = 0.01
+"""Step, rad turned at most, at which two runs with nothing in common mean that the motion amplifies rounding."""
 MOST_RUNS = 20.0
 """Work of a search after the first candidate that gets there, in units of what that one needs."""
 
@@ -81,6 +83,8 @@ class Candidate:
         Those tried so far.
     step_work
         Work of a step in the last attempt, ns.
+    sensitivity
+        Attitude error that rounding the scene causes, rad, where the last attempt was to find it; else 0.
     """
 
     method: Method
@@ -88,6 +92,7 @@ class Candidate:
     dt: float
     attempts: Attempts = ()
     step_work: float = 0.0
+    sensitivity: float = 0.0
 
     @property
     def reached(self) -> bool:
@@ -113,9 +118,11 @@ class Candidate:
     def advance(self, trials: Trials) -> Candidate:
         """Return it after a trial run at its next step; where that settles it, the step stays."""
         grid = self.grid
-        found = trials.estimate(self.method, grid)
+        lost = bool(self.attempts) and self.attempts[-1][1] == math.inf and self.goal.rate * grid.dt < RESOLVED
+        found = (trials.estimate_all if lost else trials.estimate)(self.method, grid)
         attempts, work = (*self.attempts, (grid.dt, found.error)), found.work / grid.n_steps
-        after = replace(self, dt=grid.dt, attempts=attempts, step_work=work)
+        moved = (found.sensitivity or 0.0) if lost else 0.0
+        after = replace(self, dt=grid.dt, attempts=attempts, step_work=work, sensitivity=moved)
         return after if after.settled else replace(after, dt=grid.dt * step_factor(found.error, self.goal.error, self.method))
 
     def prior_work(self) -> float:
@@ -153,6 +160,8 @@ def find_cheapest(trials: Trials, error: float, t_end: float) -> tuple[Method, f
         if found[i].settled or found[i].hopeless or (len(found) == 1 and found[i].method.order is None):
             return found[i].method, found[i].dt
         found[i] = found[i].advance(trials)
+        if found[i].sensitivity > error:  # no step of any method helps
+            return found[i].method, found[i].attempts[-1][0]
         spent += 1.5 * found[i].work
         done = [each for each in found if each.reached]
         if done and spent > MOST_RUNS * min(each.work for each in done):

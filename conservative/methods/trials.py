@@ -1,5 +1,9 @@
 """Trial runs: the error of a run, estimated from one more at twice the step, and remembered for the next call.
 
+Two runs of one scene cannot show what rounding the scene's own numbers causes: principal moments of a tensor are known to an
+ulp of the largest only, and motions near a separatrix, or chaotic ones, amplify that. So a third run starts from a scene whose
+inertia and start are changed by an ulp; its distance from the second run is added to the estimate.
+
 What is remembered belongs to the numbers of a scene and not to the object: a scene that is built anew profits, too. As an
 estimate depends on nothing else, a call is given the same choice whether or not another one went before.
 
@@ -10,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from time import monotonic
 from typing import Any
@@ -18,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, angle_between
+from ..body import RigidBody
 from ..errors import IntegrationFailed, MissingEngine, Unsupported
 from ..method import Grid, Method
 from ..outcome import Progress
@@ -30,16 +35,35 @@ ASYMPTOTIC = 0.2
 """Errors above this, rad, are saturated (angles end at pi) and are not used."""
 MOST_SCENES, MOST_ESTIMATES = 64, 1024
 """Scenes whose trial runs are remembered, those used last, and trial runs of each."""
+ROUNDED = float(np.finfo(float).eps)
+"""Relative change of a scene's numbers that stands for rounding them."""
+_SIGNS = np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
 QUIET, PAUSE = 1.0, 0.1
 """Time, s, before progress is told for the first time, and between two times."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated attitude error of a run, rad, inf where it failed, and its work, ns by `Method.cost`."""
+    """Estimated error of a run.
+
+    Attributes
+    ----------
+    error
+        Attitude error from a run at twice the step, rad; inf where a run failed, or both have nothing in common.
+    work
+        Work of the run, ns by `Method.cost`.
+    sensitivity
+        Attitude error that rounding inertia and start causes, rad; None if it was not asked for.
+    """
 
     error: float
     work: float
+    sensitivity: float | None = None
+
+    @property
+    def total(self) -> float:
+        """Attitude error with what rounding causes, rad."""
+        return self.error + (self.sensitivity or 0.0)
 
 
 Known = dict[tuple[Method, Grid], Estimate]
@@ -68,15 +92,24 @@ class Trials:
         """Return the estimate of a run."""
         return self.known.get((method, grid)) or self.make(method, grid)[0]
 
-    def make(self, method: Method, grid: Grid) -> tuple[Estimate, Trajectory]:
-        """Return the estimate of a run, and the run."""
+    def estimate_all(self, method: Method, grid: Grid) -> Estimate:
+        """Return the estimate of a run with its `sensitivity`."""
+        known = self.known.get((method, grid))
+        return self.make(method, grid, sensitivity=True)[0] if known is None or known.sensitivity is None else known
+
+    def make(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory]:
+        """Return the estimate of a run, if wanted with its `sensitivity`, and the run."""
         self.observe(method, grid)
-        error, trajectory = run_twice(method, self.scene, grid)
-        found = Estimate(error, count_work(method, trajectory))
+        error, fine, coarse = run_twice(method, self.scene, grid)
+        found = Estimate(error, count_work(method, fine))
+        if sensitivity:
+            # Where the run at twice the step failed, shorter steps come first.
+            moved = find_sensitivity(method, coarse, coarse_grid(grid)) if coarse is not None else 0.0
+            found = replace(found, sensitivity=moved)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
         self.known[method, grid] = found
-        return found, trajectory
+        return found, fine
 
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
@@ -123,20 +156,59 @@ def tell(progress: Callable[[Progress], object], clock: Callable[[], float] = mo
     return observe
 
 
-def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory]:
-    """Return the estimated error, rad, inf where a run fails, and the trajectory of a run, from one more at twice the step."""
+def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory, Trajectory | None]:
+    """Return the estimated error of a run, rad, the run, and the run at twice the step that the estimate is made from.
+
+    Where one of them fails, the estimate is inf and the last None.
+    """
     fine = method.solve(scene, grid)
-    # Half the samples where samples fall on odd steps: then coarse samples lie on every other fine one.
-    stride = 1 + grid.every % 2
-    try:
-        coarse = method.solve(scene, Grid(2 * grid.dt, grid.n_steps // 2, grid.every * stride // 2))
-    except (IntegrationFailed, MissingEngine, Unsupported):
-        return math.inf, fine
-    if not (fine.ok and coarse.ok):
-        return math.inf, fine
-    difference = float(angle_between(_every(stride, fine.R_WB), coarse.R_WB).max())
+    coarse = _solve(method, scene, coarse_grid(grid))
+    if not fine.ok or coarse is None:
+        return math.inf, fine, None
+    difference = float(angle_between(_every(1 + grid.every % 2, fine.R_WB), coarse.R_WB).max())
     estimate = difference / convergence_factor(method) + rounding_error(fine)
-    return (estimate if difference < ASYMPTOTIC else math.inf), fine
+    return (estimate if difference < ASYMPTOTIC else math.inf), fine, coarse
+
+
+def coarse_grid(grid: Grid) -> Grid:
+    """Return the grid of twice the step. Where samples fall on odd steps, it has every other one."""
+    return Grid(2 * grid.dt, grid.n_steps // 2, grid.every * (1 + grid.every % 2) // 2)
+
+
+def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
+    """Return a run that is ok, else None."""
+    try:
+        found = method.solve(scene, grid)
+    except (IntegrationFailed, MissingEngine, Unsupported):
+        return None
+    return found if found.ok else None
+
+
+def find_sensitivity(method: Method, found: Trajectory, grid: Grid) -> float:
+    """Return how far a run on a grid is from that of `nearby_scene`, rad; inf where that fails."""
+    scene = nearby_scene(found.scene)
+    if method.unsupported(scene) is not None:  # it needs a symmetry, which the other inertia lacks
+        scene = scene.rename(scene.name, body=found.scene.body)
+    nearby = _solve(method, scene, grid)
+    return math.inf if nearby is None else float(angle_between(found.R_WB, nearby.R_WB).max())
+
+
+def nearby_scene(scene: Scene) -> Scene:
+    """Return the scene with inertia, attitude and rates changed by `ROUNDED`, as rounding them may change them.
+
+    What is 0 stays 0 in a body whose tensor is diagonal, where no axes have to be computed: a spin about a principal axis stays
+    one. Moments of any other tensor are known to an ulp of the largest, and rates along its axes to an ulp of the whole rate.
+    """
+    body, w = scene.body, scene.w_WB_B0
+    plain = np.array_equal(body.R_BP, np.eye(3))
+    sizes, rates = (body.moments, np.abs(w)) if plain else (body.moments.max(), np.linalg.norm(w))
+    moved = body.R_BP @ np.diag(ROUNDED * sizes * _SIGNS[0]) @ body.R_BP.T
+    return scene.rename(
+        scene.name,
+        body=RigidBody(body.inertia + moved),
+        R_WB0=scene.R_WB0 * (1 + ROUNDED * _SIGNS),
+        w_WB_B0=w + ROUNDED * rates * _SIGNS[0],
+    )
 
 
 def _every(stride: int, R_WB: Array) -> Array:
