@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import sys
 from pathlib import Path
 
@@ -32,6 +33,7 @@ def render() -> str:
     environment.filters |= {"two_digits": two_digits, "small": small}
     return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
         value=lambda *key: values[key],
+        times=lambda scene, fast, slow: two_digits(values[scene, slow, "time"] / values[scene, fast, "time"]),
         ratios=[value for (*_, quantity), value in values.items() if quantity == "heyoka's time over ours"],
         version={row["name"]: row["version"] for row in rows},
         date=max(row["date"] for row in rows),
@@ -39,8 +41,8 @@ def render() -> str:
 
 
 def two_digits(value: float) -> str:
-    """Return a number to two digits, `21,000` or `0.037`: times of two reports differ in the third."""
-    return f"{float(f'{value:.2g}'):,g}"
+    """Return a number to two digits, `21,000` or `0.037`, as times of two reports differ in the third; a dash for inf."""
+    return f"{float(f'{value:.2g}'):,g}" if math.isfinite(value) else "–"
 
 
 def small(value: float) -> str:
