@@ -38,7 +38,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON."
 @click.argument("names", nargs=-1, required=True, metavar="NAME[==VERSION]...")
 @find_links_option
 @allow_build_option
-@click.option("--force", is_flag=True, help="Build an environment that is there again, with the same packages.")
+@click.option("--force", is_flag=True, help="Rebuild an existing environment with the same packages.")
 @json_option
 @click.pass_context
 def install(

@@ -27,17 +27,22 @@ if TYPE_CHECKING:
         "conservative report --resume                 go on after Ctrl-C, with the same options",
     ),
 )
-@click.option("--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="[default: the paper's two]")
 @click.option(
-    "--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="[default: a selection; all with --full]"
+    "--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="Scenes.  [default: the paper's two]"
+)
+@click.option(
+    "--methods",
+    multiple=True,
+    metavar="M,N",
+    shell_complete=completion.methods,
+    help="Methods.  [default: a selection; all with --full]",
 )
 @click.option(
     "--engines",
     multiple=True,
     metavar="E,F",
     shell_complete=completion.engine_lists,
-    help="Engines to compare in a section of their own: NAME, NAME==VERSION, or all, which stands for all that are installed, "
-    "in environments (see `conservative engines`) or beside us.",
+    help="Add a section that compares engines: NAME, NAME==VERSION, or all (see `conservative engines`).",
 )
 @click.option(
     "--bodies",
@@ -45,25 +50,24 @@ if TYPE_CHECKING:
     metavar="N",
     help="Random bodies in each of four fields.  [default: 0; with --full 3]",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the random bodies.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random bodies.")
 @click.option(
     "--full",
     is_flag=True,
-    help="Measure all methods and everything else as well: random bodies, many bodies, hard cases, stability, each step, "
-    "and the paper's figures.",
+    help="Measure all methods and more: random bodies, many bodies, hard cases, stability, each step, the paper's figures.",
 )
-@click.option("--quick", is_flag=True, help="Coarser: fewer steps, fewer rounds of timing.")
-@click.option("--skip-missing", is_flag=True, help="Rows that say so instead of an error where an engine is not installed.")
+@click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
+@click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
 @click.option(
     "--time-limit",
     type=float,
     metavar="S",
-    help="Longest run to plan for, s; a slower method gets fewer points, and one that goes on for ten times that, and at "
-    "least a minute, is ended.  [default: 0.6, with --quick 0.15]",
+    help="Time budget per run, s. Slower methods get fewer points. A run beyond ten times the budget (at least 60 s) is "
+    "stopped.  [default: 0.6, with --quick 0.15]",
 )
-@click.option("--png", is_flag=True, help="Pictures as PNG, too.")
-@click.option("--json", "as_json", is_flag=True, help="The measurements on stdout, as measurements.json has them.")
-@click.option("--resume", is_flag=True, help="Take the studies that an interrupted report has finished, and do the rest.")
+@click.option("--png", is_flag=True, help="Write pictures as PNG, too.")
+@click.option("--json", "as_json", is_flag=True, help="Print measurements.json.")
+@click.option("--resume", is_flag=True, help="Continue an interrupted report, with the same options.")
 @click.option("--out", type=FilePath(), default="report", show_default=True, help="Folder, replaced as a whole.")
 def report(
     out: Path,
@@ -80,11 +84,11 @@ def report(
     time_limit: float | None,
     png: bool,
 ) -> None:
-    """Measure our methods beside MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes.
+    """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes.
 
-    Drift of energy and momentum, attitude error, order of convergence, time per step, and time against error. Tables,
-    pictures and measurements are in the folder OUT, replaced as a whole. Until then, finished studies are in OUT.partial.json.
-    A family's bare name, such as mujoco, stands for all its variants.
+    The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
+    error. Open OUT/index.html. The folder OUT is replaced when the report is complete. Until then, finished studies are in
+    OUT.partial.json. The name of a family, such as mujoco, selects all its variants.
     """
     require_extra("conservative report", "report")
     from .. import document
