@@ -37,7 +37,8 @@ Settings = Callable[[Method], tuple[Method, ...]]
 """Takes a method to the settings of its family that stand for it."""
 
 
-def _all_variants(method: Method) -> tuple[Method, ...]:
+def all_variants(method: Method) -> tuple[Method, ...]:
+    """Return all settings that a method's family offers."""
     return method.variants()
 
 
@@ -83,7 +84,7 @@ def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
 
 
 def methods(
-    names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = _all_variants
+    names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = all_variants
 ) -> tuple[Method, ...]:
     """Return methods by name, ours first; a family's bare name, such as `mujoco`, stands for all its variants.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -62,15 +62,52 @@ COLUMNS = 7
 @click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
 @click.option("--out", type=OutputFolder(FILES), help=f"Write {', '.join(FILES)} into this folder.")
-def study(name: str, as_json: bool, **options: Any) -> None:
+def study(
+    name: str,
+    scenes: tuple[str, ...],
+    methods: tuple[str, ...],
+    engines: tuple[str, ...],
+    sizes: tuple[str, ...],
+    scheduler: str | None,
+    as_json: bool,
+    csv: Path | None,
+    markdown: Path | None,
+    out: Path | None,
+    **numbers: Any,
+) -> None:
     """Run the study NAME and show its rows, or the time ratios of random bodies.
 
     Names are those of the studies in a report. `random` and `throughput` use random bodies.
     """
     require_extra("conservative study", "report")
+    from conservative.files import make_folder, text_file
+
+    from ..run.provenance import provenance
+    from ..run.single_study import measure_study, plan_study
+    from ..tables.study_rows import StudyRows
+    from ..terminal.progress import announce, progress
+
+    wanted = [("csv", csv, "study.csv"), ("markdown", markdown, "study.md")]
     with ExitStack() as files:
-        streams = _open(files, options)
-        found = _measure(name, options)
+        # A place that cannot be written is an error before any work.
+        if out is not None:
+            make_folder(out, "out")
+            wanted += [("out", out / content, content) for content in FILES]
+        streams = [(files.enter_context(text_file(path, key)), content) for key, path, content in wanted if path is not None]
+        planned = plan_study(
+            name,
+            split_names("scenes", scenes),
+            split_names("methods", methods),
+            split_list("engines", engines),
+            split_list("sizes", sizes),
+            **numbers,
+        )
+        source = provenance()
+        made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
+        announce(f"study {name.replace('_', ' ')}")
+        with progress() as step:
+            measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
+        found = StudyRows(name, measured.table, measured.samples, made)
         contents = {"study.md": found.markdown_text, "study.csv": found.csv_text, "study.json": found.json_text}
         for stream, content in streams:
             stream.write(contents[content]())
@@ -78,43 +115,6 @@ def study(name: str, as_json: bool, **options: Any) -> None:
         click.echo(found.json_text())
     else:
         _show(found)
-
-
-def _open(files: ExitStack, options: dict[str, Any]) -> list[tuple[IO[str], str]]:
-    """Return the files to write, each with what it gets: a place that cannot be written is an error before any work."""
-    from conservative.files import make_folder, text_file
-
-    out: Path | None = options.pop("out")
-    wanted = [("csv", options.pop("csv"), "study.csv"), ("markdown", options.pop("markdown"), "study.md")]
-    if out is not None:
-        make_folder(out, "out")
-        wanted += [("out", out / content, content) for content in FILES]
-    return [(files.enter_context(text_file(path, name)), content) for name, path, content in wanted if path is not None]
-
-
-def _measure(name: str, options: dict[str, Any]) -> StudyRows:
-    """Return what the study finds.
-
-    Raises
-    ------
-    BadInput
-        A name, a setting or a number cannot be used, or is not for this study; found before any work.
-    MissingEngine
-        An engine is not installed, and nobody said to skip it.
-    """
-    from ..run.provenance import provenance
-    from ..run.single_study import Extent, measure_study, plan_study
-    from ..tables.study_rows import StudyRows
-    from ..terminal.progress import progress
-
-    scenes, methods = (tuple(split_names(key, options.pop(key))) for key in ("scenes", "methods"))
-    engines, sizes = (tuple(split_list(key, options.pop(key))) for key in ("engines", "sizes"))
-    scheduler = options.pop("scheduler")
-    planned, source = plan_study(name, Extent(scenes, methods, engines, sizes, **options)), provenance()
-    made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
-    with progress() as step:
-        found = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
-    return StudyRows(name, found.table, found.samples, made)
 
 
 def _show(found: StudyRows) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 
 from conservative.benchmarks.measures import measurement, samples
 from conservative.benchmarks.studies import (
@@ -20,8 +20,6 @@ from conservative.benchmarks.studies.study import Finding, Progress, Study
 from conservative.check import choice
 from conservative.errors import BadInput
 from conservative.integration.cluster import open_client
-from conservative.method import Method
-from conservative.scene import Scene
 
 from .measure import Measurements
 
@@ -29,23 +27,32 @@ DEFAULT_BODIES = 10
 """Random bodies in each field."""
 
 
-@dataclass(frozen=True)
-class Extent:
-    """What a study is asked to be of; names that are left out stand for what the study usually takes."""
+def plan_study(
+    name: str,
+    scenes: Sequence[str] = (),
+    methods: Sequence[str] = (),
+    engines: Sequence[str] = (),
+    sizes: Sequence[str] = (),
+    bodies: int | None = None,
+    seed: int | None = None,
+    quick: bool = False,
+    skip_missing: bool = False,
+    time_limit: float | None = None,
+) -> Study:
+    """Return a study by name; names of scenes, methods and engines that are left out stand for the study's own.
 
-    scenes: tuple[str, ...] = ()
-    methods: tuple[str, ...] = ()
-    engines: tuple[str, ...] = ()
-    sizes: tuple[str, ...] = ()
-    bodies: int | None = None
-    seed: int | None = None
-    quick: bool = False
-    skip_missing: bool = False
-    time_limit: float | None = None
-
-
-def plan_study(name: str, extent: Extent) -> Study:
-    """Return the study of that name.
+    Parameters
+    ----------
+    name
+        One of `studies.MAKERS`.
+    scenes, methods, engines
+        Names.
+    sizes
+        Numbers of bodies of the study of throughput, such as `1e3`.
+    bodies, seed
+        Number and seed of random bodies.
+    quick, skip_missing, time_limit
+        See `Study`.
 
     Raises
     ------
@@ -55,44 +62,47 @@ def plan_study(name: str, extent: Extent) -> Study:
         An engine is not installed, and `skip_missing` is False.
     """
     choice("name", name, tuple(studies.MAKERS))
+    _require_fitting(name, scenes=scenes, methods=methods, sizes=sizes, bodies=bodies, seed=seed)
+    if name in studies.ENGINES:
+        compared = engine_selection.select_engines(engines or (engine_selection.ALL,), skip_missing)
+    else:
+        of_family = {studies.RANDOM: random.settings, studies.THROUGHPUT: many_runs.settings}
+        named = selection.methods(methods or None, skip_missing, of_family.get(name, selection.all_variants))
+        others = engine_selection.select_engines(engines, skip_missing) if engines else ()
+        compared = tuple(dict.fromkeys((*named, *others)))
     if name == studies.RANDOM:
-        return _random(extent)
+        number = DEFAULT_BODIES if bodies is None else bodies
+        return studies.random_study(compared, number, seed or 0, quick, skip_missing)
     if name == studies.THROUGHPUT:
-        return _throughput(extent)
-    for argument, value in (("bodies", extent.bodies), ("seed", extent.seed), ("sizes", extent.sizes or None)):
-        if value is not None:
-            drawn = f"the studies {studies.RANDOM!r} and {studies.THROUGHPUT!r} draw bodies"
-            raise BadInput(argument, str(value), f"nothing: only {drawn}")
-    limits = (extent.quick, extent.skip_missing)
-    return Study(name, _scenes(name, extent), _methods(name, extent), *limits, time_limit=extent.time_limit)
+        counts = tuple(read_count("sizes", size) for size in sizes)
+        numbers = {"sizes": counts or None, "bodies": bodies, "seed": seed, "time_limit": time_limit}
+        given = {key: value for key, value in numbers.items() if value is not None}
+        return studies.throughput_study(compared, quick=quick, skip_missing=skip_missing, **given)
+    if name == "hard_cases":
+        compared = hard_cases.settings(compared)
+    if scenes:
+        chosen = selection.scenes(scenes)
+    else:
+        usual = {"stability": lambda: selection.scenes(stability.SCENES), "hard_cases": hard_cases.scenes}
+        chosen = usual.get(name, selection.scenes)()
+    return Study(name, chosen, compared, quick, skip_missing, time_limit=time_limit)
 
 
-def _random(extent: Extent) -> Study:
-    _require_drawn(extent)
-    if extent.sizes:
-        raise BadInput(
-            "sizes", ", ".join(extent.sizes), f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
-        )
-    bodies = DEFAULT_BODIES if extent.bodies is None else extent.bodies
-    found = selection.methods(extent.methods or None, extent.skip_missing, random.settings)
-    methods = tuple(dict.fromkeys((*found, *_engines(extent))))
-    return studies.random_study(methods, bodies, extent.seed or 0, extent.quick, extent.skip_missing)
-
-
-def _throughput(extent: Extent) -> Study:
-    """Return the study of many bodies: of what runs many at once, of what is named, and of engines that are."""
-    _require_drawn(extent)
-    found = selection.methods(extent.methods or None, extent.skip_missing, many_runs.settings)
-    methods = tuple(dict.fromkeys((*found, *_engines(extent))))
-    sizes = tuple(read_count("sizes", size) for size in extent.sizes)
-    numbers = {"sizes": sizes or None, "bodies": extent.bodies, "seed": extent.seed, "time_limit": extent.time_limit}
-    given = {name: value for name, value in numbers.items() if value is not None}
-    return studies.throughput_study(methods, quick=extent.quick, skip_missing=extent.skip_missing, **given)
-
-
-def _require_drawn(extent: Extent) -> None:
-    if extent.scenes:
-        raise BadInput("scenes", ", ".join(extent.scenes), "none: the study draws its bodies; say how many, and a seed")
+def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:
+    """Raise `BadInput` if an argument is given that a study does not have."""
+    drawn = (studies.RANDOM, studies.THROUGHPUT)
+    draws = f"nothing: only the studies {drawn[0]!r} and {drawn[1]!r} draw bodies"
+    refused = {} if name in drawn else {"bodies": draws, "seed": draws}
+    if name in drawn:
+        refused["scenes"] = "none: the study draws its bodies; say how many, and a seed"
+    if name != studies.THROUGHPUT:
+        refused["sizes"] = f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
+    if name in studies.ENGINES:
+        refused["methods"] = "none: the study is of --engines"
+    for argument, allowed in refused.items():
+        value = given[argument]
+        if value not in (None, (), []):
+            raise BadInput(argument, str(value) if isinstance(value, int) else ", ".join(value or ()), allowed)
 
 
 def read_count(argument: str, text: str) -> int:
@@ -101,26 +111,6 @@ def read_count(argument: str, text: str) -> int:
         if (number := float(text)) >= 1 and number == int(number):
             return int(number)
     raise BadInput(argument, repr(text), "an integer of 1 or more, such as 1000 or 1e6")
-
-
-def _engines(extent: Extent) -> tuple[Method, ...]:
-    return engine_selection.select_engines(extent.engines, extent.skip_missing) if extent.engines else ()
-
-
-def _scenes(name: str, extent: Extent) -> tuple[Scene, ...]:
-    if extent.scenes:
-        return selection.scenes(extent.scenes)
-    usual = {"stability": lambda: selection.scenes(stability.SCENES), "hard_cases": hard_cases.scenes}
-    return usual.get(name, selection.scenes)()
-
-
-def _methods(name: str, extent: Extent) -> tuple[Method, ...]:
-    if name in studies.ENGINES:
-        if extent.methods:
-            raise BadInput("methods", ", ".join(extent.methods), "none: the study is of --engines")
-        return engine_selection.select_engines(extent.engines or (engine_selection.ALL,), extent.skip_missing)
-    found = tuple(dict.fromkeys((*selection.methods(extent.methods or None, extent.skip_missing), *_engines(extent))))
-    return hard_cases.settings(found) if name == "hard_cases" else found
 
 
 def measure_study(study: Study, progress: Progress, scheduler: str | None = None) -> Measurements:
@@ -133,14 +123,14 @@ def measure_study(study: Study, progress: Progress, scheduler: str | None = None
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """
-    findings = list(studies.findings(study, progress)) if scheduler is None else _find_there(study, progress, scheduler)
+    if scheduler is None:
+        findings: Iterable[Finding] = studies.findings(study, progress)
+    else:
+        on_cluster.require_untimed(study.name)
+        with open_client(scheduler) as client:
+            findings = list(on_cluster.find_on_cluster(client, study, progress))
+    every = list(findings)
     return Measurements(
-        measurement.frame(each for each in findings if isinstance(each, measurement.Measurement)),
-        samples.frame(each for each in findings if isinstance(each, samples.Samples)),
+        measurement.frame(each for each in every if isinstance(each, measurement.Measurement)),
+        samples.frame(each for each in every if isinstance(each, samples.Samples)),
     )
-
-
-def _find_there(study: Study, progress: Progress, scheduler: str) -> list[Finding]:
-    on_cluster.require_untimed(study.name)
-    with open_client(scheduler) as client:
-        return list(on_cluster.find_on_cluster(client, study, progress))

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from conservative import BadInput, MissingEngine
+from conservative import BadInput, MissingEngine, MoserVeselov, Reduced
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import many_runs, studies, throughput
 from conservative.benchmarks.studies.ensembles import draw
@@ -122,6 +122,12 @@ def test_a_setting_that_would_take_too_long_says_so():
     assert throughput.too_long(point, 30, 0.2).reason.startswith("a call would take 0.3 s")
     assert "preparing" in throughput.too_long(throughput.Point(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
     assert throughput.too_long(point, 1, 1e-9) is None  # one body is always tried
+
+
+def test_an_exact_setting_stands_for_its_family_in_the_coarse_study():
+    methods = (MoserVeselov(order=2), MoserVeselov(), Reduced())
+    assert list(many_runs.families(methods, quick=True)) == [MoserVeselov(), Reduced()]
+    assert len(list(many_runs.families(methods))) > 2
 
 
 def test_a_lucky_setting_decides_nothing():

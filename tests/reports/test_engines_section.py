@@ -16,12 +16,16 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import differences, terms
 from conservative.reports.tables.cells import Grade
+from conservative.reports.tables.classes import OF_ENGINES, with_classes
+from conservative.reports.tables.closing import verdict
 from conservative.reports.tables.engine_rows import engine_rows, points_of
 from conservative.reports.tables.engine_scenes import engine_scenes
 from conservative.reports.tables.engine_tables import beside, every_setting
+from conservative.reports.tables.summary import cheapest
+from conservative.reports.tables.work_precision import all_points
 
 from .made_up_engines import SCENE, STEPS, at_step, over_steps
-from .rows import table
+from .rows import point, table
 
 NO_ORDER = Outcome(OutcomeKind.NO_ORDER, WORSE)
 CRASHED = Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")
@@ -157,3 +161,18 @@ def test_completion_of_engines_goes_on_after_a_comma(text, found):
 
 def test_versions_are_no_settings_of_the_name_before_them():
     assert split_list("engines", ("all, exudyn,mujoco==3.6.0",)) == ["all", "exudyn", "mujoco==3.6.0"]
+
+
+def test_the_verdict_counts_engines_that_only_their_own_studies_measured():
+    ours = [
+        each
+        for dt, error in ((0.1, 1e-4), (0.01, 1e-8))
+        for each in point("reduced", "ours", error, 1e-5 / dt, dt, scene=SCENE)
+    ]
+    found = table(ours, over_steps("a==1", "RK4", (1e-5, 1e-7, 1e-9, 1e-11), 4.0))
+    points = with_classes(all_points(found))
+    assert set(points["name"]) == {"reduced", "a 1 RK4"}
+    assert cheapest(points, OF_ENGINES, 1e-6).name == "a 1 RK4"
+    assert verdict(points, [SCENE]).startswith(f"At 1e-6 rad: on {SCENE} ")
+    assert "a 1 RK4" in verdict(points, [SCENE])
+    assert len(all_points(table(ours))) == 2

@@ -17,7 +17,7 @@ from conservative.integration.pickling import dump, load
 from conservative.reports.cli.main import main
 from conservative.reports.run import single_study
 from conservative.reports.run.measure import Measurements
-from conservative.reports.run.single_study import Extent, plan_study
+from conservative.reports.run.single_study import plan_study
 from conservative.reports.tables.study_rows import rows_table
 
 from .rows import row
@@ -101,26 +101,26 @@ def test_what_is_not_for_the_study_is_refused(arguments, argument):
 
 @pytest.mark.parametrize("name", studies.MAKERS)
 def test_every_study_has_scenes_and_methods_of_its_own(name):
-    planned = plan_study(name, Extent(skip_missing=True, bodies=1 if name == "random" else None, engines=("scipy",)))
+    planned = plan_study(name, skip_missing=True, bodies=1 if name == "random" else None, engines=("scipy",))
     assert planned.name == name
     assert planned.scenes
     assert planned.competitors
 
 
 def test_studies_of_hard_cases_have_their_own_scenes():
-    assert [scene.name for scene in plan_study("stability", Extent(methods=("reduced",))).scenes] == list(stability.SCENES)
-    assert len(plan_study("hard_cases", Extent(methods=("reduced",))).scenes) == len(hard_cases.scenes())
+    assert [scene.name for scene in plan_study("stability", methods=("reduced",)).scenes] == list(stability.SCENES)
+    assert len(plan_study("hard_cases", methods=("reduced",)).scenes) == len(hard_cases.scenes())
 
 
 def test_the_number_of_bodies_is_that_in_each_field():
-    assert len(plan_study("random", Extent(methods=("projected",), bodies=2, seed=5)).scenes) == 8
-    assert "seed=5" in plan_study("random", Extent(methods=("projected",), bodies=1, seed=5)).scenes[0].name
+    assert len(plan_study("random", methods=("projected",), bodies=2, seed=5).scenes) == 8
+    assert "seed=5" in plan_study("random", methods=("projected",), bodies=1, seed=5).scenes[0].name
     with pytest.raises(BadInput):
-        plan_study("random", Extent(methods=("projected",), bodies=0))
+        plan_study("random", methods=("projected",), bodies=0)
 
 
 def test_numbers_of_bodies_are_read_as_people_write_them():
-    planned = plan_study("throughput", Extent(methods=("mujoco:RK4",), sizes=("1", "1e3"), bodies=3, seed=2, quick=True))
+    planned = plan_study("throughput", methods=("mujoco:RK4",), sizes=("1", "1e3"), bodies=3, seed=2, quick=True)
     assert (planned.sizes, planned.bodies, planned.seed, planned.quick) == ((1, 1000), 3, 2, True)
     assert [method.name for method in planned.methods] == ["mujoco"]
     assert [scene.name for scene in planned.scenes] == ["heavy_tops", "free_bodies"]
@@ -167,7 +167,7 @@ def numbers(finding):
 
 @pytest.mark.parametrize("name", ["paper", "long_runs"])
 def test_a_study_on_a_cluster_finds_the_same_rows(monkeypatch, name):
-    study = plan_study(name, Extent(("brick_flip", "symmetric_body"), ("gauss",)))
+    study = plan_study(name, ("brick_flip", "symmetric_body"), ("gauss",))
     here, told = Here(), []
     monkeypatch.setattr(on_cluster, "start_executor", lambda client: nullcontext(here))
     found = list(on_cluster.find_on_cluster(None, study, lambda *each: told.append(each)))
