@@ -1,10 +1,9 @@
-"""The motion that a recommendation is for: how fast it is, its truth, and what it makes of a small disturbance."""
+"""The motion of a recommendation: its rate, its reference solution, and its amplification of a small disturbance."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -26,7 +25,7 @@ from .extrapolation import Amplification
 from .probe import STEPS, Conditions
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0
-"""Length of short probes, rad turned, with a closed form for a truth and with multi-precision, which costs a second for ten."""
+"""Length of short probes, rad turned, with a closed form and with multi-precision, which takes a second for ten radians."""
 SAMPLES = 32
 """Least number of samples of a short probe."""
 DISTURBANCE = 1e-9
@@ -39,29 +38,33 @@ MOST_GRIDS = 16
 
 
 def prepare_conditions(scene: Scene, error: float, duration: float, cost_limit: float) -> tuple[Conditions, Truth]:
-    """Return what all probes have in common, and the truth that errors are measured against."""
-    rate = find_largest_rate(scene, duration)
+    """Return the conditions of all probes, and the reference solution."""
+    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound_rate(scene)))
+    rate = max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)  # at least one radian in the whole duration
     closed = Exact().unsupported(scene) is None
     length = min(duration, (CLOSED_RADIANS if closed else RADIANS) / rate)
     spacing = round_down(min(length / SAMPLES, step_ladder.RADIANS / rate))
     samples = math.ceil(length / spacing * (1 - 1e-9))
-    # Steps longer than the spacing end up to an eighth later.
+    # Runs with steps longer than the spacing end up to an eighth later.
     truth = reference(scene, Grid(spacing, samples + samples // 8 + 1))
+
+    @lru_cache(maxsize=MOST_GRIDS)
+    def closed_form(grid: Grid) -> Array:
+        return Exact().solve(scene, grid).R_WB
+
+    def sampled(grid: Grid) -> Array:
+        """Return the attitudes at multiples of the spacing, all of which the reference solution has."""
+        return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
+
     until = max(duration, truth.trajectory.t[-1]) if closed else samples * spacing
-    attitudes = sample_closed_form(scene) if closed else sample_truth(truth.trajectory, spacing)
+    attitudes = closed_form if closed else sampled
     nothing = Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, "")
     conditions = Conditions(scene, error, duration, cost_limit, spacing, samples, attitudes, float(until), rate, nothing)
-    return replace(conditions, amplification=measure_amplification(conditions)), truth
-
-
-def find_largest_rate(scene: Scene, duration: float) -> float:
-    """Return the largest angular speed, rad/s, of a trial run, and at least a turn by one radian in the whole duration."""
-    trial = integrate_quietly(scene, 1e-3, min(duration, 2 * CLOSED_RADIANS / bound_rate(scene)))
-    return max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)
+    return replace(conditions, amplification=_measure_amplification(conditions)), truth
 
 
 def integrate_quietly(scene: Scene, error: float, t_end: float) -> Trajectory:
-    """Return our own trajectory for an error; that it was not reached shows in its `choice` alone."""
+    """Return our own trajectory for an error; only its `choice` shows that the error was not reached."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyNotReached)
         return integrate(scene, error=error, t_end=t_end, on_failure="return")
@@ -74,29 +77,19 @@ def round_down(value: float) -> float:
     return float(f"{digit}e{power}")
 
 
-def sample_closed_form(scene: Scene) -> Callable[[Grid], Array]:
-    """Return the function from a grid to exact attitudes, which keeps those of the last `MOST_GRIDS` grids."""
-
-    @lru_cache(maxsize=MOST_GRIDS)
-    def attitudes(grid: Grid) -> Array:
-        return Exact().solve(scene, grid).R_WB
-
-    return attitudes
-
-
-def sample_truth(truth: Trajectory, spacing: float) -> Callable[[Grid], Array]:
-    """Return the function from a grid of multiples of the spacing to the attitudes of a truth that has them all."""
-    return lambda grid: truth.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
-
-
-def measure_amplification(conditions: Conditions) -> Amplification:
-    """Return how far a start with slightly other rates leads away: by closed forms, else by our own method."""
+def _measure_amplification(conditions: Conditions) -> Amplification:
+    """Return the effect of a small change of the initial rates: by closed forms, otherwise by our own method."""
     scene = conditions.scene
     size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
     off = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
     exact = Exact().unsupported(scene) is None and Exact().unsupported(off) is None
     method, dt = (Exact(), conditions.duration) if exact else choose_ours(conditions, DISTURBANCE / 100)
-    until = conditions.duration if exact else min(conditions.duration, affordable_duration(conditions, method, dt))
+    until = conditions.duration
+    if not exact:  # as far as the method gets within the wall time
+        n = max(1, math.ceil(conditions.short / dt))
+        run = method.prepare(scene, Grid(dt, n, n))
+        run()
+        until = min(until, AFFORDABLE * n * dt / wall_time(run))
     times, factors = [], []
     for end in sorted({min(until, conditions.short), until}):
         n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
@@ -116,11 +109,3 @@ def choose_ours(conditions: Conditions, error: float) -> tuple[Method, float]:
     choice = integrate_quietly(conditions.scene, error, length).choice
     assert choice is not None  # an error was asked for
     return choice.method, conditions.step_at_most(min(choice.dt, length / STEPS))
-
-
-def affordable_duration(conditions: Conditions, method: Method, dt: float) -> float:
-    """Return how far, s, a method gets in the wall time `AFFORDABLE`."""
-    n = max(1, math.ceil(conditions.short / dt))
-    run = method.prepare(conditions.scene, Grid(dt, n, n))
-    run()
-    return AFFORDABLE * n * dt / wall_time(run)

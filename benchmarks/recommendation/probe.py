@@ -1,7 +1,7 @@
-"""Probe runs: one method at one setting, its error against the truth, and the error that this makes expect in the end.
+"""Probe runs: one method at one setting, its error, and the error to expect at the end of the duration.
 
-Samples of all runs are multiples of one spacing, a round number, and steps are that spacing divided or multiplied by a product
-of twos and fives: so they are numbers that people type, and one truth serves all runs of a motion that has no closed form.
+The times of samples of all runs are multiples of one spacing, a round number. Steps are that spacing divided or multiplied by a
+product of twos and fives. So steps are numbers that people type, and one reference solution serves all runs.
 """
 
 from __future__ import annotations
@@ -199,14 +199,21 @@ class Conditions:
         where the finer run is about as long itself.
         """
         whole = [probe for probe in before if self.shows_growth(probe)]
-        if not whole or (tolerance_setting(method) is None and method.order is None):
+        name = tolerance_setting(method)
+        if not whole or (name is None and method.order is None):
             return None
         base = max(whole, key=lambda probe: (probe.length, -probe.setting))
         enough = min(base.length / MUCH_LONGER, self.duration)
         if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
             return None
-        assert base.error_law is not None  # or it would tell nothing
-        carried = base.error_law.scale(find_scaling(base, method, dt))
+        assert base.error_law is not None  # `shows_growth` requires it
+        if name is not None:
+            tolerance = getattr(method, name)
+            scaling = Scaling(name, base.setting, tolerance / base.setting, None)
+        else:
+            assert method.order is not None  # checked above
+            scaling = Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)
+        carried = base.error_law.scale(scaling)
         # What rounding leaves: a random walk of the rate, a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
@@ -215,12 +222,3 @@ class Conditions:
         """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < ASYMPTOTIC
-
-
-def find_scaling(base: Probe, method: Method, dt: float) -> Scaling:
-    """Return how the error of a probe changes at the tolerance of a method, or at a step of dt s where it has none."""
-    name = tolerance_setting(method)
-    if name is not None:
-        return Scaling(name, base.setting, getattr(method, name) / base.setting, None)
-    assert method.order is not None  # nothing is carried over where neither is there
-    return Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)

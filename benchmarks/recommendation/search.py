@@ -1,11 +1,10 @@
-"""From probe to probe: cut the step, or the tolerance, until the wanted error may be expected over the duration."""
+"""Reduce the step, or the tolerance, from probe to probe until the wanted error may be expected over the duration."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -73,7 +72,13 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
     ones find out.
     """
     more = conditions.truth_until > conditions.short * (1 + 1e-9) and conditions.duration > conditions.short
-    aim = partial(expect_linear, conditions) if more else expect
+
+    def expect_linear(probe: Probe) -> float:
+        """Return the error, rad, to expect over the duration if that of a short probe grows linearly."""
+        law = probe.error_law
+        return law.error * max(1.0, conditions.duration / law.length) if law and law.error < ASYMPTOTIC else math.inf
+
+    aim = expect_linear if more else expect
     short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], aim, long=False)
     if not more or aim(short[-1]) > conditions.target:
         return Refinement(tuple(short), ())
@@ -83,12 +88,6 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
 def expect(probe: Probe) -> float:
     """Return the error, rad, that a probe makes expect over the duration."""
     return probe.expected
-
-
-def expect_linear(conditions: Conditions, probe: Probe) -> float:
-    """Return the error, rad, to expect over the duration if that of a probe grows linearly."""
-    law = probe.error_law
-    return law.error * max(1.0, conditions.duration / law.length) if law and law.error < ASYMPTOTIC else math.inf
 
 
 def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
@@ -114,7 +113,7 @@ def refine_long(conditions: Conditions, short: list[Probe]) -> list[Probe]:
 def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: bool) -> list[Probe]:
     adaptive = tolerance_setting(probes[0].method) is not None
     while len(probes) < ATTEMPTS and aim(probes[-1]) > conditions.target:
-        if at_round_off(probes) or timed_out(probes[-1]):
+        if at_round_off(probes) or probes[-1].outcome.kind is OutcomeKind.TIMEOUT:  # finer runs would take even longer
             break
         finer = (_tighten_tolerance if adaptive else _shorten_step)(conditions, probes, aim(probes[-1]))
         if finer is None:
@@ -126,11 +125,6 @@ def _refine_until(conditions: Conditions, probes: list[Probe], aim: Aim, long: b
 def at_round_off(probes: Sequence[Probe]) -> bool:
     """Whether finer settings have stopped helping where they once did: round-off."""
     return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
-
-
-def timed_out(probe: Probe) -> bool:
-    """Whether a probe went on beyond its limit; what is finer would, too."""
-    return probe.outcome.kind is OutcomeKind.TIMEOUT
 
 
 def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
