@@ -90,12 +90,6 @@ def test_errors_of_round_off_are_alike_however_far_apart():
     assert changes(before, replace(GOOD, error=near(2e-9))) == {(Aspect.ERROR, ""): False}
 
 
-def test_an_order_that_goes_with_the_error_is_lost():
-    gone = replace(GOOD, attitude_order=Fit(reason="no descent"), error=near(1.0))
-    assert changes(GOOD, gone) == {(Aspect.ATTITUDE_ORDER, ""): True, (Aspect.ERROR, ""): False}
-    assert changes(gone, GOOD) == {(Aspect.ATTITUDE_ORDER, ""): False, (Aspect.ERROR, ""): False}
-
-
 def test_sizes_and_directions():
     assert Spread(0.1, -0.2, 0.3).sizes == (0.0, 0.3)
     assert Spread(-0.1, -0.3, -0.05).sizes == (0.05, 0.3)

@@ -68,8 +68,3 @@ def test_rows_are_sorted_by_their_ratio_both_ways(opened, visible):
     click(opened, "thead th:nth-child(4) button")
     assert visible() == ["reduced", "lame", "gauss"]
     assert opened.execute_script("return document.querySelector('[aria-sort]').textContent") == "ratio"
-
-
-def test_the_page_is_no_wider_than_a_phone(opened, visible):
-    opened.set_window_size(500, 844)  # chromium's narrowest window
-    assert opened.execute_script("return document.documentElement.scrollWidth - innerWidth") <= 0

@@ -5,11 +5,13 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
+from click.testing import CliRunner
 
 from conservative.benchmarks.tracking.observation import Fit
 from conservative.outcome import Outcome, OutcomeKind
+from conservative.reports.cli.main import main
+from conservative.reports.cli.options import HEAD
 from conservative.reports.page.versions import render_track
-from conservative.reports.tables.changes import drift_text, order_text
 from conservative.reports.tables.track import NO_END, NOTHING_CHANGED, Answer
 
 from ..benchmarks.made_up_versions import BAD, FAILED, GOOD, TIMES, history, near
@@ -68,15 +70,6 @@ def test_a_time_is_said_with_what_differs_between_repeats():
     assert said(GOOD, GOOD, times=(TIMES, SLOW)) == (
         "midpoint on brick: from 1.0 to 2.0 a step takes 2 times as long (2 to 2)",
     )
-
-
-def test_noise_is_not_said():
-    assert said(GOOD, replace(GOOD, error=near(4e-3)), times=(TIMES, (1e-6, 9e-6, 2e-6))) == ()
-
-
-def test_numbers_are_written_as_people_say_them():
-    assert [order_text(order) for order in (0.99, 2.3, 4.06)] == ["1", "2.3", "4"]
-    assert [drift_text(drift) for drift in (-0.1677, 4e-4, 2.4e-13)] == ["-17 %", "4e-4", "2e-13"]
 
 
 # -------------------------------------------------------------------------------------------------------------- the verdict
@@ -141,13 +134,6 @@ def test_markdown_has_tables_changes_and_versions():
     assert NOTHING_CHANGED in Answer(history(GOOD, GOOD)).markdown_text()
 
 
-def test_what_has_no_order_says_why_once_for_all_versions():
-    chaotic = replace(GOOD, attitude_order=Fit(reason="2 points between the coarsest steps and the floor"))
-    answer = Answer(history(chaotic, chaotic, GOOD))
-    assert answer.unfinished == ("midpoint on brick in 1.0, 2.0: no order (2 points between the coarsest steps and the floor)",)
-    assert answer.unfinished[0] in render_track(answer)
-
-
 def test_json_has_every_figure_and_change():
     found = json.loads(Answer(history(GOOD, BAD, times=(TIMES, TIMES)), gated=True).json_text())
     assert (found["engine"], found["passed"], len(found["failures"])) == ("made", False, 1)
@@ -176,3 +162,22 @@ def test_the_page_stands_alone_and_says_what_the_markdown_says():
     assert "<script" not in page
     assert "src=" not in page
     assert "http" not in page
+
+
+def test_a_file_of_somebody_else_is_not_replaced_and_its_own_are_recognized(tmp_path):
+    answer = Answer(history(*[GOOD, BAD] * 9), gated=True, made={"command": "conservative track made"})
+    texts = {"track.html": render_track(answer), "track.md": answer.markdown_text(), "track.json": answer.json_text()}
+    for option, name, text in (
+        *(("--out", name, text) for name, text in texts.items()),
+        ("--junit", "notes", answer.junit_text()),
+        ("--markdown", "notes", answer.markdown_text()),
+    ):
+        mine = tmp_path / name
+        mine.write_text("mine")
+        arguments = ["track", "mujoco", "no such version", option, str(tmp_path if option == "--out" else mine)]
+        done = CliRunner().invoke(main, arguments)
+        assert (done.exit_code, "--force" in done.stderr, mine.read_text()) == (2, True, "mine")
+        command = main.commands["track"]
+        kind = next(each.type for each in command.params if option in each.opts)
+        assert kind.marks(tmp_path if option == "--out" else mine)[mine] in text[:HEAD]
+        mine.unlink()
