@@ -11,7 +11,7 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import studies, study
+from conservative.benchmarks.studies import convergence, studies, study
 from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
@@ -118,7 +118,13 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     assert any(row.outcome.ok for row in found if row.method == "reduced") or name == "sphere_curves"
 
 
-def test_a_slow_engine_has_a_line_of_fewer_points():
+@pytest.fixture
+def on_an_idle_machine(monkeypatch):
+    """Runs of `Slow` that are taken to last as long as they sleep, however busy the machine is."""
+    monkeypatch.setattr(convergence, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
+
+
+def test_a_slow_engine_has_a_line_of_fewer_points(on_an_idle_machine):
     slow = Slow(pause=0.002)
     found = rows("work_precision", slow, time_limit=0.08)  # 12, 24, 48 and 96 steps, of up to 1536
     timed = [row for row in found if row.measure is Measure.TIME and row.outcome.ok]
@@ -133,7 +139,7 @@ def test_a_slow_engine_has_a_line_of_fewer_points():
     assert all("more than 0.08 s" in row.outcome.reason for row in left)
 
 
-def test_a_slow_engine_has_an_order():
+def test_a_slow_engine_has_an_order(on_an_idle_machine):
     found = {
         row.measure: row for row in rows("convergence", Slow(pause=0.001), time_limit=0.05) if row.measure is Measure.ORDER
     }
