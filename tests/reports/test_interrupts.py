@@ -93,8 +93,7 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
     assert process.returncode == -signal.SIGINT
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_work_in_another_process_ends_with_its_command(number, tmp_path):
+def test_work_in_another_process_ends_with_its_command(tmp_path):
     code = (
         "import os, pathlib\nfrom conservative.references.worker import run_within\n"
         "pathlib.Path('pid').write_text(str(run_within(60, os.getpid)))\npathlib.Path('.busy').touch()\n"
@@ -103,7 +102,7 @@ def test_work_in_another_process_ends_with_its_command(number, tmp_path):
     with programs() as popen:
         process = start(popen, [], tmp_path, code)
         worker = psutil.Process(int((tmp_path / "pid").read_text()))
-        process.send_signal(number)
+        process.send_signal(signal.SIGINT)
         process.communicate(timeout=HANG)
         assert psutil.wait_procs([worker], timeout=10)[1] == []
 
@@ -200,9 +199,20 @@ def test_compiled_code_that_writes_to_stdout_leaves_json_whole():
     assert b"a log of an engine" in done.stderr
 
 
-def test_an_encoding_without_our_signs_is_no_error():
-    for command in (["list"], ["run", "brick_flip"]):
-        environment = variables(PYTHONPATH=str(ROOT), PYTHONIOENCODING="ascii")
-        done = subprocess.run([*CLI, *command], env=environment, capture_output=True, timeout=HANG)
-        assert (done.returncode, done.stderr) == (0, b"")
-        assert done.stdout
+SIGNS = """
+import sys
+from conservative.reports.tables import catalogue
+from conservative.reports.terminal.tables import TerminalTable
+catalogue.tables = lambda: [TerminalTable("times", ("µs", "done"), [("1", "✓")])]
+sys.argv = ["conservative", "list"]
+from conservative.reports.cli.launch import launch
+launch()
+"""
+
+
+@pytest.mark.parametrize(("encoding", "sign"), [("ascii", b"\\u2713"), ("latin-1", b"\\u2713"), ("utf-8", "✓".encode())])
+def test_an_encoding_without_our_signs_is_no_error(encoding, sign):
+    environment = variables(PYTHONPATH=str(ROOT), PYTHONIOENCODING=encoding)
+    done = subprocess.run([sys.executable, "-c", SIGNS], env=environment, capture_output=True, timeout=HANG)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert sign in done.stdout
