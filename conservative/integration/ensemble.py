@@ -39,29 +39,29 @@ MOST_LISTED = 5
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Samples of the motions of n bodies, each of which moves by itself, at the same m times.
+    """Samples of the motions of n independent bodies at the same m times.
 
-    `len` is the number of bodies, `ensemble[i]` the trajectory of body number i, `ensemble[:10]` an ensemble of the first ten.
+    `len` is the number of bodies, `ensemble[i]` the trajectory of body i, and `ensemble[:10]` an ensemble of the first ten.
 
     Attributes
     ----------
     bodies
-        What was integrated: `bodies.take(i)` is the scene of body number i.
+        The bodies: `bodies.take(i)` is the scene of body i.
     grid
-        Steps of dt, s, and the samples kept of them.
+        Steps of length dt, s, and the stored samples.
     R_WB
-        Attitudes (n, m, 3, 3), body to world; nan after a failure, as all other samples.
+        Attitudes (n, m, 3, 3), body to world; nan after a failure.
     w_WB_B
-        Angular velocities (n, m, 3), rad/s, body axes.
+        Angular velocities (n, m, 3), rad/s, body axes; nan after a failure.
     drifts
-        The largest drift (n,) over a body's samples, dimensionless, by the name of what drifts: orthonormality and the
-        invariants of the scene. nan where a body has no such invariant, or failed.
+        Largest drift (n,) of each body, dimensionless, by name: orthonormality and the invariants of the scene. nan if a
+        body has no such invariant, or failed.
     label
-        Who made it, with version and setting.
+        Method with version and setting.
     failures
-        What ended runs early, by the number of the body.
+        Exceptions of runs that ended early, by the index of the body.
     choice
-        Method, step and estimated error, where `integrate_many` was asked for an error. Else None.
+        Method, step size and estimated error, if `integrate_many` had a target error, otherwise None.
     """
 
     bodies: Bodies
@@ -80,30 +80,30 @@ class Ensemble:
 
     @property
     def ok(self) -> Any:
-        """Whether each body (n,) reached the end of its run."""
+        """Whether the run of each body (n,) reached its end."""
         found = np.ones(len(self), dtype=bool)
         found[list(self.failures)] = False
         return found
 
     def outcome(self, i: int) -> Outcome:
-        """Return how the run of body number i ended."""
+        """Return the outcome of body i."""
         i = range(len(self))[i]
         return self.failures[i].outcome if i in self.failures else OK
 
     def to_pandas(self, rows: Literal["samples", "bodies"] = "samples") -> pandas.DataFrame:
-        """Return a table with a row for each body and sample, or for each body.
+        """Return a table with a row for each sample of each body, or for each body.
 
         Parameters
         ----------
         rows
-            "samples": the number of the body, and what `Trajectory.to_pandas` has: t, R_WB (by rows), w_WB_B, energy,
-            momentum_W. Samples after a failure are left out. A million rows take about 140 MB: `ensemble[:100].to_pandas()` is
-            a part. "bodies": outcome, the time reached, s, and the largest drifts, with the number of the body as index.
+            "samples": index of the body, t, R_WB (by rows), w_WB_B, energy, momentum_W, without samples after a failure. A
+            million rows take about 140 MB; `ensemble[:100].to_pandas()` is a part. "bodies": outcome, time reached, s, and
+            largest drifts, with the index of the body.
 
         Raises
         ------
         BadInput
-            rows is neither.
+            rows is something else.
         MissingExtra
             pandas, of the extra `report`, is not installed.
         """
@@ -126,14 +126,14 @@ class Ensemble:
         return frame
 
     def plot(self, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
-        """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
+        """Return a chart of the directions of a body axis at start and end, the spread of attitudes over time, and the drifts.
 
-        The axis is a direction (3,) in body axes, by default the axis of symmetry of body and field, else the third.
+        The axis is a direction (3,) in body axes; default: the symmetry axis of body and field, or the third axis.
 
         Raises
         ------
         BadInput
-            The axis is no direction.
+            The axis is not a direction.
         MissingExtra
             Altair or pandas, of the extra `report`, is not installed.
         """
@@ -194,9 +194,9 @@ class Ensemble:
         Raises
         ------
         BadInput
-            There is something.
+            The folder exists.
         NotWritten
-            It cannot be written, or the disk is full.
+            The folder cannot be written, or the disk is full.
         MissingExtra
             Zarr, of the extra `ensembles`, is not installed.
         """

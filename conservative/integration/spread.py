@@ -59,31 +59,31 @@ def spread(
     parameters: Mapping[str, float | str] | None = None,
     seed: int = 0,
 ) -> Starts:
-    """Return n random starts and bodies about those of a scene: `integrate_many(scene, **spread(scene, n, ...))`.
+    """Return n random initial states and bodies near those of a scene: `integrate_many(scene, **spread(scene, n, ...))`.
 
-    All are normally distributed about the scene's. A number is a standard deviation in SI units, of a vector that of each
-    component; a text such as `"2%"` is one relative to the scene's value, of a vector relative to its length. What is not given
-    is the scene's. The same seed gives the same bodies, with one version of NumPy, and the first of many are those of few.
+    Deviations are normally distributed. A number is a standard deviation in SI units, for each component of a vector. A string
+    such as `"2%"` is relative to the scene's value, or to the length of a vector. Everything else is taken from the scene. The
+    same seed gives the same bodies with the same version of NumPy, and a larger n only adds bodies.
 
     Parameters
     ----------
     scene, n
-        What they are about, and how many.
+        The scene, and the number of bodies.
     attitude
-        Standard deviation of each component of a rotation vector, body axes, by which the attitude is turned: a number in rad,
-        or `"5deg"`; `"any"` for attitudes evenly distributed over all there are.
+        Standard deviation of each component of a rotation vector, body axes, that turns the attitude: a number in rad, or
+        `"5deg"`; `"any"` for uniformly distributed attitudes.
     rate
-        That of each component of the angular velocity, body axes: a number in rad/s, `"5deg/s"`, or `"10%"` of its size;
-        `"any"` for directions evenly distributed, at the scene's size.
+        Standard deviation of each component of the angular velocity, body axes: a number in rad/s, `"5deg/s"`, or `"10%"` of
+        its magnitude; `"any"` for uniformly distributed directions with the scene's magnitude.
     inertia
-        That of each second moment of mass about a principal plane (int x^2 dm), which are above 0 for every body there is, such
-        as `"1%"`. Of these the principal moments are the sums of two, so that they vary by 0.71 to 1 times as much; the
-        principal axes stay. A share that would not be above 0 is drawn again (of 30 %, one in 2,300).
+        Standard deviation of each second moment of mass about a principal plane (int x^2 dm), such as `"1%"`; any positive
+        values belong to a body. The principal moments are sums of two of them and vary by 0.71 to 1 times as much. The
+        principal axes do not change. Negative values are drawn again (with 30 %, one in 2,300).
     parameters
-        That of numbers of the scene's potential by the names of its fields, such as `{"weight": "2%"}`, or of its vectors; of a
-        direction (3,) that of its components before it is made a unit vector.
+        Standard deviations of the potential's numbers and vectors, by the names of its fields, such as `{"weight": "2%"}`. A
+        direction (3,) is normalized after its components were changed.
     seed
-        Any integer of 0 or more.
+        Seed of the random numbers, 0 or more.
 
     Returns
     -------
@@ -94,9 +94,9 @@ def spread(
     Raises
     ------
     BadInput
-        A spread cannot be read, or is one of nothing, such as 2 % of a body's rate at rest; the potential has no such number;
-        the scene's inertia is none that a mass distribution has, or is that of a field that turns, too; n or the seed is no
-        such integer, or so many do not fit in memory.
+        A deviation is invalid, or relative to zero; the potential has no such number; the scene's inertia does not belong to a
+        mass distribution, or is also that of a turning field; n or seed is not an integer in range, or n bodies do not fit in
+        memory.
     """
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "a Scene, such as conservative.scenes.brick_flip()")
