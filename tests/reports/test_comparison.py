@@ -15,6 +15,7 @@ from conservative.benchmarks.gate.results import Status
 from conservative.reports.cli.main import main
 from conservative.reports.page.versions import WIDEST, bar, place, render_comparison
 from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
+from conservative.reports.terminal import progress
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
 from ..environments import ROOT
@@ -166,15 +167,22 @@ def test_junit_has_violations_that_belong_to_no_row():
 
 
 def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "jinja2", None)  # an import of it fails
+    monkeypatch.setitem(sys.modules, "jinja2", None)  # neither found nor imported
     monkeypatch.delitem(sys.modules, "conservative.reports.page.versions")
-    monkeypatch.setattr("conservative.errors.find_spec", lambda name: None if name == "jinja2" else name)
     markdown = tmp_path / "gate.md"
     assert gate("--against", "main", "--markdown", markdown) == (1, f"{SLOWER}\n")
     assert gate("--against", "main", "--markdown", markdown, ended=answer())[0] == 0
     code, text = gate("--against", "main", "--html", tmp_path / "page.html", ended=None)
     assert (code, "conservative-rotation[report]" in text) == (2, True)
     assert not (tmp_path / "page.html").exists()
+
+
+def test_progress_on_a_terminal_without_rich_is_silent(monkeypatch):
+    monkeypatch.setattr(progress, "has_terminal", lambda: True)
+    monkeypatch.setitem(sys.modules, "rich", None)
+    monkeypatch.delitem(sys.modules, "conservative.reports.terminal.bars", raising=False)
+    with progress.progress() as step:
+        step(0.5, "half")
 
 
 @pytest.mark.parametrize("package", ["uv", "heyoka"])
