@@ -1,1 +1,1 @@
-"""Two versions of a project against each other, in one run: times in turn, and what else the gate compares. No baseline."""
+"""Compare two versions of a project in one run: accuracy as the gate compares it, and times in turn. No stored baseline."""

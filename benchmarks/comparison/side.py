@@ -1,4 +1,4 @@
-"""One side of a comparison: a version's process, and its methods as methods of ours, which studies and measures take."""
+"""One side of a comparison: the process of a version, and its methods as `Method`, for studies and measures."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Setting:
 
 
 class Side:
-    """A version, and the process in which it is asked; kernels are compiled into a folder of the version alone."""
+    """A version and its process; each version has its own folder of compiled kernels."""
 
     def __init__(self, version: Version) -> None:
         self.version, home = version, version.environment.folder / "home"
@@ -52,7 +52,7 @@ class Side:
         self._worker = Worker(version.environment.interpreter, home, temporary_folder(), variables)
 
     def close(self) -> None:
-        """End the process; the next question starts another one."""
+        """End the process; the next call starts another one."""
         self._worker.close()
 
     def ask(self, task: str, **values: Any) -> dict[str, Any]:
@@ -91,13 +91,13 @@ class TimedRun(WorkerRun[Trajectory]):
 
 @dataclass(frozen=True)
 class States:
-    """Makes trajectories of a scene of the states that a version hands over."""
+    """Makes trajectories of a scene from the states of a version."""
 
     scene: Scene | None = None
     label: str = ""
 
     def trajectory(self, found: Mapping[str, Any]) -> Trajectory:
-        """Return the samples that there are, with the failure that the version has seen."""
+        """Return the samples, with the failure if there is one."""
         assert self.scene is not None
         counts = Counters(**{name: found["counts"].get(name) for name in _COUNTS})
         failure = found["failure"]
@@ -138,6 +138,6 @@ class Remote(Method):
         return self.longest
 
     def prepare(self, scene: Scene, grid: Grid) -> WorkerRun[Trajectory]:
-        """Return the run; it is prepared when it is first called, so that what cannot be prepared is a failure of the run."""
+        """Return the run. It is prepared at its first call, so that a failure to prepare is a failure of the run."""
         values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
         return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)

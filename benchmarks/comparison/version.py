@@ -1,4 +1,4 @@
-"""A version of a project: what names it, a git ref, a folder or a wheel, and the environment in which it runs."""
+"""A version of a project, given by a git ref, a folder or a wheel, and its environment."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ class Version:
 
     @property
     def packages(self) -> tuple[str, ...]:
-        """All that is installed beside it, as `name==version` or the file of a wheel."""
+        """Installed packages, as `name==version` or the file of a wheel."""
         return tuple(text.rpartition("/")[2] for text in self.environment.packages)
 
     @property
     def title(self) -> str:
-        """What tables call it."""
+        """Name in tables."""
         head, plus, changes = self.commit.partition("+")
         return f"{self.name} ({head[:9]}{plus}{changes})" if head and not self.name.startswith(head[:9]) else self.name
 
 
 def install_version(name: str, project: Path, source: Source, requirements: Sequence[str] = ()) -> Version:
-    """Return a version, in an environment that is made where it is not there.
+    """Return a version, and make its environment if it does not exist.
 
     Parameters
     ----------
@@ -62,12 +62,12 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     source
         Where packages come from.
     requirements
-        What its environment is to have beside the project.
+        Additional packages for its environment.
 
     Raises
     ------
     BadInput
-        There is no such version, it does not build, or what it needs cannot be had.
+        There is no such version, it does not build, or a package that it needs is not available.
     """
     path = Path(name)
     if path.suffix == ".whl" and path.is_file():
@@ -82,13 +82,13 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
 
 
 def _wheel_of_commit(found: str, project: Path, source: Source) -> Path:
-    """Return the wheel of a commit: what is kept of it, or what its files build, which are taken out of the repository."""
+    """Return the wheel of a commit: a kept one, or a new one built from the files of the commit."""
     inside = git(project, "rev-parse", "--show-prefix")
 
     def make_wheel(folder: Path) -> Path:
         sources = folder / "sources"
         _take_out(found, project, sources)
-        # setuptools-scm, and what is built on it, would look for a version in a repository
+        # setuptools-scm, and tools built on it, would look for a version in a repository
         return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{found[:12]}")(folder)
 
     return keep_wheel(f"{found}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)

@@ -1,4 +1,4 @@
-"""The baseline: the value and the limit of every row, and the reason for every change. A hash shows edits by hand."""
+"""The stored baseline: values and limits of every row, and the reason of every change. A hash shows edits by hand."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ COUNTS = tuple(field.name for field in fields(Counters))
 SPREADS = 5.0
 """How many times its measured spread a value may move."""
 ROUND_OFF = 8 * 2.0**-52
-"""How far any error or drift may move: a change of the last digits is none."""
+"""Smallest allowed change of an error or a drift: the last digits."""
 ORDER_MARGIN = 0.05
-"""How far an observed order may fall."""
+"""Largest allowed decrease of an observed order."""
 
 
 class NoBaseline(BadInput):
@@ -117,7 +117,7 @@ def _measure(name: str, rows: Sequence[Row]) -> Allowed:
     """Return the limit that follows from the spread within and between runs."""
     values = [row.values[name] for row in rows]
     if not all(math.isfinite(value) for value in values):
-        raise BadInput("results", f"{name} = {values} of {rows[0].id}", "finite values: what is not a number is not accepted")
+        raise BadInput("results", f"{name} = {values} of {rows[0].id}", "finite values: NaN is not accepted")
     if runaway := find_runaway({name: max(values)}):
         raise BadInput("results", f"{rows[0].id}, whose {runaway}", "runs that keep their energy: a failure is not accepted")
     spread = max(max(row.spreads.get(name, 0.0) for row in rows), max(values) - min(values))

@@ -53,7 +53,7 @@ def benchmarks_requested(config: pytest.Config) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """With the option and no path, make the suite what is run; take paths of the suite by the name it is imported under.
+    """With the option and no path, run the suite; take paths of the suite by the name that it is imported under.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class Row:
     engine
         Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for the project under test.
     definition
-        Hash of what is measured.
+        Hash of scene, method and steps.
     values, spreads
         Measures that must not get worse, and the change of each by round-off alone.
     """

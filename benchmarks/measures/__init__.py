@@ -1,1 +1,1 @@
-"""What is measured of a run: errors, drifts, orders and times, and the tidy row each value becomes."""
+"""Measures of a run: errors, drifts, orders and times, and the tidy row of each value."""

@@ -38,7 +38,7 @@ class Order:
     slope, stderr
         d log(error) / d log(step) and its standard error; nan where there is no fit.
     used
-        Indices of the points in the fit, into what was handed in, coarsest step first.
+        Indices of the points in the fit, into the arguments, coarsest step first.
     floor
         The largest error at steps where the error no longer shrinks; nan where the data do not reach a floor.
     reason
@@ -108,7 +108,7 @@ def _none(floor: float, reason: str) -> Order:
 def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
     """Return whether the error at the shortest step is more than `GROWTH` times the smallest one, and no round-off.
 
-    Parameters and what is raised are those of `observed_order`.
+    Parameters and exceptions are those of `observed_order`.
     """
     h, e = check_points(steps, errors)
     known = np.isfinite(e)

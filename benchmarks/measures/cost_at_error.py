@@ -1,8 +1,8 @@
-"""What an error costs on a line of settings, coarse to fine, where no lucky setting counts.
+"""Cost at an error on a line of settings, coarse to fine; isolated good results are ignored.
 
 Errors of single settings scatter: a coarse one can be right by accident. A setting is therefore credited with the largest error
 of itself and of all finer settings of its line. Where that falls from one setting to the next, errors in between cost what the
-log-log interpolation gives, which is exact for a method with an order. Nothing is extrapolated. Source: ours.
+log-log interpolation gives, which is exact for a method with an order. Nothing is extrapolated.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from itertools import accumulate
 
 SMALLEST = 1e-17
-"""What an error of 0 is taken for."""
+"""Stands for an error of 0."""
 
 
 def credit(errors: Sequence[float]) -> list[float]:

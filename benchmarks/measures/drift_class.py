@@ -1,4 +1,4 @@
-"""From which drift on a quantity no longer counts as conserved, or as drifting little. Source: our own."""
+"""Classes of drift: conserved, small, large."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a trajectory is from the truth, and how far what should be conserved has drifted."""
+"""Errors of a trajectory against a reference solution, and drifts of its invariants."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     Parameters
     ----------
     trajectory
-        May end early; what it has is measured.
+        May end early; the samples that it has are measured.
     truth
         The exact motion at the same times.
 
@@ -80,7 +80,7 @@ def measure_drifts(trajectory: Trajectory) -> list[Value]:
 
 
 def blanks(scene: Scene) -> list[Value]:
-    """Return all that `measure_errors` finds for a scene, without values: what a run that failed has."""
+    """Return the measures of `measure_errors` for a scene without values, for a run that failed."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
     return [found.blank for found in measure_errors(start, start)]
 

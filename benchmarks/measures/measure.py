@@ -1,4 +1,4 @@
-"""Everything that is ever measured, once: what it is called, and its unit."""
+"""All measures, with their texts and units."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Measure(Enum):
-    """What a value is of: its text, and its unit. A drift is one of a quantity, which is named beside it."""
+    """A measure with its text and unit. A drift also has a quantity, which is a field of its own."""
 
     ATTITUDE_MAX = "attitude error max", "rad"
     ATTITUDE_FINAL = "attitude error final", "rad"
@@ -52,7 +52,7 @@ class Measure(Enum):
 
     @classmethod
     def from_text(cls, text: str) -> Measure:
-        """Return the measure with this text; `KeyError` where there is none."""
+        """Return the measure with this text; raise `KeyError` if there is none."""
         return _BY_TEXT[text]
 
     def __str__(self) -> str:
@@ -64,7 +64,7 @@ _BY_TEXT = {measure.text: measure for measure in Measure}
 
 @dataclass(frozen=True)
 class Value:
-    """What was measured and how much of it, in the measure's unit; nan where it could not be measured.
+    """A measure and its value in the unit of the measure; NaN if it could not be measured.
 
     `quantity` is the name of the invariant that a drift is of, and empty for everything else.
     """
@@ -85,7 +85,7 @@ class Value:
 
 
 def key(measure: Measure, quantity: str = "") -> str:
-    """Return what a measure, of a quantity where it is a drift, is called: `energy drift max`."""
+    """Return the name of a measure, with the quantity of a drift: `energy drift max`."""
     return f"{quantity} {measure.text}".lstrip()
 
 

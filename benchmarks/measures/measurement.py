@@ -23,7 +23,7 @@ class Measurement:
     Attributes
     ----------
     study, scene
-        Names of the study that made the row and of the scene; the latter empty for what belongs to none.
+        Names of the study and of the scene; the scene is empty if the row belongs to none.
     method
         Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back. Empty for
         what belongs to no one method.
@@ -34,19 +34,19 @@ class Measurement:
     role
         Which side the method is on.
     series
-        What one line of a picture is: the method without its tolerance.
+        Name of a line in a chart: the method without its tolerance.
     series_setting
         The setting without the tolerance.
     dt
-        Step, s, or distance of samples of an adaptive method; nan for what belongs to no single step.
+        Step, s, or distance of samples of an adaptive method; NaN if the row belongs to no single step.
     quantity
         Name of the invariant that a drift is of; else empty.
     measure, value
-        What was measured, and how much of it in the measure's unit; nan where nothing could be measured.
+        Measure, and value in its unit; NaN if it could not be measured.
     outcome
         How the run ended, or why there was none.
     detail
-        What a reader may want beside the value; may be empty.
+        Further information; may be empty.
     """
 
     study: str
@@ -96,7 +96,7 @@ def flat(row: Measurement) -> dict[str, str | float]:
 
 
 def from_flat(record: Mapping[str, Any]) -> Measurement:
-    """Return the row that `flat` made a record of; `KeyError` or `ValueError` for what is none."""
+    """Return the row of a record from `flat`; raise `KeyError` or `ValueError` for anything else."""
     return Measurement(
         **{name: record[name] for name in _AS_THEY_ARE},
         role=Role(record["role"]),

@@ -1,4 +1,4 @@
-"""Where a measurement comes from: the machine, and the commit of the source."""
+"""The machine and the commit of a measurement."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Machine:
-    """What a computer is.
+    """Description of a computer.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Machine:
     cores
         How many this process may use.
     memory
-        All of it, as Linux says it; "unknown" elsewhere.
+        Total memory, as Linux reports it; "unknown" elsewhere.
     """
 
     processor: str
@@ -40,7 +40,7 @@ class Machine:
         return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
 
     def as_dict(self) -> dict[str, str]:
-        """Return what a reader is told of it."""
+        """Return the fields that reports show."""
         names = ("processor", "architecture", "cores", "memory", "system")
         return {name: getattr(self, name) for name in names}
 
@@ -70,7 +70,7 @@ def first_values(path: str) -> dict[str, str]:
 
 
 def git(folder: Path, *arguments: str) -> str:
-    """Return what git says about a folder; "" where it fails, or there is no git."""
+    """Return the output of git for a folder; "" if git fails or is not installed."""
     try:
         done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=10, check=True)
     except (OSError, subprocess.SubprocessError):

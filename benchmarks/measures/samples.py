@@ -1,4 +1,4 @@
-"""One line of a picture, sampled: what a study yields besides its rows."""
+"""Samples of a quantity over time, which a study yields besides its rows."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Samples:
     study, scene, method, label, family, version, setting, role, series, series_setting, dt
         As a `Measurement` has them.
     quantity
-        What is sampled, such as `energy`; its unit is said where the study yields it.
+        Name of the quantity, such as `energy`; the study documents its unit.
     t, value
         Times (n,), s, and values (n,).
     """
@@ -54,13 +54,13 @@ class Samples:
 
 
 def flat(samples: Samples) -> dict[str, Any]:
-    """Return samples as what JSON knows; floats stay as they are."""
+    """Return samples as a record for JSON."""
     who = {name: getattr(samples, name) for name in _WHO}
     return {**who, "role": samples.role.value, "t": samples.t.tolist(), "value": samples.value.tolist()}
 
 
 def from_flat(record: Mapping[str, Any]) -> Samples:
-    """Return the samples that `flat` made a record of; `KeyError` or `ValueError` for what is none."""
+    """Return the samples of a record from `flat`; raise `KeyError` or `ValueError` for anything else."""
     who = {name: record[name] for name in _WHO}
     t, value = (np.array(record[name], dtype=float) for name in ("t", "value"))
     return Samples(**{**who, "role": Role(record["role"])}, t=t, value=value)

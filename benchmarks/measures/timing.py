@@ -24,7 +24,7 @@ MIN_ROUNDS = 3
 class Timing:
     """Wall time of one call, s: the minimum and the median over `rounds` samples of `calls` calls each.
 
-    Of a run that failed while it was timed, as an engine in another process can, both are NaN, and `outcome` says how.
+    For a run that failed while it was timed, as an engine in another process can, both are NaN, and `outcome` has the failure.
     """
 
     minimum: float
@@ -51,7 +51,7 @@ def without_collector() -> Iterator[None]:
 
 
 def wall_time(run: Callable[[], Any], calls: int = 1) -> float:
-    """Return the wall time of `calls` calls, s. A run that takes its own time, as one in another process does, tells it."""
+    """Return the wall time of `calls` calls, s. A run in another process measures its own time."""
     own: Callable[[int], float] | None = getattr(run, "wall_time", None)
     if own is not None:
         return own(calls)
@@ -78,12 +78,12 @@ def time_interleaved(
 
     Each is called unmeasured first, to warm up and to see how many calls make a sample. Then every round takes one sample of
     each, in a new random order, so that a slow spell of the machine, or a neighbour in the order, hits them all alike. Ratios
-    of minimums are what lasts.
+    of minimums are reproducible.
 
     Parameters
     ----------
     runs
-        What to call, by name.
+        Functions to call, by name.
     rounds
         Samples of each.
     min_time
@@ -128,7 +128,7 @@ class _TimedRun:
                 taken.append(wall_time(self._run, self._calls) / self._calls)
 
     def timing(self) -> Timing:
-        """Return what was found."""
+        """Return the result."""
         values = self._taken if self._outcome.ok else [math.nan]
         return Timing(min(values), statistics.median(values), len(self._taken), self._calls, self._outcome)
 
@@ -142,7 +142,7 @@ class _TimedRun:
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a model costs once, s: `prepare` (conversion; compilation where code is not warm) and the first call of the run."""
+    """One-time costs, s: `prepare` (conversion, and compilation if needed) and the first call of the run."""
 
     prepare: float
     first_call: float
@@ -154,7 +154,7 @@ class Preparation:
 
 
 def prepare_and_run(prepare: Callable[[], Callable[[], Any]]) -> tuple[Callable[[], Any], Any, Preparation]:
-    """Return the run that `prepare` gives, the result of its first call, and what both cost."""
+    """Return the run from `prepare`, the result of its first call, and the cost of both."""
     start = perf_counter_ns()
     run = prepare()
     middle = perf_counter_ns()

@@ -1,4 +1,4 @@
-"""From an error measured over a short run to the error to expect over a long one, and what that rests on."""
+"""Extrapolate an error measured over a short run to a long one, by a stated law."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Drift:
 
 
 def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
-    """Return the drift of every invariant of a run, and what to expect of it over `duration` s."""
+    """Return the drift of every invariant of a run, measured and expected over `duration` s."""
     found = []
     for invariant in trajectory.scene.invariants:
         relative = trajectory.drift(invariant)
@@ -68,7 +68,7 @@ class Scaling:
     Attributes
     ----------
     setting, base
-        What differs, "dt" or the name of a tolerance, and its coarser value.
+        "dt" or the name of a tolerance, and its coarser value.
     factor
         Error at the finer setting, in units of that at the coarser one.
     order
@@ -138,7 +138,7 @@ class ErrorLaw:
         return replace(self, error=self.error * scaling.factor, linear=linear, quadratic=quadratic, scaling=scaling)
 
     def describe(self, duration: float) -> str:
-        """Return in words what `extrapolate` does."""
+        """Return the law of `extrapolate` in words."""
         if self.is_measured(duration):
             return f"measured over all {duration:g} s"
         run = f"measured over {self.length:.3g} s{self.scaling or ''}"
@@ -179,7 +179,7 @@ def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) ->
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """What becomes of a small disturbance of the start.
+    """Growth of a small disturbance of the start.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ class Amplification:
 
     @property
     def end(self) -> float:
-        """End of what is known, s."""
+        """End of the known part, s."""
         return float(self.t[self._known - 1])
 
     @property
@@ -219,7 +219,7 @@ class Amplification:
 
     @property
     def steepness(self) -> float:
-        """By how much the disturbance ends above a straight line through what it was after an eighth of the samples."""
+        """Final disturbance divided by a straight line through its value after an eighth of the samples."""
         last = self._known - 1
         early = max(1, last // 8)
         if self.factor[early] <= 0:

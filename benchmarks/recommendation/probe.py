@@ -45,7 +45,7 @@ class Probe:
     Attributes
     ----------
     method, dt
-        What ran; dt in s, of an adaptive method the distance of samples.
+        Method, and its step, s; for an adaptive method the distance of samples.
     length, error
         Of the run, s, and its largest attitude error against the truth, rad; nan where it failed.
     expected, law
@@ -88,7 +88,7 @@ class Conditions:
     Attributes
     ----------
     scene, error, duration
-        What is asked: the largest attitude error, rad, over s.
+        Scene, wanted attitude error, rad, and duration, s.
     cost_limit
         Wall time per simulated second, s/s, that a setting may cost.
     spacing, samples
@@ -100,7 +100,7 @@ class Conditions:
     rate
         Largest angular speed, rad/s.
     amplification
-        What becomes of a disturbance.
+        Growth of a disturbance.
     time_limit
         Time, s, after which a probe is ended.
     """
@@ -152,14 +152,14 @@ class Conditions:
         return Grid(sampling * self.spacing, n)
 
     def probe(self, method: Method, dt: float, cost: float, long: bool, before: Sequence[Probe] = ()) -> Probe:
-        """Return what a run of a method shows.
+        """Run a method and return the probe.
 
         Parameters
         ----------
         method, dt
-            What runs; dt in s, without a meaning for an adaptive method.
+            Method, and its step, s, which an adaptive method ignores.
         cost
-            What it is expected to cost, s/s; nan where nobody knows.
+            Expected cost, s/s; NaN if unknown.
         long
             Which window.
         before
@@ -214,7 +214,7 @@ class Conditions:
             assert method.order is not None  # checked above
             scaling = Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)
         carried = base.error_law.scale(scaling)
-        # What rounding leaves: a random walk of the rate, a rounding unit a step.
+        # Round-off: a random walk of the rate by a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
 

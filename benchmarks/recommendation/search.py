@@ -144,7 +144,7 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
 
 
 def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
-    """Return method with the next tolerance, a power of ten, and its cost; None where there is none or cost allows none."""
+    """Return method with the next tolerance, a power of ten, and its cost; None if there is none that the cost limit allows."""
     last = probes[-1]
     name = tolerance_setting(last.method)
     wanted = math.floor(math.log10(conditions.target / expected)) if expected < math.inf else -2

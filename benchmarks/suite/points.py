@@ -30,7 +30,7 @@ PAPER = SCENES[:2]
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
-"""Attitudes at which the energies of two potentials tell them apart."""
+"""Attitudes at which energies distinguish two potentials."""
 STEPS = 6
 """Number of steps that an observed order is fitted to; high orders need all of theirs, which are short."""
 LARGEST = {Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.DRIFT_MAX, Measure.ORTHONORMALITY}
@@ -65,7 +65,7 @@ class Point:
 
     @property
     def labels(self) -> dict[str, str]:
-        """What tells the row apart for the gate and for a reader; the version of an engine must stay, ours must not."""
+        """Names and definition of the row; the gate requires that the version of an engine stays the same, not ours."""
         label = self.method.label
         engine = label if self.method.role == Role.ENGINE else ""
         return {
@@ -78,14 +78,14 @@ class Point:
 
     @property
     def definition(self) -> str:
-        """Hash of what is integrated, how, and over which steps: measures of two definitions cannot be compared."""
+        """Hash of scene, method and steps: measures of two definitions cannot be compared."""
         words = [self.scene.name, self.method.name, *(invariant.name for invariant in self.scene.invariants)]
         # The empty text once described how times were taken. Without it, every definition in every baseline would change.
         return _hash([words, motion_numbers(self.scene), ""])
 
 
 def define_scene(scene: Scene) -> str:
-    """Return a hash of what a scene is: its motion, steps and invariants, whatever its file is called."""
+    """Return a hash of a scene: name, motion, steps and invariants."""
     return _hash([[scene.name, *(invariant.name for invariant in scene.invariants)], motion_numbers(scene)])
 
 
@@ -95,7 +95,7 @@ def define(words: list[str], values: Iterable[object]) -> str:
 
 
 def motion_numbers(scene: Scene) -> list[list[float]]:
-    """Return what makes the motion of a scene over its own steps: body, start, steps, and energies of the field."""
+    """Return the numbers that define the motion of a scene: body, start, steps, and energies of the field."""
     grid = grid_for(scene, scene.dt)
     times = np.linspace(0, scene.t_end, len(PROBES)) if depends_on_time(scene.potential) else np.zeros(len(PROBES))
     energies = (

@@ -1,1 +1,1 @@
-"""One engine over its versions: what each does with the same scenes and steps, and which conclusions changed in between."""
+"""Compare versions of an engine on the same scenes and steps, and find the conclusions that changed."""
