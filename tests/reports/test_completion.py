@@ -63,7 +63,6 @@ def test_the_last_of_several_is_completed(folder):
         ("run brick_flip --method re", ("plain", "reduced")),
         ("recommend brick_flip --engine muj", ("plain", "mujoco")),
         ("report --re", ("plain", "--resume")),
-        ("gate --times k", ("plain", "known")),
         ("track exu", ("plain", "exudyn")),
         ("gate res", ("file", "res")),
         ("run brick_flip --csv s", ("file", "s")),

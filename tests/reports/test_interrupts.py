@@ -56,8 +56,8 @@ def temporaries(folder):
         ("run", signal.SIGINT),
         ("run", signal.SIGTERM),
         ("run", signal.SIGHUP),
-        ("sweep", signal.SIGINT),
-        ("report", signal.SIGTERM),
+        pytest.param("sweep", signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param("report", signal.SIGTERM, marks=pytest.mark.slow),
     ],
 )
 def test_a_signal_ends_a_command_and_leaves_nothing(command, number, tmp_path):
