@@ -41,7 +41,7 @@ def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any
     y = alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
     title = alt.Title(
         f"{scene}: time against error",
-        subtitle="lower left is better; bold grey: the Pareto front without solutions of integrable motions",
+        subtitle="lower left is better; bold grey: fastest at each error, without closed forms",
     )
     base = alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=title).encode(x=x, y=y)
     best = alt.Chart(best_points).mark_line(color=BLACK, opacity=0.22, strokeWidth=11, strokeCap="round", strokeJoin="round")
