@@ -24,7 +24,6 @@ from ..presentation import COLUMNS
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
-from . import pictures
 from .blocks import BlockResult
 from .drifts import find_drifts, list_drifts
 from .store import read_store, write_store
@@ -137,7 +136,10 @@ class Ensemble:
         MissingExtra
             Altair or pandas, of the extra `report`, is not installed.
         """
-        return pictures.draw_ensemble(self, axis_B)
+        require_extra("Ensemble.plot", "report", "altair", "pandas")
+        from .pictures import draw_ensemble
+
+        return draw_ensemble(self, axis_B)
 
     def _repr_html_(self) -> str:
         rows = [

@@ -1,88 +1,73 @@
 """Pictures of an ensemble: where a body axis points, how far attitudes are apart over time, and the drifts.
 
 Charts have a few thousand rows at most, for any number of bodies: counts and quantiles, found block by block. Directions are
-drawn on a disc by J. H. Lambert's equal-area projection (1772), so that equal areas are equal parts of the sphere. Altair is
-imported when a picture is drawn.
+drawn on a disc by J. H. Lambert's equal-area projection (1772), so that equal areas are equal parts of the sphere.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import altair as alt
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..check import finite_array
-from ..errors import BadInput, require_extra
+from ..errors import BadInput
 from .distributions import angle_quantiles, directions, mean_attitudes, project
-
-if TYPE_CHECKING:
-    import altair
-    import pandas
 
 BLUE = "#0072B2"
 MOST_POINTS = 1000
-"""Bodies up to which each is a point; more are counted in cells."""
+"""Largest number of bodies that are drawn as points; more are counted in cells."""
 _CELLS, _SIDE = 41, 230
 _RINGS = (*(m * 10.0**k for k in range(-9, 1) for m in (1, 2, 5)), 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
 """Angles between rings, degrees."""
 _LEAST_EXTENT = 1e-7
-"""Half the side of a disc at least, rad: what is nearer is one point."""
+"""Smallest half side of a disc, rad: closer directions are one point."""
 LEAST_DRAWN = 1e-17
-"""Relative drift at which smaller ones are drawn, 0 too: a tenth of the round-off of one number."""
+"""Relative drift at which smaller ones, including 0, are drawn: a tenth of the round-off of one number."""
 MOST_TIMES = 200
-"""Samples that a line over time has at most, evenly chosen."""
+"""Largest number of samples of a line over time, evenly chosen."""
 _PER_DECADE = 4
 _WIDTH, _HEIGHT = 560, 170
 _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
-"""Those of Okabe and Ito, which colour-blind readers tell apart."""
+"""Okabe and Ito's colours, which colour-blind readers can distinguish."""
 
 
-def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> altair.VConcatChart:
+def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcatChart:
     """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
 
     Parameters
     ----------
     ensemble
-        What is drawn.
+        An `Ensemble`.
     axis_B
         The axis, a direction (3,) in body axes; default the axis of symmetry of body and field, else the third axis.
 
     Raises
     ------
     BadInput
-        The axis is no direction.
-    MissingExtra
-        Altair or pandas, of the extra `report`, is not installed.
+        The axis is not a direction.
     """
-    require_extra("Ensemble.plot", "report", "altair", "pandas")
-    import altair as alt
-
-    axis, shown = _read_axis(ensemble, axis_B), choose_samples(len(ensemble.t))
+    axis, m = _read_axis(ensemble, axis_B), len(ensemble.t)
+    along = np.flatnonzero(axis == 1)
+    named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis)})"
+    ends, shown = sorted({0, m - 1}), np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
     discs = [
-        draw_pointing(found, f"{_name_axis(axis)} at t = {ensemble.t[sample]:.6g} s")
-        for sample, found in zip(ends(ensemble), directions(ensemble.R_WB, axis, ends(ensemble)), strict=True)
+        draw_pointing(found, f"Body axis {named} at t = {ensemble.t[sample]:.6g} s")
+        for sample, found in zip(ends, directions(ensemble.R_WB, axis, ends), strict=True)
     ]
     quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, shown), shown)
     beside = alt.hconcat(*discs, spacing=40).resolve_scale(color="independent")
     rows = [beside, draw_spread(ensemble.t[shown], quantiles), draw_drifts(ensemble.drifts)]
     failed = f", {len(ensemble.failures):,} failed" if ensemble.failures else ""
     title = alt.Title(ensemble.bodies.scene.name, subtitle=[f"{len(ensemble):,} bodies{failed}", ensemble.label])
-    chart: altair.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
+    chart: alt.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
     return chart
-
-
-def choose_samples(m: int) -> list[int]:
-    """Return which of m samples a line over time has."""
-    return np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
-
-
-def ends(ensemble: Any) -> list[int]:
-    """Return the numbers of the first and of the last sample."""
-    return sorted({0, len(ensemble.t) - 1})
 
 
 def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
@@ -96,18 +81,10 @@ def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
     return axis / np.linalg.norm(axis)
 
 
-def _name_axis(axis_B: Array) -> str:
-    along = np.flatnonzero(axis_B == 1)
-    named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis_B)})"
-    return f"Body axis {named}"
-
-
-def draw_spread(t: Array, quantiles: Array) -> altair.LayerChart:
+def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
     """Return the median and the band of 90 % of angles from the mean attitude, (s, 3), rad, over times (s,), s."""
-    import altair as alt
-
     low, middle, high = np.degrees(quantiles).T
-    data = frame(t=t, low=low, middle=middle, high=high)
+    data = pd.DataFrame({"t": t, "low": low, "middle": middle, "high": high})
     positive = low[low > 0]
     wide = len(positive) == len(low) and high.max() > 1000 * positive.min()
     scale = alt.Scale(type="log" if wide else "linear")
@@ -118,21 +95,23 @@ def draw_spread(t: Array, quantiles: Array) -> altair.LayerChart:
         y=alt.Y("middle:Q", scale=scale), tooltip=[alt.Tooltip(f"{each}:Q", format=".4g") for each in data.columns]
     )
     title = alt.Title("Spread of attitude", subtitle="line: median; band: 5 to 95 % of the bodies")
-    chart: altair.LayerChart = (band + line).properties(title=title)
+    chart: alt.LayerChart = (band + line).properties(title=title)
     return chart
 
 
-def draw_drifts(drifts: Mapping[str, Array]) -> altair.Chart:
-    """Return how many bodies have which largest drift of each invariant, (n,) by its name, relative; both axes logarithmic."""
-    import altair as alt
-    import pandas as pd
-
+def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
+    """Return a histogram of the largest drifts (n,), relative, by the names of the invariants; both axes are logarithmic."""
     edges = _edges(drifts.values())
     data = pd.concat([_drift_rows(name, values, edges) for name, values in drifts.items()])
-    x = alt.X("drift:Q", title="largest drift, relative", scale=_log(nice=False), axis=_power_axis(edges[0], edges[-1], "~e"))
-    y = alt.Y("bodies:Q", scale=_log(domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
+    x = alt.X(
+        "drift:Q",
+        title="largest drift, relative",
+        scale=alt.Scale(type="log", nice=False),
+        axis=_power_axis(edges[0], edges[-1], "~e"),
+    )
+    y = alt.Y("bodies:Q", scale=alt.Scale(type="log", domainMin=0.5), axis=_power_axis(1, max(10, data["bodies"].max()), "~s"))
     colour = alt.Color("of:N", title="drift of", sort=list(drifts), scale=alt.Scale(range=list(_COLOURS)))
-    chart: altair.Chart = (
+    chart: alt.Chart = (
         alt.Chart(data, width=_WIDTH, height=_HEIGHT, title="Drifts over the run")
         .mark_line(interpolate="step-after", strokeWidth=1.8)
         .encode(x=x, y=y, color=colour, tooltip=["of:N", "bodies:Q"])
@@ -140,16 +119,8 @@ def draw_drifts(drifts: Mapping[str, Array]) -> altair.Chart:
     return chart
 
 
-def _log(**settings: Any) -> Any:
-    import altair as alt
-
-    return alt.Scale(type="log", **settings)
-
-
 def _power_axis(low: float, high: float, form: str) -> Any:
     """Return a logarithmic axis with a label at each power of ten, or at every second or third where they are many."""
-    import altair as alt
-
     first, last = math.floor(math.log10(low) + 1e-9), math.floor(math.log10(high) + 1e-9)
     return alt.Axis(format=form, values=[10.0**k for k in range(first, last + 1, 1 + (last - first) // 12)])
 
@@ -164,79 +135,56 @@ def _edges(drifts: Iterable[Array]) -> Array:
     return np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
 
 
-def _drift_rows(name: str, values: Array, edges: Array) -> pandas.DataFrame:
-    """Return the number of bodies from each edge on to the next; half a body where there is none, below the axis."""
+def _drift_rows(name: str, values: Array, edges: Array) -> pd.DataFrame:
+    """Return the number of bodies in each bin; half a body, below the axis, for an empty one."""
     finite = np.clip(values[np.isfinite(values)], edges[0], edges[-1])
     counts, _ = np.histogram(finite, edges)
-    return frame(of=np.full(len(edges), name), drift=edges, bodies=np.maximum([*counts, 0], 0.5))
+    return pd.DataFrame({"of": name, "drift": edges, "bodies": np.maximum([*counts, 0], 0.5)})
 
 
 def draw_pointing(directions_W: Array, title: str) -> Any:
     """Return where n bodies point, unit vectors (n, 3), world axes: as points, or counted in cells of a disc, with rings."""
-    import altair as alt
-
     points, mean = project(directions_W)
-    extent = _extent(points)
+    extent = max(float(np.linalg.norm(points, axis=1).max(initial=0.0)) * 1.06, _LEAST_EXTENT)  # all points are in the square
+    if len(points) <= MOST_POINTS:
+        data = pd.DataFrame(points, columns=["x", "y"])
+        bodies = alt.Chart(data).mark_point(filled=True, size=14, opacity=0.6, color=BLUE)
+    else:
+        counts, edges, _ = np.histogram2d(points[:, 0], points[:, 1], bins=_CELLS, range=[[-extent, extent]] * 2)
+        middle = (edges[1:] + edges[:-1]) / 2
+        i, j = np.nonzero(counts)
+        data = pd.DataFrame({"x": middle[i], "y": middle[j], "bodies": counts[i, j].astype(int)})
+        colour = alt.Color("bodies:Q", scale=alt.Scale(scheme="yellowgreenblue"), legend=None)
+        cells = alt.Chart(data).mark_square(size=(_SIDE / _CELLS + 0.6) ** 2, opacity=1)
+        bodies = cells.encode(color=colour, tooltip="bodies:Q")
     shown = f"mean ({', '.join(f'{each:.3f}' for each in mean)}), world axes"
     scale = alt.Scale(domain=[-extent, extent], nice=False)
     x, y = alt.X("x:Q", axis=None, scale=scale), alt.Y("y:Q", axis=None, scale=scale)
-    layers = [_points(points) if len(points) <= MOST_POINTS else _cells(points, extent), *_rings(extent)]
-    drawn = alt.layer(*(layer.encode(x=x, y=y) for layer in layers))
+    drawn = alt.layer(*(layer.encode(x=x, y=y) for layer in (bodies, *_rings(extent))))
     return drawn.properties(width=_SIDE, height=_SIDE, title=alt.Title(title, subtitle=shown))
-
-
-def _extent(points: Array) -> float:
-    """Return half the side of the square that is drawn: all points (n, 2) are in it."""
-    return max(float(np.linalg.norm(points, axis=1).max(initial=0.0)) * 1.06, _LEAST_EXTENT)
-
-
-def _points(points: Array) -> Any:
-    import altair as alt
-
-    return alt.Chart(frame(x=points[:, 0], y=points[:, 1])).mark_point(filled=True, size=14, opacity=0.6, color=BLUE)
-
-
-def _cells(points: Array, extent: float) -> Any:
-    """Return the numbers of bodies in the cells of a square; empty ones are not drawn."""
-    import altair as alt
-
-    counts, edges, _ = np.histogram2d(points[:, 0], points[:, 1], bins=_CELLS, range=[[-extent, extent]] * 2)
-    middle = (edges[1:] + edges[:-1]) / 2
-    i, j = np.nonzero(counts)
-    data = frame(x=middle[i], y=middle[j], bodies=counts[i, j].astype(int))
-    colour = alt.Color("bodies:Q", scale=alt.Scale(scheme="yellowgreenblue"), legend=None)
-    cells = alt.Chart(data).mark_square(size=(_SIDE / _CELLS + 0.6) ** 2, opacity=1)
-    return cells.encode(color=colour, tooltip="bodies:Q")
 
 
 def _rings(extent: float) -> list[Any]:
     """Return circles about the centre at round angles, and their labels in degrees."""
-    import altair as alt
-
     reach = math.degrees(2 * math.asin(min(extent / 2, 1.0)))
     step = next((angle for angle in _RINGS if reach / angle < 4), _RINGS[-1])
     angles = np.arange(1, math.floor(reach / step) + 1) * step
     turn = np.linspace(0, 2 * math.pi, 61)
     radii = 2 * np.sin(np.radians(angles) / 2)
     n, many = len(turn), len(radii)
-    lines = frame(
-        x=np.outer(radii, np.sin(turn)).ravel(),
-        y=np.outer(radii, np.cos(turn)).ravel(),
-        order=np.tile(np.arange(n), many),
-        ring=np.repeat(angles, n),
+    lines = pd.DataFrame(
+        {
+            "x": np.outer(radii, np.sin(turn)).ravel(),
+            "y": np.outer(radii, np.cos(turn)).ravel(),
+            "order": np.tile(np.arange(n), many),
+            "ring": np.repeat(angles, n),
+        }
     )
     apart = np.append(np.diff(radii) > 0.15 * extent, True)[:many]
     angles, radii = angles[apart], radii[apart]
-    labels = frame(x=0 * radii, y=radii, label=[f"{angle:g}°" for angle in angles])
+    labels = pd.DataFrame({"x": 0 * radii, "y": radii, "label": [f"{angle:g}°" for angle in angles]})
     halo, text = ({"stroke": "white", "strokeWidth": 3}, {"color": "#404040"})
     return [
         alt.Chart(lines).mark_line(color="#7F7F7F", strokeWidth=0.7).encode(order="order:Q", detail="ring:N"),
         *(alt.Chart(labels).mark_text(dy=-5, fontSize=10, **look).encode(text="label:N") for look in (halo, text)),
     ]
-
-
-def frame(**columns: Any) -> pandas.DataFrame:
-    """Return a table with the columns given."""
-    import pandas as pd
-
-    return pd.DataFrame(columns)
