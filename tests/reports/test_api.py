@@ -10,6 +10,8 @@ import pytest
 import conservative
 from conservative.references.exact import method
 
+pytestmark = pytest.mark.slow
+
 LOADED = re.compile(r'<(?:script|img|iframe|source)[^>]*\ssrc="([^"]*)"|<link[^>]*\shref="([^"]*)"|url\((http[^)]*)\)')
 
 
@@ -18,7 +20,7 @@ def pages(tmp_path_factory):
     """Pages by their path; made in another process, as pdoc runs what stands under `if TYPE_CHECKING`."""
     folder = tmp_path_factory.mktemp("api")
     command = [sys.executable, "-W", "error", "-m", "conservative.reports.documentation.api", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert done.stdout.strip() == str(folder / "conservative.html")

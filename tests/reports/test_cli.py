@@ -14,7 +14,8 @@ from conservative.reports.cli.main import main
 
 
 def conservative(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+    """Run a command where tables have room, however wide the terminal is in which the tests were started."""
+    return CliRunner(env={"COLUMNS": "200"}).invoke(main, [str(argument) for argument in arguments])
 
 
 def one_line(text):

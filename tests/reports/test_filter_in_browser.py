@@ -27,7 +27,7 @@ def opened(tmp_path_factory):
         *at_step("a==1", "Euler", 3.0, as_installed=True),
         *at_step("b==2", "Euler", 0.2),
     ]
-    plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), engines=(registry.method("pinocchio"),))
+    plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
     view = build(plan, Measurements(measurement.frame(rows), samples.frame([])), provenance([]))
     charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     file = tmp_path_factory.mktemp("page") / "index.html"
