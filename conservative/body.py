@@ -31,7 +31,7 @@ class RigidBody:
     ----------
     inertia
         Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component
-        is of 1e-100 to 1e100 kg m^2.
+        is of 1e-30 to 1e30 kg m^2.
 
     Raises
     ------

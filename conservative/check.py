@@ -22,7 +22,7 @@ from .errors import BadInput
 
 T = TypeVar("T")
 
-SMALLEST, LARGEST = 1e-100, 1e100
+SMALLEST, LARGEST = 1e-30, 1e30
 """Range of every number with a unit, in SI units, 0 apart; of an array the largest component counts.
 
 Products of three such numbers are doubles, and so are all that energies and momenta of a scene are made of.
@@ -221,23 +221,6 @@ def _convert_count(argument: str, value: object) -> int:
     if count > MOST_STEPS:
         raise BadInput(argument, describe(count), _COUNT)
     return count
-
-
-def power_of_two(size: float) -> float:
-    """Return the power of two above a finite size, by which dividing rounds nothing; 1 for a size of 0. Of any unit."""
-    return math.ldexp(1.0, min(math.frexp(size)[1], 1023)) if size > 0 else 1.0
-
-
-def length(vector: Array) -> float:
-    """Return |v| of a vector (3,), of any unit and size: squares neither vanish nor overflow."""
-    unit = power_of_two(float(np.abs(vector).max()))
-    return float(np.linalg.norm(vector / unit)) * unit
-
-
-def geometric_mean(a: float, b: float) -> float:
-    """Return the square root of the product of two numbers of any unit, above 0, which itself may overflow or vanish."""
-    (x, i), (y, j) = math.frexp(a), math.frexp(b)
-    return math.ldexp(math.sqrt(math.ldexp(x * y, (i + j) % 2)), (i + j) // 2)
 
 
 def set_fields(value: object, **fields: Any) -> None:

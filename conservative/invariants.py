@@ -11,7 +11,7 @@ import numpy as np
 
 from .attitude import Array
 from .body import RigidBody
-from .check import describe, geometric_mean, length, printable_text, real_number
+from .check import describe, printable_text, real_number
 from .errors import BadInput, nearest
 from .potentials.potential import AnyPotential, depends_on_time, energy_at
 from .potentials.turning import Turning
@@ -100,7 +100,7 @@ def conserved_part(body: RigidBody, potential: AnyPotential | None, R: Array, w_
 
 def jacobi_scale(body: RigidBody, field: Turning, energy_scale: float) -> float:
     """Return what errors of the Jacobi integral are relative to, J: the energy's scale and what the turning adds to it."""
-    return energy_scale + field.orbit.rate * geometric_mean(2 * energy_scale, float(body.moments.max()))
+    return energy_scale + field.orbit.rate * math.sqrt(2 * energy_scale * float(body.moments.max()))
 
 
 def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
@@ -131,7 +131,7 @@ def invariants_of(
     """
     found = list(_energies(body, potential, energy_scale))
     # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
-    scale = length(body.momentum(w_WB_B0)) or geometric_mean(float(body.moments.max()), energy_scale)
+    scale = float(np.linalg.norm(body.momentum(w_WB_B0))) or math.sqrt(float(body.moments.max()) * energy_scale)
     if potential is None:
         found.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
     elif (line := potential.axis_W) is not None:
@@ -166,7 +166,7 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     Those sizes have the units of the invariants. That of a momentum is all that the energy can make of it, which is more than
     its scale where a body starts near rest.
     """
-    most = geometric_mean(2 * scene.energy_scale, float(scene.body.moments.max()))
+    most = math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
     found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
     return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in found}
 
@@ -198,10 +198,10 @@ def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: 
     if potential is not None and not isinstance(potential, UniformGravity):
         return None
     moment_P = np.zeros(3) if potential is None else potential.moment_B @ body.R_BP
-    size = length(moment_P)
+    size = float(np.linalg.norm(moment_P))
     if size > 0 and np.ptp(body.moments) <= tolerance * body.moments.max():
         return np.asarray(body.R_BP @ (moment_P / size))
     axis = body.symmetry_axis(tolerance)
-    if axis is None or length(np.delete(moment_P, axis)) > tolerance * size:
+    if axis is None or np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size:
         return None
     return np.asarray(body.R_BP[:, axis] * (-1.0 if moment_P[axis] < 0 else 1.0))

@@ -32,7 +32,7 @@ MOST_DERIVATIONS = 64
 class Scene:
     """A rigid body that rotates about a fixed point: body, potential, initial state and duration.
 
-    Numbers with units are 0 or of magnitude 1e-100 to 1e100 in SI units, of vectors the largest component. In that range our
+    Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component. In that range our
     own methods are right or say what failed; engines are given the numbers as they are.
 
     Parameters

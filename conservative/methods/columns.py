@@ -1,8 +1,8 @@
 """Many bodies as kernels with lanes take them: in columns of whole registers, and in units in which all are of order one.
 
 Moments of inertia are in units of the largest of each body, times in units of the step, both rounded to powers of two. So
-squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold, and nothing is rounded: results are those in SI
-units, bit for bit. Source: definitions; our own layout.
+thresholds mean the same for bodies of any size, and nothing is rounded: results are those in SI units, bit
+for bit.
 """
 
 from __future__ import annotations

@@ -68,8 +68,7 @@ def _find_gravity(potential: UniformGravity, bodies: Bodies, R_BP: Array) -> Fie
 @find_fields.register
 def _find_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Fields:
     rest, stiffness = read_parameter(bodies, "rest_length"), read_parameter(bodies, "stiffness")
-    b, A, unit = _shrink_points(bodies, R_BP, rest)
-    stiffness, rest = stiffness * unit * unit, rest / unit
+    b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
     farthest = np.maximum(np.linalg.norm(b, axis=1) + np.linalg.norm(A, axis=1), rest)
     like = kernels("point_fields").Spring(_NONE, _NONE, 0.0, 0.0)
     return Fields(like, np.column_stack([b, A, stiffness, rest]), slice(6, 7), A, stiffness / 2 * farthest**2)
@@ -77,8 +76,8 @@ def _find_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Field
 
 @find_fields.register
 def _find_attractions(potential: PointAttraction, bodies: Bodies, R_BP: Array) -> Fields:
-    b, A, unit = _shrink_points(bodies, R_BP)
-    strength = read_parameter(bodies, "strength") / unit
+    b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
+    strength = read_parameter(bodies, "strength")
     scale = np.abs(strength) / np.hypot(np.linalg.norm(b, axis=1), np.linalg.norm(A, axis=1))
     like = kernels("point_fields").Attraction(_NONE, _NONE, 0.0)
     return Fields(like, np.column_stack([b, A, strength]), slice(6, 7), A, scale)
@@ -104,11 +103,3 @@ def read_parameter(bodies: Bodies, name: str) -> Array:
 def into_axes(v: Array, R_BP: Array) -> Array:
     """Return vectors (n, 3) of any unit, body axes, in axes R_BP (n, 3, 3)."""
     return np.asarray((v[:, None, :] @ R_BP)[:, 0, :])
-
-
-def _shrink_points(bodies: Bodies, R_BP: Array, *lengths: Array) -> tuple[Array, Array, Array]:
-    """Return the points of body and world (n, 3) in units of the longest length, m, and these units (n,), powers of two."""
-    b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
-    longest = np.column_stack([np.abs(b), np.abs(A), *lengths]).max(axis=1)
-    unit = np.ldexp(1.0, np.frexp(longest)[1])
-    return b / unit[:, None], A / unit[:, None], unit

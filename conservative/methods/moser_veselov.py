@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
-from ..check import choice, length, set_fields
+from ..check import choice, set_fields
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -176,14 +176,14 @@ def require_short_step(scene: Scene, dt: float, exact: bool) -> None:
     """Raise `BadInput` unless dt, s, is below `step_limit`."""
     bound = step_limit(scene, exact)
     if dt >= bound:
-        turn = length(scene.w_WB_B0) * dt
+        turn = float(np.linalg.norm(scene.w_WB_B0)) * dt
         rule = f"|w| dt < {LONGEST_EXACT:g} and shorter than half a period of the polhode" if exact else f"|w| dt < {LONGEST:g}"
         raise BadInput("dt", f"{dt:g}, |w| dt = {turn:.3g} rad", f"a step with {rule}: below {bound:.6g} s")
 
 
 def step_limit(scene: Scene, exact: bool) -> float:
     """Return the step, s, from which on steps are refused; infinite for a body at rest."""
-    speed = length(scene.w_WB_B0)
+    speed = float(np.linalg.norm(scene.w_WB_B0))
     if speed == 0:
         return math.inf
     if not exact:

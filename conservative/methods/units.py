@@ -2,7 +2,7 @@
 
 A motion stays what it is when moments of inertia are measured in units of M, times in units of T, and energies in units of
 M/T^2. Methods integrate in units in which the largest moment is of order one, and so is the rate that the energy makes of it:
-squares and cubes of numbers from 1e-100 to 1e100 leave what a float can hold. Exponents of the units are multiples of 16,
+so tolerances and thresholds of theirs mean the same for bodies of any size. Exponents of the units are multiples of 16,
 rounded towards 0: a scene whose largest moment lies between 2^-16 and 2^16 kg m^2, and whose rate lies between 2^-16 and
 2^16 rad/s, keeps its own units, bit for bit. So does one with a potential that has no `in_units`.
 

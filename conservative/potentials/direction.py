@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import finite_array, length, read_only
+from ..check import finite_array, read_only
 from ..errors import BadInput
 
 _UNIT = 4 * np.finfo(float).eps
@@ -23,7 +23,7 @@ def unit_vector(argument: str, value: ArrayLike) -> Array:
         It is not finite, of another shape, or 0.
     """
     direction = finite_array(argument, value, ((3,),), _ALLOWED)
-    size = length(direction)
+    size = float(np.linalg.norm(direction))
     if size == 0:
         raise BadInput(argument, direction.tolist(), _ALLOWED)
     return read_only(direction / size) if abs(size - 1) > _UNIT else direction

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array, triple
 from ..body import RigidBody
-from ..check import build_unchecked, positive_number, power_of_two, set_fields
+from ..check import build_unchecked, positive_number, set_fields
 from .direction import unit_vector
 from .varied import VariedGradient, fill
 
@@ -79,10 +78,8 @@ class GravityGradient:
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        rate = power_of_two(self.rate)
-        ratio = rate / math.sqrt(energy)  # twice, as a product of three may vanish before it is divided
-        inertia = self.inertia * ratio * ratio
-        return build_unchecked(GravityGradient, rate=self.rate / rate, inertia=inertia, direction_W=self.direction_W)
+        inertia = self.inertia / energy
+        return build_unchecked(GravityGradient, rate=self.rate, inertia=inertia, direction_W=self.direction_W)
 
     @property
     def axis_W(self) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array, Triple, triple
-from ..check import build_unchecked, finite_array, finite_number, positive_number, power_of_two, set_fields
+from ..check import build_unchecked, finite_array, finite_number, positive_number, set_fields
 from ..errors import BadInput
 from .varied import VariedPoints, fill, lengths
 
@@ -77,11 +77,6 @@ class PointPotential(ABC):
         """Return the direction (3,) of the world point; None where it is the pivot, and the field does nothing."""
         size = np.linalg.norm(self.anchor_W)
         return self.anchor_W / size if size > 0 else None
-
-    def _shrink(self, *lengths: float) -> tuple[float, dict[str, Array]]:
-        """Return the power of two above the longest of all lengths, m, and the points in units of it."""
-        unit = power_of_two(max(float(np.abs(self.point_B).max()), float(np.abs(self.anchor_W).max()), *lengths, 0.0))
-        return unit, {"point_B": self.point_B / unit, "anchor_W": self.anchor_W / unit}
 
     def _points(self, R_BP: Array) -> tuple[Triple, Triple]:
         return triple(self.point_B @ R_BP), triple(self.anchor_W)
@@ -155,10 +150,9 @@ class LinearSpring(PointPotential):
         return (parameters.get("stiffness", np.ones(1)) <= 0) | (parameters.get("rest_length", np.ones(1)) < 0)
 
     def in_units(self, energy: float) -> LinearSpring:
-        """Return the field with energies in units of `energy`, a power of two, J, and lengths in units of the longest."""
-        unit, points = self._shrink(self.rest_length)
-        stiffness = self.stiffness * unit / energy * unit
-        return build_unchecked(LinearSpring, stiffness=stiffness, rest_length=self.rest_length / unit, **points)
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        points = {"point_B": self.point_B, "anchor_W": self.anchor_W}
+        return build_unchecked(LinearSpring, stiffness=self.stiffness / energy, rest_length=self.rest_length, **points)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return points, stiffness and rest length as the kernels want them."""
@@ -227,9 +221,9 @@ class PointAttraction(PointPotential):
         return np.logical_or.reduce([parameters.get("strength", np.ones(1)) == 0, *zero])
 
     def in_units(self, energy: float) -> PointAttraction:
-        """Return the field with energies in units of `energy`, a power of two, J, and lengths in units of the longest."""
-        unit, points = self._shrink()
-        return build_unchecked(PointAttraction, strength=self.strength / unit / energy, **points)
+        """Return the field with energies in units of `energy`, a power of two, J."""
+        strength = self.strength / energy
+        return build_unchecked(PointAttraction, strength=strength, point_B=self.point_B, anchor_W=self.anchor_W)
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return points and strength as the kernels want them."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..check import build_unchecked, finite_array, finite_number, length, power_of_two, set_fields
+from ..check import build_unchecked, finite_array, finite_number, set_fields
 from .varied import VariedGravity, fill
 
 
@@ -67,12 +67,11 @@ class UniformGravity:
 
     def scale(self) -> float:
         """Return weight times lever arm, J."""
-        return length(self.moment_B)
+        return float(np.linalg.norm(self.moment_B))
 
     def in_units(self, energy: float) -> UniformGravity:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        lever = power_of_two(float(np.abs(self.com_B).max()))
-        return build_unchecked(UniformGravity, weight=self.weight * lever / energy, com_B=self.com_B / lever)
+        return build_unchecked(UniformGravity, weight=self.weight / energy, com_B=self.com_B)
 
     def vary(self, parameters: Mapping[str, Array]) -> VariedGravity:
         """Return the fields of n bodies with these numbers (n, ...), N and m, in place of its own."""

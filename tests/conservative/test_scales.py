@@ -61,6 +61,6 @@ def test_a_spring_much_longer_at_rest_than_it_ever_gets_is_measured_by_its_rest_
 
 
 def test_what_overflows_in_a_step_is_an_outcome():
-    body = cv.RigidBody((4e5, 4e6, 1e90))
-    scene = cv.Scene("far apart", body, np.eye(3), (3e79, 2e9, 2e-83), 8e18)
+    body = cv.RigidBody((4e5, 4e6, 1e30))
+    scene = cv.Scene("far apart", body, np.eye(3), (3e29, 2e9, 2e-23), 8e18)
     assert not cv.integrate(scene, 8e17, cv.Convected(), on_failure="return").ok
