@@ -132,7 +132,7 @@ def test_a_step_that_cannot_be_projected_says_so(field: str) -> None:
 
 
 def test_a_step_that_overflows_is_a_failure() -> None:
-    found = cv.integrate(scene("gravity", 1e40), 1e40, cv.Taylor(18), on_failure="return")
+    found = cv.integrate(scene("gravity", 1e30), 1e30, cv.Taylor(18), on_failure="return")
     assert found.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
     assert not found.outcome.residual < 1e-6  # not a number, too
     assert len(found) == 1

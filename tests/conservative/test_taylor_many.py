@@ -87,7 +87,7 @@ def test_symmetric_bodies_turn_in_a_frame_that_does_not_spin(field: str) -> None
         assert orthonormality(found.R_WB).max() < 1e-14
 
 
-@pytest.mark.parametrize(("moment", "time"), [(1e-30, 1e-20), (1e40, 1e10), (1.0, 1e40)])
+@pytest.mark.parametrize(("moment", "time"), [(1e-20, 1e-4), (1e20, 1e5), (1.0, 1e12)])
 def test_units_of_bodies_do_not_matter(moment: float, time: float) -> None:
     bodies, grid = draw("gravity"), cv.Grid(0.05 * time, 10, 10)
     parameters = {**bodies.parameters, "weight": bodies.parameters["weight"] * moment / time / time}

@@ -74,10 +74,10 @@ STEEP += [Heyoka(frame=frame) for frame in ("body", "lean", "base_vectors")]
 def test_a_run_that_ends_early_says_so_and_writes_no_file(method, every, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with np.errstate(over="ignore", invalid="ignore"):
-        scene = cv.Scene("hopeless", cv.RigidBody((1, 2, 2.5)), np.eye(3), (1e100, 1e100, 1e100), 2.0, dt=0.1)
+        scene = cv.Scene("hopeless", cv.RigidBody((1, 2, 2.5)), np.eye(3), (1e30, 1e30, 1e30), 2.0, dt=0.1)
         found = method.run(scene, 0.01, sample_every=every)
     assert str(found.outcome).startswith("diverged after t = 0")
-    assert len(found) <= 2  # MuJoCo's Euler gets as far as one step of units in which a rate is of order one
+    assert len(found) <= 3  # Euler's method overflows in the third step
     assert isinstance(found.failure, cv.Diverged)
     assert not list(tmp_path.iterdir())
 
