@@ -53,13 +53,12 @@ def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> View:
 
 def render(view: View, folder: Path, png: bool) -> None:
     """Write pictures, tables, page, CSV, and last the JSON that lists them."""
-    from .page import engines, markdown, page, random_bodies, scene_charts  # here, as altair takes a second to import
+    from .page import figures, markdown, page  # here, as altair takes a second to import
 
-    charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
-    of_engines, of_random = engines.charts(view.engines), random_bodies.chart(view.random)
-    text = markdown.render(view, charts, of_engines, lambda name, chart: draw(chart, folder / name, png), of_random)
+    charts = figures.charts(view)
+    text = markdown.render(view, charts, lambda name, chart: draw(chart, folder / name, png))
     files.write_text(folder / "report.md", text, "out")
-    files.write_text(folder / "index.html", page.render(view, charts, of_engines, of_random), "out")
+    files.write_text(folder / "index.html", page.render(view, charts), "out")
     files.write_text(folder / "measurements.csv", view.table.to_csv(index=False, lineterminator="\n"), "out")
     names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
     files.write_text(folder / MANIFEST, manifest(view, names), "out")

@@ -57,7 +57,7 @@ class PageFigure:
     charts: tuple[Spec, ...]
     legend: tuple[Entry, ...]
     view: str = ""
-    """ "sphere" where the charts have the parameters `turn` and `tilt`, "families" where they have `single`."""
+    """Class of the figure on the page; the charts of "families" have the parameter `single`."""
 
 
 def legend(families: Families, marks: bool) -> tuple[Entry, ...]:

@@ -14,35 +14,24 @@ from ..charts import paper
 from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, markdown
 from ..view import PaperView, View
-from . import many_bodies, random_bodies
-from .scene_charts import SceneCharts
 
 Draw = Callable[[str, Any], str]
 """Draws a chart under a name, and returns the name of its file."""
 
 
-def render(
-    view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], draw: Draw, of_random: Any = None
-) -> str:
-    """Return report.md.
-
-    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike, `of_random` that of random bodies,
-    if there is one; `draw(name, chart)` returns the name of its file.
-    """
+def render(view: View, charts: Mapping[str, Any], draw: Draw) -> str:
+    """Return report.md; `charts` are the pictures of `figures.charts`."""
     environment = Environment(
         loader=PackageLoader("conservative.reports"), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False
     )
     environment.filters["table"] = markdown
     return environment.get_template("report.md.j2").render(
         view=view,
-        random_picture=draw(random_bodies.NAME, of_random) if of_random is not None else "",
         random_terms=random_ratios.TERMS,
-        many_picture=draw(many_bodies.NAME, picture) if (picture := many_bodies.chart(view.throughput)) is not None else "",
         many_terms=throughput.TERMS,
-        pictures={name: _pictures(name, of_scene, draw) for name, of_scene in charts.items()},
+        pictures={name: draw(name, chart) for name, chart in charts.items()},
         default_method=DEFAULT_METHOD,
         durations=f"{long_runs.DURATIONS:g}",
-        engine_pictures={name: draw(f"engines_{name}", chart) for name, chart in of_engines.items()},
         engine_terms=engine_tables.TERMS,
         class_terms=summary.TERMS,
         sample_terms=summary.SAMPLE_TERMS,
@@ -53,10 +42,6 @@ def render(
         small=f"{SMALL:.0e}",
         paper=list(_paper(view.paper, draw)),
     )
-
-
-def _pictures(scene: str, charts: SceneCharts, draw: Draw) -> dict[str, str]:
-    return {kind: draw(f"{kind}_{scene}", chart) for kind, chart in charts._asdict().items()}
 
 
 def _paper(view: PaperView, draw: Draw) -> Iterator[str]:

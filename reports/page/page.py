@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
-from itertools import chain
+from collections.abc import Iterable
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -21,45 +20,29 @@ from ..charts.vega_embed import PageFigure
 from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, tolerance
 from ..view import View
-from . import engines, libraries, many_bodies, paper, random_bodies
-from .figures import first, scene_figures
-from .scene_charts import SceneCharts
+from . import libraries
+from .figures import page_figures, paper_figures
 
 
-def render(view: View, charts: Mapping[str, SceneCharts], of_engines: Mapping[str, Any], of_random: Any = None) -> str:
-    """Return the page.
-
-    `charts` are those of each scene by its name, `of_engines` the pictures of engines alike, `of_random` that of random bodies,
-    if there is one.
-    """
-    figures = {scene.name: scene_figures(scene, charts[scene.name]) for scene in view.scenes}
-    engine_figures = engines.figures(view.engines, of_engines)
-    random_figure = random_bodies.figure(view.random, of_random) if view.random and of_random is not None else None
-    many = many_bodies.chart(view.throughput)
-    many_figure = many_bodies.figure(view.throughput, many) if view.throughput and many is not None else None
-    first_figure, paper_figures = first(view.first, "first", view.about), paper.figures(view.paper)
-    of_scenes = chain.from_iterable(figures.values())
-    drawn = [first_figure, *of_scenes, *engine_figures.values(), *paper_figures, random_figure, many_figure]
+def render(view: View, charts: dict[str, Any]) -> str:
+    """Return the page; `charts` are the pictures of `figures.charts`."""
+    figures, paper = page_figures(view, charts), paper_figures(view.paper)
     return _template().render(
         view=view,
-        first_figure=first_figure,
-        paper=paper_figures,
+        paper=paper,
         caveat=summary.CAVEAT,
         class_terms=summary.TERMS,
         sample_terms=summary.SAMPLE_TERMS,
         samples=step_ladder.SAMPLES,
         hard_terms=hard_cases.TERMS,
-        random_figure=random_figure,
-        many_figure=many_figure,
         many_terms=throughput.TERMS,
         random_terms=random_ratios.TERMS,
         figures=figures,
-        engine_figures=engine_figures,
         engine_terms=engine_tables.TERMS,
         conserved=tolerance(CONSERVED),
         small=tolerance(SMALL),
         durations=f"{long_runs.DURATIONS:g}",
-        charts=libraries.pack(json.dumps(_charts(filter(None, drawn)), separators=(",", ":"))),
+        charts=libraries.pack(json.dumps(_charts([*figures.values(), *paper]), separators=(",", ":"))),
         libraries=libraries.packed(),
     )
 

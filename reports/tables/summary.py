@@ -87,12 +87,11 @@ def of_scene(
 ) -> Summary:
     """Return the summary of a scene: its points, drifts over long runs, failures (see `overview`), samples at each step."""
     found, data = with_classes(points), picture(points)
-    rows = [_with_sample(_row(kind, found, drifts, troubles), kind, each) for kind in MethodClass]
+    rows = [_row(kind, found, drifts, troubles) for kind in MethodClass]
+    if each is None or each.kept.empty:  # the report has no study of samples at each step
+        return Summary(_sentence(found, integrable), data, first_names(data), (HEADER, rows))
+    rows = [[*row[:-1], _sample(kind, each), row[-1]] for kind, row in zip(MethodClass, rows, strict=True)]
     return Summary(_sentence(found, integrable), data, first_names(data), (SCENE_HEADER, rows))
-
-
-def _with_sample(row: Row, kind: MethodClass, each: EachStep | None) -> Row:
-    return [*row[:-1], _sample(kind, each) if each else DASH, row[-1]]
 
 
 def _sample(kind: MethodClass, each: EachStep) -> str:

@@ -11,7 +11,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.charts import engines as picture
 from conservative.reports.cli.completion import engine_lists
 from conservative.reports.cli.options import split_list
-from conservative.reports.page import engines as section
+from conservative.reports.page import figures as section
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import differences, terms
@@ -116,7 +116,7 @@ def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend():
     assert scene.count == 3
     lines = {tuple(line) for line in scene.points[["name", "kind"]].itertuples(index=False)}
     assert lines == {("a==1", "at its best"), ("a==1", "as installed"), ("b==2", "at its best"), ("c==3", "at its best")}
-    (figure,) = section.figures((scene,), section.charts((scene,))).values()
+    figure = section.engine_figure(scene, picture.work_precision(scene.points, scene.name))
     assert [entry.name for entry in figure.legend] == ["a==1", "b==2", "c==3"]
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures import measurement, samples
-from conservative.reports.page import engines, page, scene_charts
+from conservative.reports.page import figures, page
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan
 from conservative.reports.run.provenance import provenance
@@ -29,9 +29,8 @@ def opened(tmp_path_factory):
     ]
     plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
     view = build(plan, Measurements(measurement.frame(rows), samples.frame([])), provenance([]))
-    charts = {scene.name: scene_charts.build(scene) for scene in view.scenes}
     file = tmp_path_factory.mktemp("page") / "index.html"
-    file.write_text(page.render(view, charts, engines.charts(view.engines)), encoding="utf-8")
+    file.write_text(page.render(view, figures.charts(view)), encoding="utf-8")
     with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
 

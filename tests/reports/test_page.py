@@ -10,7 +10,7 @@ import vl_convert
 from conservative import Reduced, Scene, scenes
 from conservative.reports.charts import figures, vega_embed
 from conservative.reports.page import figures as page_figures
-from conservative.reports.page import page, scene_charts
+from conservative.reports.page import page
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import lines
@@ -27,7 +27,7 @@ def text():
 
 def rendered(plan, source):
     view = build(plan, measurements(), source)
-    return page.render(view, {scene.name: scene_charts.build(scene) for scene in view.scenes}, {})
+    return page.render(view, page_figures.charts(view))
 
 
 class Outward(HTMLParser):
@@ -96,10 +96,10 @@ def test_chart_draws_its_lines_and_the_switch_takes_one_away():
 
 
 def test_legend_has_the_lines_of_the_charts():
-    (scene,) = build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance([])).scenes
-    found = page_figures.scene_figures(scene, scene_charts.build(scene))
-    assert [entry.name for entry in found.work_precision.legend] == ["reduced", "scipy"]
-    panels = found.drift.charts
+    view = build(plan_report(["brick_flip"], ["reduced"], quick=True), measurements(), provenance([]))
+    found = page_figures.page_figures(view, page_figures.charts(view))
+    assert [entry.name for entry in found["work_precision_brick_flip"].legend] == ["reduced", "scipy"]
+    panels = found["drift_brick_flip"].charts
     assert len(panels) == 1
     assert panels[0]["datasets"].popitem()[1].count("\n") == 2 * lines.THIN + 1
 

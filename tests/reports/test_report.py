@@ -30,7 +30,8 @@ def made(tmp_path_factory):
     """A real report, of one scene and three methods; the folder, and what the command said."""
     folder = tmp_path_factory.mktemp("made") / "report"
     methods = "reduced,mujoco:RK4,heyoka:tol=1e-9,frame=non_spinning"
-    done = CliRunner().invoke(main, ["report", "--quick", "--scenes", "brick_flip", "--methods", methods, "--out", str(folder)])
+    options = ["--quick", "--scenes", "brick_flip", "--methods", methods, "--out", str(folder)]
+    done = CliRunner().invoke(main, ["report", *options], env={"COLUMNS": "80"})
     assert done.exit_code == 0, done.output
     return folder, done
 
