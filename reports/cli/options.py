@@ -15,7 +15,7 @@ EXIT_CODES = """Exit codes:
     0    done
     1    a run failed, or the gate did not pass
     2    invalid command or input, or a missing engine or baseline
-    130  interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP; report and sweep keep what is finished for --resume
+    130  interrupted by Ctrl-C (143: SIGTERM, 129: SIGHUP); --resume continues report and sweep
 """
 
 
