@@ -12,6 +12,8 @@ from conservative.references.environments.lock import Source
 
 from .local_wheels import write_numpy, write_wheel
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def cache(no_environments):

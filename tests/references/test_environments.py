@@ -11,6 +11,8 @@ from conservative.references.environments.lock import Source, split_requirement
 
 from .local_wheels import write_numpy, write_sdist, write_wheel
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def cache(no_environments):

@@ -16,6 +16,8 @@ from conservative.references.exact.method import Exact
 from conservative.references.heyoka_equations import forms, formulations
 from conservative.references.precise import Precise
 
+pytestmark = pytest.mark.slow
+
 THREADS = 4
 METHODS = (
     *(Heyoka(1e-12, frame) for frame in ("body", "lean")),

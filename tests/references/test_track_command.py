@@ -61,6 +61,7 @@ def test_what_changed_between_versions_is_found_and_left_in_files(track, tmp_pat
     assert ElementTree.parse(tmp_path / "junit.xml").find("testsuite").get("failures") == "0"
 
 
+@pytest.mark.slow
 def test_the_newest_releases_are_taken_and_equal_ones_change_nothing(track, index, tmp_path):
     code, text, _ = track("--last", 1, "1.0", "--json")
     assert code == 0
@@ -83,6 +84,7 @@ def test_a_build_that_lost_an_order_exits_with_1(track, tmp_path):
     assert ElementTree.parse(tmp_path / "junit.xml").find("testsuite").get("failures") == "1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["segfault", "raise", "nan"])
 def test_a_build_that_fails_exits_with_1(fault, track, tmp_path):
     exit_code, text, _ = against(track, tmp_path, (fault, 4), "1.1")
@@ -90,6 +92,7 @@ def test_a_build_that_fails_exits_with_1(fault, track, tmp_path):
     assert "the outcome at dt = 0.01 s went from ok to " in text
 
 
+@pytest.mark.slow
 def test_a_build_that_is_as_good_or_better_exits_with_0(track, tmp_path):
     assert against(track, tmp_path, ("integrate", 4), "1.1")[0] == 0
     exit_code, text, _ = against(track, tmp_path, ("integrate", 4), "1.0")

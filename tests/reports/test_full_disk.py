@@ -10,6 +10,8 @@ from conservative.benchmarks.gate.results import Row
 
 from ..environments import run_python
 
+pytestmark = pytest.mark.slow
+
 LIMITED = """
 import os, resource, sys
 limit, folder = int(sys.argv.pop(1)), sys.argv.pop(1)
@@ -53,7 +55,6 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.rglob("*") if path.name != "stdout"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder, tmp_path_factory):
     limit, words, arguments = COMMANDS[command]
