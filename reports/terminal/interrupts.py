@@ -63,14 +63,18 @@ def _send_again(unraisable: Any) -> None:
 @contextmanager
 def unstoppable() -> Iterator[None]:
     """Make signals wait until the end of the block: for a few renames that belong together."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _NUMBERS)
+    # Blocking them in this thread is not enough: the system would hand them to another one.
+    waiting: list[int] = []
+    in_main_thread = threading.current_thread() is threading.main_thread()  # only there can handlers be set
+    handled = [number for number in _NUMBERS if in_main_thread and signal.getsignal(number) not in (None, signal.SIG_IGN)]
+    before = {number: signal.signal(number, lambda number, frame: waiting.append(number)) for number in handled}
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in waiting[:1]:
+            signal.raise_signal(number)
 
 
 def notes(error: BaseException) -> list[str]:
