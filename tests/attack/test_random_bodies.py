@@ -138,7 +138,7 @@ def check_conservation(found, method, grid, turn):
         assert (sizes(found.drift(invariant)) * (invariant.scale / size)).max() <= min(LOOSEST, bounds.drift), invariant.name
 
 
-@tries(600)
+@tries(1500)
 @given(seeds, methods)
 def test_a_run_that_is_called_ok_has_conserved_what_it_claims(seed, method):
     draw = np.random.default_rng(seed)
