@@ -14,6 +14,7 @@ coverage report. Results then differ by round-off, as products are not fused wit
 from __future__ import annotations
 
 import hashlib
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,22 @@ from ..files import write_text
 COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # made from the environment
 """Whether kernels are machine code; else they are plain Python."""
 
-kernel: Any = partial(njit, cache=True, error_model="numpy")
+
+def _can_cache() -> bool:
+    """Return whether numba finds a folder for compiled code that can be written; warn if not."""
+    try:
+        njit(cache=True)(_can_cache)
+    except RuntimeError:
+        said = "No folder for compiled kernels can be written, so every process compiles them again. Set NUMBA_CACHE_DIR."
+        warnings.warn(said, RuntimeWarning, stacklevel=2)
+        return False
+    return True
+
+
+CACHED = COMPILED and _can_cache()
+"""Whether compiled code is kept for the next process."""
+
+kernel: Any = partial(njit, cache=CACHED, error_model="numpy")
 """The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""
 
 SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
@@ -58,5 +74,5 @@ def _drop_stale_code(cache: Path, sources: Path) -> None:
     write_text(stamp, digest, "NUMBA_CACHE_DIR")
 
 
-if COMPILED:
+if CACHED:
     _drop_stale_code(Path(kernel(lambda: None).stats.cache_path), Path(__file__).parent)

@@ -9,6 +9,8 @@ from conservative.kernels import projected
 from conservative.methods.coefficients.explicit import DORMAND_PRINCE_8
 from conservative.methods.projected import convert
 
+from ..environments import run_python
+
 TURN = rotation_about((1, -2, 0.5), 1.1)
 START = rotation_about((0.3, -0.5, 0.8), 0.7)
 SYMMETRIC = cv.Scene(
@@ -55,3 +57,16 @@ def test_a_step_that_is_left_off_its_invariants_is_a_failure(defect, done, monke
     found = march(convert(HEAVY, cv.Projected())[2], coefficients, (3, 1, 0, np.empty((4, 4)), np.empty((4, 3))))
     assert found.done == done
     assert found.size == pytest.approx(defect, nan_ok=True)
+
+
+@pytest.mark.slow
+def test_without_a_folder_for_compiled_code_a_run_works_and_warns():
+    code = (
+        "import warnings, conservative as cv\n"
+        "with warnings.catch_warnings(record=True) as told:\n    warnings.simplefilter('always')\n"
+        "    print(cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, 'reduced').ok)\n"
+        "print(['NUMBA_CACHE_DIR' in str(each.message) for each in told])"
+    )
+    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "NUMBA_CACHE_DIR": "/dev/null/nowhere"}
+    status, out, error = run_python(code, **nowhere)
+    assert (status, out) == (0, "True\n[True]\n"), error
