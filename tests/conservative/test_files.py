@@ -137,20 +137,20 @@ def test_a_full_device_is_named():
         files.write_text(Path("/dev/full"), "anything", "csv")
 
 
-def holding(target):
+def holding(start, target):
     """Return a process that is in the middle of writing a file."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen([sys.executable, "-c", HOLDING, target], stdout=subprocess.PIPE, text=True, env=environment)
+    process = start([sys.executable, "-c", HOLDING, target], stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout.readline() == "writing\n"
     return process
 
 
-def test_what_a_kill_left_goes_with_the_next_writing_and_what_lives_stays(tmp_path):
+def test_what_a_kill_left_goes_with_the_next_writing_and_what_lives_stays(tmp_path, start):
     target = tmp_path / "run.csv"
-    with holding(target) as dead:
+    with holding(start, target) as dead:
         dead.kill()
     (left,) = names(tmp_path)
-    with holding(target) as alive:
+    with holding(start, target) as alive:
         assert left not in names(tmp_path)
         (live,) = names(tmp_path)
         files.write_text(target, "whole", "csv")

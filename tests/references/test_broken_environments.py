@@ -78,27 +78,26 @@ INSTALL = (
 )
 
 
-def start_install(wheels):
+def start_install(start, wheels):
     command = [sys.executable, "-c", INSTALL, str(wheels)]
     path = os.pathsep.join([str(ROOT), *sys.path])
-    return subprocess.Popen(
+    return start(
         command,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=variables(PYTHONPATH=path),
         text=True,
-        start_new_session=True,
     )
 
 
-def test_a_kill_leaves_nothing_half_installed(cache, wheels):
-    start = time.monotonic()
-    process = start_install(wheels)
+def test_a_kill_leaves_nothing_half_installed(cache, wheels, start):
+    began = time.monotonic()
+    process = start_install(start, wheels)
     assert process.communicate(timeout=120)[0] == "start\nwhole\n"
-    duration, whole = time.monotonic() - start, 0
+    duration, whole = time.monotonic() - began, 0
     for part in (0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
         install.remove("trial")
-        process = start_install(wheels)
+        process = start_install(start, wheels)
         time.sleep(part * duration)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate(timeout=60)

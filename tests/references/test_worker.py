@@ -228,10 +228,10 @@ time.sleep(600)
 
 
 @pytest.mark.parametrize("how", ["idle", "busy"])
-def test_the_process_does_not_outlive_a_parent_that_is_killed(how):
-    with subprocess.Popen([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, text=True) as parent:
-        process = psutil.Process(int(parent.stdout.readline()))
-        time.sleep(0.5)
-        parent.kill()
+def test_the_process_does_not_outlive_a_parent_that_is_killed(how, start):
+    parent = start([sys.executable, "-c", ORPHAN, how], stdout=subprocess.PIPE, text=True)
+    process = psutil.Process(int(parent.stdout.readline()))
+    time.sleep(0.5)
+    parent.kill()
     gone, _ = psutil.wait_procs([process], timeout=LONG)
     assert gone == [process]

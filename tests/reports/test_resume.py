@@ -16,6 +16,8 @@ from conservative.reports.run.measure import measure
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 
+from ..environments import programs
+
 pytestmark = pytest.mark.slow
 
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
@@ -24,19 +26,20 @@ HANG = 600
 """Time, s, after which a process hangs for sure."""
 
 
-def started(arguments, folder):
+def started(start, arguments, folder):
     code = [sys.executable, "-c", "from conservative.reports.cli.launch import launch; launch()"]
-    return subprocess.Popen([*code, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return start([*code, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def stopped(arguments, folder, number, ready):
     """Start a command, send it a signal once `ready`, and return its exit code, stdout and stderr."""
-    process = started(arguments, folder)
-    end = time.monotonic() + HANG
-    while not ready() and process.poll() is None and time.monotonic() < end:
-        time.sleep(0.005)
-    process.send_signal(number)
-    out, err = process.communicate(timeout=HANG)
+    with programs() as start:
+        process = started(start, arguments, folder)
+        end = time.monotonic() + HANG
+        while not ready() and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.005)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=HANG)
     return process.returncode, out, err
 
 
@@ -62,8 +65,9 @@ def resumed(tmp_path_factory):
     earlier = {path.name: path.read_text() for path in (folder / "report").iterdir()}
     content = json.loads(kept.read_text())
     again = shlex.split(err.partition("go on with: ")[2])
-    done = started(again[1:], folder)
-    said = done.communicate(timeout=HANG)
+    with programs() as start:
+        done = started(start, again[1:], folder)
+        said = done.communicate(timeout=HANG)
     return folder, (code, out, err), left, earlier, content, again, (done.returncode, *said)
 
 
