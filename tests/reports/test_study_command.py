@@ -27,7 +27,7 @@ RANDOM = ("study", "random", "--bodies", "2", "--seed", "7", "--methods", "proje
 
 
 def conservative(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+    return CliRunner(env={"COLUMNS": "200"}).invoke(main, [str(argument) for argument in arguments])
 
 
 @pytest.fixture
