@@ -18,11 +18,6 @@ def test_own():
 def test_plain():
     pass
 """
-TIMED = """
-def test_timed(benchmark):
-    benchmark.extra_info.update(scene="numbers", method="sum", error=1e-9, spreads={"error": 1e-12})
-    benchmark(sum, range(100))
-"""
 CONFTEST = "import benchmarks\n\nassert benchmarks.OWNER == 'this project'\n"
 RUNS = {
     "pytest": (["pytest"], {}),
@@ -72,19 +67,6 @@ def test_our_command_line_does_not_take_its_packages(with_us, project):
     code, text = with_us.run(["conservative", "list"], project, PYTHONPATH=".")
     assert code == 0, text
     assert "brick_flip" in text
-
-
-def test_its_benchmarks_are_gated(with_us, project):
-    (project / "tests" / "test_timed.py").write_text(TIMED)
-    gated = ["python", "-m", "pytest", "--benchmark", "--gate", "--benchmark-max-time=0.001", "tests"]
-    code, text = with_us.run(gated, project)
-    assert code == 2, text
-    assert "no baseline" in text
-    code, text = with_us.run(["conservative", "gate", "--update", "First"], project, PYTHONPATH=".")
-    assert code == 0, text
-    code, text = with_us.run(gated, project)
-    assert code == 0, text
-    assert "gate: passed, 1 rows" in text
 
 
 def test_our_suite_runs_beside_its_packages(with_us, project):

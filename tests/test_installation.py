@@ -92,15 +92,6 @@ def test_a_room_has_one_name(room):
     assert (code, out.strip()) == (0, f"conservative.{room}"), error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("room", ROOMS)
-def test_the_package_of_another_project_comes_first(room, tmp_path):
-    (tmp_path / room).mkdir()
-    (tmp_path / room / "__init__.py").write_text("OWNER = 'another project'\n")
-    code, out, error = run_python(f"import {room}; print({room}.OWNER)", PYTHONPATH=f"{tmp_path}:{ROOT}")
-    assert (code, out.strip()) == (0, "another project"), error
-
-
 EVERYTHING = """
 import importlib, pkgutil, sys
 from pathlib import Path

@@ -81,18 +81,11 @@ class Slow(Foreign):
 class Harmful(Foreign):
     """What does harm in the way that `how` says."""
 
-    how: str = "nan"
+    how: str = "hang"
     family: ClassVar[str] = "foreign_harm"
 
     def prepare(self, scene: cv.Scene, grid: Grid) -> Run:
         return lambda: getattr(self, self.how)(scene, grid)
-
-    def nan(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
-        n = grid.n_samples
-        return cv.Trajectory(scene, grid.t, np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), self.label)
-
-    def short(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
-        return cv.Trajectory(scene, grid.t[:2], np.stack([scene.R_WB0] * 2), np.stack([scene.w_WB_B0] * 2), self.label)
 
     def hang(self, scene: cv.Scene, grid: Grid) -> cv.Trajectory:
         while True:

@@ -1,25 +1,118 @@
+"""The studies of stability and of hard cases."""
+
 import math
+import time
 from functools import cache
+from typing import ClassVar
 
 import numpy as np
+import pytest
 
 import conservative as cv
 from conservative import registry
+from conservative.attitude import rotation_about
 from conservative.benchmarks.measures import errors
-from conservative.benchmarks.measures.measure import key
-from conservative.benchmarks.studies import hard_cases, selection, studies
+from conservative.benchmarks.measures.measure import Measure, key
+from conservative.benchmarks.studies import hard_cases, selection, stability, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
-from conservative.outcome import OutcomeKind
+from conservative.outcome import OK, OutcomeKind
 from conservative.references.exact.method import Exact
-from conservative.references.truth import Truth
+
+from .generic_study import TURN, truth
+
+KINDS = ("not converged", "wrong branch", "diverged", "timeout", "unsupported", "crashed")
+AXIS = cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, 0, 2.0), 2.0)
+"""A spin about the middle axis, whose branch of solutions ends at |w| dt = 4.16."""
+
+
+def rows(*methods, scene=AXIS):
+    study = Study("stability", (scene,), methods, truth=truth)
+    return {(row.method, row.measure): row for row in studies.rows(study)}
+
+
+class Staged(cv.Method):
+    """A method that goes wrong in the way `how` from a step of |w| dt = 1 on."""
+
+    how: ClassVar[str]
+    family: ClassVar[str] = "staged"
+    role: ClassVar[Role] = Role.ENGINE
+
+    @property
+    def name(self):
+        return self.how
+
+    @property
+    def order(self):
+        return 2
+
+    def prepare(self, scene, grid):
+        if grid.dt * 2.0 < 0.99:
+            return cv.Reduced().prepare(scene, grid)
+        if self.how == "unsupported":
+            raise cv.BadInput("dt", grid.dt, "a shorter step")
+        good = Exact().prepare(scene, grid)()
+        R, w = good.R_WB.copy(), good.w_WB_B.copy()
+        failure = None
+        if self.how == "wrong branch":
+            R[1] = rotation_about((0, 0, 1), -1.5) @ R[0]
+        elif self.how == "diverged":
+            w[3:] *= 1.5
+        elif self.how == "not converged":
+            failure = cv.NotConverged(3, 1.0, 0.5)
+
+        def run():
+            if self.how == "crashed":
+                raise RuntimeError("planted")
+            if self.how == "timeout":
+                time.sleep(60)
+            return cv.Trajectory(scene, grid.t, R, w, self.label, failure=failure)
+
+        return run
+
+
+def staged(how):
+    return type("Planted", (Staged,), {"how": how})()
+
+
+@pytest.mark.parametrize("how", KINDS)
+def test_every_kind_of_failure_is_named(how, monkeypatch):
+    monkeypatch.setattr(stability, "LIMIT", 5.0)
+    found = rows(staged(how))
+    assert found[how, Measure.LONGEST_STEP].value == pytest.approx(0.7)
+    assert found[how, Measure.LONGEST_STEP].outcome == OK
+    assert found[how, Measure.FAILING_STEP].value == pytest.approx(1.0)
+    assert found[how, Measure.FAILING_STEP].outcome.kind == how
+
+
+def test_our_own_verdict_is_taken():
+    found = rows(cv.Reduced(), cv.Substepped())
+    assert found["reduced", Measure.LONGEST_STEP].value == pytest.approx(4.0)  # the branch ends at 4.16
+    assert found["reduced", Measure.FAILING_STEP].outcome.kind is OutcomeKind.WRONG_BRANCH
+    assert found["reduced", Measure.FAILING_STEP].outcome.reason == "no continuous solution"
+    assert found["substepped", Measure.LONGEST_STEP].value == pytest.approx(10.0)
+    assert found["substepped", Measure.FAILING_STEP].outcome == OK
+    assert math.isnan(found["substepped", Measure.FAILING_STEP].value)
+
+
+def test_methods_without_a_step_have_no_row():
+    assert rows(cv.MoserVeselov()) == {}
+
+
+def test_a_body_at_rest_is_measured_in_its_own_steps():
+    field = cv.UniformGravity(3.0, TURN.T @ (0, 0, -0.2))  # hanging straight down, to round-off
+    rest = cv.Scene("rest", cv.RigidBody((2, 2, 2)), TURN, (0, 0, 0), 1.0, field, dt=0.01)
+    assert rows(cv.Reduced(), scene=rest)["reduced", Measure.LONGEST_STEP].value == pytest.approx(10.0)
+
+
+def test_the_scenes_of_the_study_are_registered():
+    study = studies.list_hard_studies((cv.Reduced(),))[0]
+    assert tuple(scene.name for scene in study.scenes) == stability.SCENES
+    assert np.all(np.diff(stability.STEP_SIZES) > 0)
+    assert (stability.UNIT * stability.STEP_SIZES[0], stability.UNIT * stability.STEP_SIZES[-1]) == pytest.approx((0.1, 10.0))
+
 
 METHODS = (cv.Reduced(), cv.Lame(), registry.method("mujoco:RK4"))
-
-
-@cache
-def truth(scene, grid):
-    return Truth(Exact().prepare(scene, grid)(), 2e-15, ("exact", "other"), scene.t_end)
 
 
 @cache

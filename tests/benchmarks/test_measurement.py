@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.measures.measure import Measure, Value, blanks, key
+from conservative.benchmarks.measures.measure import Measure, Value, blanks
 from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame, from_flat, outcome_of
 from conservative.benchmarks.measures.samples import Samples
 from conservative.method import Role
@@ -74,21 +74,11 @@ def test_a_record_of_something_else_is_refused(change):
         from_flat(measurement.flat(ROW) | change)
 
 
-def test_rows_are_frozen():
-    with pytest.raises(AttributeError):
-        ROW.value = 2.0
-
-
 def test_every_measure_is_found_by_its_text():
     assert [Measure.from_text(measure.text) for measure in Measure] == list(Measure)
     assert len({measure.text for measure in Measure}) == len(Measure)
     with pytest.raises(KeyError):
         Measure.from_text("energy drift max")
-
-
-def test_a_drift_is_called_by_its_quantity():
-    assert key(Measure.DRIFT_MAX, "energy") == Value(Measure.DRIFT_MAX, 1.0, "energy").key == "energy drift max"
-    assert key(Measure.ATTITUDE_MAX) == "attitude error max"
 
 
 def test_samples_survive_json():

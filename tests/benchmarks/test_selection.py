@@ -1,11 +1,23 @@
+"""Scenes, methods and engines by name: what a name stands for, and engines that are not installed."""
+
 import re
+from dataclasses import dataclass
+from typing import ClassVar
 
 import pytest
 
 from conservative import BadInput, MissingEngine, Reduced, registry
-from conservative.benchmarks.studies import selection
+from conservative.benchmarks.studies import engine_selection, selection
+from conservative.benchmarks.studies.case import Case, attempt
+from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
+from conservative.benchmarks.studies.method_names import drop_tolerance, names_of
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
-from conservative.method import Grid
+from conservative.method import Grid, Method, Role, grid_for
+from conservative.outcome import OutcomeKind
+from conservative.references.environments.environment import Environment
+from conservative.references.environments.failures import MissingEnvironment
+
+from .generic_study import SCENE
 
 BRICK = registry.scene("brick_flip")
 
@@ -87,3 +99,120 @@ def test_ids_are_different_and_have_no_odd_characters():
     found = [identifier(scene, method, 0.01) for scene in selection.scenes() for method in methods()]
     assert len(set(found)) == len(found)
     assert all(re.fullmatch(r"[\w.+-]+", text) for text in found)
+
+
+@pytest.fixture(autouse=True)
+def nothing_in_environments(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def test_an_engine_beside_us_stands_for_all_its_settings():
+    found = select_engines(["pinocchio"])
+    assert [method.name for method in found] == ["pinocchio:scheme=Euler", "pinocchio"]
+
+
+def test_all_are_those_beside_us_where_no_environment_is_there():
+    families = {method.family for method in select_engines(["all"])}
+    assert {"mujoco", "pinocchio", "heyoka", "scipy"} <= families
+    assert not families & {"reduced", "exact", "exudyn"}
+
+
+def test_all_take_the_newest_environment_and_none_of_what_is_beside_us(monkeypatch, tmp_path):
+    here = select_engines(["mujoco"])[0].label.partition("/")[0].partition("==")[2]
+    made = [("exudyn", "1.9"), ("exudyn", "1.10"), ("mujoco", here), ("unregistered", "1.0")]
+    environments = tuple(Environment(*each, tmp_path, "3.11", ()) for each in made)
+    monkeypatch.setattr(engine_selection, "list_environments", lambda: environments)
+    found = list_installed()
+    assert found[-1] == "exudyn==1.10"
+    assert sum(name.startswith("mujoco") for name in found) == 1
+    monkeypatch.setattr(engine_selection, "list_environments", lambda: (Environment("mujoco", "0.1", tmp_path, "3.11", ()),))
+    assert list_installed()[-1] == "mujoco==0.1"
+
+
+@pytest.mark.parametrize("name", ["exudyn", "exudyn==1.2.3", "mujoco==3.6.0"])
+def test_an_engine_without_an_environment_is_an_error_with_the_line_that_installs_it(name):
+    with pytest.raises(MissingEngine, match=f"conservative engines install {name}$"):
+        select_engines([name])
+
+
+def test_a_missing_engine_is_a_row_where_it_is_asked_for():
+    (found,) = select_engines(["exudyn==1.2.3"], skip_missing=True)
+    assert isinstance(found, Missing)
+    assert found.label == "exudyn==1.2.3"
+    case = Case("engines_at_one_step", SCENE, found, grid_for(SCENE, 0.02))
+    outcome = attempt(case, skip_missing=True).outcome
+    assert outcome.kind is OutcomeKind.MISSING
+    assert outcome.reason.endswith("conservative engines install exudyn==1.2.3")
+    with pytest.raises(MissingEnvironment):
+        attempt(case)
+
+
+@pytest.mark.parametrize("name", ["exudin", "reduced", "exact", "pinocchio==4.0", "exudyn:RK44", "exudyn==", "", "a;b"])
+def test_a_name_that_is_no_engine_is_bad_input(name):
+    with pytest.raises(BadInput):
+        select_engines([name])
+
+
+def test_no_setting_is_as_installed_where_the_engine_does_not_say_so():
+    assert not any(is_as_installed(method) for method in select_engines(["scipy"]))
+    assert not is_as_installed(Missing("mujoco", "MuJoCo", "mujoco"))
+
+
+@dataclass(frozen=True)
+class Adaptive(Method):
+    """A method of another package, without a label of its own."""
+
+    stol: int = 3
+    tol: float = 1e-6
+
+    family: ClassVar[str] = "adaptive"
+    role: ClassVar[Role] = Role.ENGINE
+
+    @property
+    def label(self):
+        return f"theirs==1.0/{self.name}"
+
+    @property
+    def order(self):
+        return None
+
+    def prepare(self, scene, grid):
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize(
+    ("method", "parts", "of_series"),
+    [
+        ("reduced", ("reduced", "", ""), ""),
+        ("reduced:order=4", ("reduced", "", "order=4"), "order=4"),
+        ("convected:tol=1e-12", ("convected", "", "tol=1e-12"), "tol=1e-12"),  # the tolerance of its iteration
+        ("exact", ("exact", "", ""), ""),
+        ("mujoco:Euler", ("mujoco", "VERSION", "Euler"), "Euler"),
+        ("heyoka:1e-6", ("heyoka", "VERSION", "tol=1e-06,body"), "body"),
+        ("scipy:rtol=1e-9", ("scipy", "VERSION", "DOP853,rtol=1e-09"), "DOP853"),
+        ("pinocchio:RK4", ("pinocchio", "VERSION", "aba+RK4"), "aba+RK4"),
+    ],
+)
+def test_the_parts_of_a_name(method, parts, of_series):
+    value = registry.method(method)
+    found = names_of(value)
+    version = value.label.partition("==")[2].partition("/")[0]
+    assert (found.family, found.version, found.setting) == tuple(version if part == "VERSION" else part for part in parts)
+    assert found.series_setting == of_series
+    assert (found.method, found.label) == (value.name, value.label)
+
+
+def test_a_method_of_another_package_has_its_version_and_its_name_once():
+    found = names_of(Adaptive(stol=4, tol=1e-9))
+    assert (found.family, found.version, found.setting) == ("adaptive", "1.0", "stol=4,tol=1e-09")
+    assert (found.series, found.series_setting) == ("adaptive:stol=4", "stol=4")
+
+
+def test_only_the_tolerance_is_dropped():
+    assert drop_tolerance(Adaptive(), "stol=3,tol=1e-06,x") == "stol=3,x"
+
+
+def test_a_method_whose_engine_is_missing_is_called_as_it_was_asked_for():
+    found = names_of(Missing("mujoco:RK4", "MuJoCo", "mujoco"))
+    assert (found.family, found.version, found.setting) == ("mujoco", "", "RK4")
+    assert found.label == "mujoco:RK4"

@@ -1,4 +1,4 @@
-"""Studies and recommendations beside engines that are slow, hang, lie or end their process."""
+"""Studies beside engines that are slow, hang, lie or end their process: limits of time, and what they end."""
 
 import math
 import threading
@@ -13,11 +13,15 @@ from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import convergence, studies, study
 from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
+from conservative.benchmarks.studies.convergence import FEWEST_POINTS, fits
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
+from conservative.benchmarks.studies.work_precision import points
 from conservative.method import Grid, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
+from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
+from conservative.references.engines.scipy import SciPy
 from conservative.references.environments.client import close_workers
 
 from .foreign_engines import Fast, Harmful, Slow
@@ -169,3 +173,22 @@ def test_the_limits_of_a_study():
     assert limits[False].hang_limit == 60.0
     given = Study("speed", (SCENE,), (cv.Reduced(),), time_limit=10.0)
     assert (given.longest_run, given.hang_limit) == (10.0, 100.0)
+
+
+def test_a_run_ends_early_where_it_would_take_ten_times_the_limit_alone():
+    assert limit_reason(PACE_STEPS, PACE_STEPS / (9 * STEP_LIMIT)) == ""
+    assert "out of reach" in limit_reason(PACE_STEPS, PACE_STEPS / (11 * STEP_LIMIT))
+
+
+@pytest.mark.parametrize("made", range(2 * FEWEST_POINTS))
+def test_a_slow_method_gets_the_fewest_points_and_no_more(made):
+    study = Study("any", (SCENE,), (cv.Reduced(),), truth=truth)
+    slow = 1.1 * study.longest_run
+    assert fits(study, [1e-3] * made, slow) == (made < FEWEST_POINTS)
+
+
+def test_a_line_of_tolerances_goes_from_cheap_to_dear():
+    study = Study("any", (SCENE,), (SciPy(),), truth=truth)
+    tolerances = [case.method.rtol for case in points(study, SCENE, SciPy())]
+    assert tolerances == sorted(tolerances, reverse=True)
+    assert len(set(tolerances)) == len(tolerances) > 3

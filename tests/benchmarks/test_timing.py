@@ -42,21 +42,10 @@ def test_the_first_call_is_not_counted(rest):
     assert found.minimum == found.median == pytest.approx(1e-3, rel=1e-5)  # measured 1e-6: one reading of the clock
 
 
-def test_fast_runs_are_repeated_within_a_sample(rest):
-    assert count_calls(lambda: rest(1e-6), 1e-3) == 1000
-    assert count_calls(lambda: rest(2e-3), 1e-3) == 1
-
-
 def test_minimum_and_median_of_the_rounds(rest):
     rests = iter([1e-3, 1e-3, 5e-3, 2e-3, 3e-3, 9e-3, 4e-3])  # two before the rounds, to see how many calls make a sample
     found = time_interleaved({"run": lambda: rest(next(rests))}, rounds=5, min_time=1e-3)["run"]
     assert (found.minimum, found.median) == pytest.approx((2e-3, 4e-3), rel=1e-3)
-
-
-def test_a_run_over_its_budget_gets_three_rounds(rest):
-    runs = {"slow": lambda: rest(5e-3), "fast": lambda: rest(1e-6)}
-    timings = time_interleaved(runs, rounds=8, min_time=1e-4, budget=1e-3)
-    assert (timings["slow"].rounds, timings["fast"].rounds) == (3, 8)
 
 
 def test_a_budget_is_of_all_calls_of_a_sample(rest):
@@ -64,7 +53,7 @@ def test_a_budget_is_of_all_calls_of_a_sample(rest):
     assert (found.rounds, found.calls) == (5, 1000)
 
 
-@pytest.mark.parametrize(("each", "calls"), [(0.0009, 12), (0.0011, 10)])
+@pytest.mark.parametrize(("each", "calls"), [(1e-5, 1000), (0.0009, 12), (0.0011, 10), (0.02, 1)])
 def test_calls_double_while_too_short_to_be_trusted(rest, each, calls):
     """A sample of less than a tenth says little: twice as many then; else as many as are wanted."""
     assert count_calls(lambda: rest(each), 0.01) == calls

@@ -12,7 +12,6 @@ from conservative.benchmarks.comparison.times import (
     Clock,
     Timed,
     compare_times,
-    last_a_sample,
     ratio_of,
     settle,
 )
@@ -123,18 +122,3 @@ def test_of_one_process_there_is_no_interval():
         ratio = ratio_of(times)
         assert math.isnan(ratio.value)
         assert not ratio.slower
-
-
-@pytest.mark.parametrize(("step", "expected"), [(2.4e-5, 16), (0.9 * 4e-4, 16), (2e-5, 20), (0.0, 2**22)])
-def test_a_run_lasts_a_sample(step, expected):
-    class Steps:
-        def __init__(self, n):
-            self.n = n
-
-        def __call__(self):
-            return None
-
-        def wall_time(self, calls):
-            return calls * step * self.n
-
-    assert last_a_sample(Steps)[0] == expected

@@ -1,17 +1,80 @@
-"""A version of a project out of a git ref, a folder or a wheel, and the environment that is kept of it."""
+"""Versions of a project out of a git ref, a folder or a wheel, and two commits of one that the command compares."""
+
+import json
+import os
+import subprocess
 
 import pytest
+from click.testing import CliRunner
 
+from conservative.benchmarks.comparison import version
 from conservative.benchmarks.comparison.version import install_version
 from conservative.errors import BadInput
-from conservative.references.environments import projects as environments
-from conservative.references.environments.environment import folder_of_projects
+from conservative.references.environments import projects
+from conservative.references.environments.environment import Environment, folder_of_projects
 from conservative.references.environments.lock import Source
+from conservative.reports.cli.main import main
 
+from ...environments import ROOT
+from ...environments import Environment as WheelEnvironment
 from ...references.local_wheels import write_numpy, write_wheel
-from .projects import commit, git, write_project
 
 pytestmark = pytest.mark.slow
+
+PROJECT = """[build-system]
+requires = []
+build-backend = "backend"
+backend-path = ["."]
+[project]
+name = "{name}"
+version = "1.0"
+"""
+BACKEND = '''"""Builds a wheel of the one module that stands beside it."""
+import pathlib, zipfile
+
+NAME, MODULE, ENTRY = "{name}", "{module}", "{entry}"
+INFO = f"{{NAME}}-1.0.dist-info"
+
+
+def build_wheel(folder, settings=None, metadata=None):
+    files = {{
+        f"{{MODULE}}.py": pathlib.Path(f"{{MODULE}}.py").read_text(),
+        f"{{INFO}}/METADATA": f"Metadata-Version: 2.1\\nName: {{NAME}}\\nVersion: 1.0\\n",
+        f"{{INFO}}/WHEEL": "Wheel-Version: 1.0\\nGenerator: tests\\nRoot-Is-Purelib: true\\nTag: py3-none-any\\n",
+        f"{{INFO}}/entry_points.txt": ENTRY,
+    }}
+    files[f"{{INFO}}/RECORD"] = "".join(f"{{name}},,\\n" for name in [*files, f"{{INFO}}/RECORD"])
+    wheel = f"{{NAME}}-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(pathlib.Path(folder) / wheel, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(zipfile.ZipInfo(name), text)
+    return wheel
+'''
+
+
+def write_project(folder, name, module, code, entry=""):
+    """Write a project of one module."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "pyproject.toml").write_text(PROJECT.format(name=name))
+    (folder / "backend.py").write_text(BACKEND.format(name=name.replace("-", "_"), module=module, entry=entry))
+    (folder / f"{module}.py").write_text(code)
+
+
+def commit(folder, message="change"):
+    """Commit all files of a folder, in a repository that is made where there is none; return the commit."""
+    if not (folder / ".git").exists():
+        git(folder, "init", "--quiet", "--initial-branch=main")
+    git(folder, "add", "--all")
+    git(folder, "commit", "--quiet", "--message", message)
+    return git(folder, "rev-parse", "HEAD")
+
+
+def git(folder, *arguments):
+    who = {f"GIT_{role}_{what}": "somebody@example.org" for role in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    command = ["git", "-C", str(folder), *arguments]
+    return subprocess.run(command, env=kept | who, check=True, capture_output=True, text=True, timeout=60).stdout.strip()
+
 
 NAME, MODULE = "made-up-integrator", "conservative"
 """Its module is called as the package that environments of projects have to have."""
@@ -58,8 +121,8 @@ def test_a_ref_is_what_was_committed(project, source):
 
 def test_an_environment_is_made_once_for_a_commit(project, source, monkeypatch):
     first = install_version("first", project, source)
-    monkeypatch.setattr(environments, "build_wheel", None)
-    monkeypatch.setattr(environments, "make", None)
+    monkeypatch.setattr(projects, "build_wheel", None)
+    monkeypatch.setattr(projects, "make", None)
     assert install_version(first.commit, project, source).environment == first.environment
     assert first.environment.folder.name == first.commit
 
@@ -93,7 +156,7 @@ def test_a_wheel(project, source, tmp_path):
 
 
 def test_the_oldest_environments_go(project, source, monkeypatch):
-    monkeypatch.setattr(environments, "KEPT", 2)
+    monkeypatch.setattr(projects, "KEPT", 2)
     for value in range(3):
         (project / f"{MODULE}.py").write_text(f"VALUE = {value}\n")
         last = install_version(str(project), project, source)
@@ -118,3 +181,81 @@ def test_a_wheel_with_another_name_is_refused(tmp_path, source):
     (tmp_path / "wheel.whl").write_bytes(b"")
     with pytest.raises(BadInput, match="allowed: the name that a wheel has"):
         install_version(str(tmp_path / "wheel.whl"), tmp_path, source)
+
+
+EXAMPLE = ROOT / "tests" / "example_package" / "example_integrator.py"
+ENTRY = "[conservative.methods]\\nexample = example_integrator:Example\\n"
+STEP = "middle = w + h / 2 * inverse @ (hat(J @ w) @ w)"
+OPTIONS = ("--scenes", "brick_flip:t_end=1", "--methods", "example", "--processes", "3")
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    """The project at its first commit."""
+    folder = tmp_path_factory.mktemp("project")
+    write_project(folder, "example-integrator", "example_integrator", EXAMPLE.read_text(), ENTRY)
+    commit(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def install(wheel, tmp_path_factory):
+    """What makes an environment of a wheel out of what is installed here, with us, from a wheel as well."""
+    home, made = tmp_path_factory.mktemp("environments"), {}
+
+    def environment_of(wheel_of_project, requirements, source):
+        key = wheel_of_project.parent.name
+        if key not in made:
+            made[key] = WheelEnvironment.create(home / key, wheel)
+            made[key]._install(wheel_of_project)
+        return Environment("example-integrator", key, made[key].folder, "3", ())
+
+    return environment_of
+
+
+@pytest.fixture
+def gate(example, install, tmp_path, monkeypatch):
+    """Return exit code and answer of the command, for the example with its module changed."""
+    monkeypatch.setattr(version, "environment_of", install)
+
+    def run(before, after):
+        text = EXAMPLE.read_text()
+        assert before in text
+        (example / "example_integrator.py").write_text(text.replace(before, after))
+        done = CliRunner().invoke(main, ["gate", "--against", "HEAD", "--project", str(example), *OPTIONS, "--json"])
+        assert done.exit_code in (0, 1), done.output
+        return done.exit_code, json.loads(done.stdout)
+
+    return run
+
+
+def measures(answer):
+    return {each["measure"] for each in answer["violations"]}
+
+
+def test_a_change_of_a_comment_passes(gate):
+    code, answer = gate("for free bodies only.", "for free bodies alone.")
+    assert (code, answer["violations"]) == (0, [])
+    (row,) = answer["rows"]
+    assert row["is"]["values"] == row["was"]["values"]
+    assert row["is"]["values"]["observed order"] == pytest.approx(2, abs=0.1)
+    assert row["time"]["first"]["processes"] >= 3
+
+
+def test_a_step_of_another_order_fails(gate):
+    code, answer = gate(STEP, "middle = w")
+    assert code == 1
+    assert {"attitude error max", "energy drift max", "observed order"} <= measures(answer)
+
+
+def test_a_slower_step_fails(gate):
+    # About twice the work: three processes of each are enough for that on a busy machine.
+    code, answer = gate(STEP, f"{STEP}\n                for _ in range(12):\n                    hat(w)")
+    assert (code, measures(answer)) == (1, {"time of a step"})
+    assert answer["rows"][0]["time"]["again"]["low"] > 1.05
+
+
+def test_a_step_that_raises_fails(gate):
+    code, answer = gate(STEP, "raise ZeroDivisionError('no step')")
+    assert (code, measures(answer)) == (1, {"row"})
+    assert any("ZeroDivisionError: no step" in note for note in answer["notes"])

@@ -1,0 +1,391 @@
+"""A baseline, its file and its limits; each way in which a run can be worse than it; and the command."""
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import conservative as cv
+from conservative.attitude import rotation_about
+from conservative.benchmarks.gate import baseline, compare, results
+from conservative.benchmarks.gate.baseline import Allowed, limit
+from conservative.benchmarks.gate.results import Results, Row, Status
+from conservative.benchmarks.suite import points
+from conservative.errors import BadInput
+from conservative.registry import method, scene
+from conservative.reports.cli.main import main
+
+ROW = Row(
+    "file.py::test[a]",
+    "brick",
+    "reduced",
+    Status.PASSED,
+    "",
+    "hash",
+    {"energy drift max": 1e-3, "observed order": 2.0, "iterations": 30.0},
+    {"energy drift max": 1e-5, "observed order": 0.001},
+)
+RUN = Results("here", {ROW.id: ROW}, "abc")
+KEPT = baseline.update_baseline(None, [RUN], "first")
+OTHER = Row("file.py::test[b]", "top", "gauss", Status.PASSED, "heyoka==7", "other", {"rate error max": 1.0})
+
+
+def changed(row=ROW, **changes):
+    """The run with its row changed; a change of `values` is merged into those it has."""
+    if "values" in changes:
+        changes["values"] = {**row.values, **changes["values"]}
+    return Results("here", {row.id: replace(row, **changes)}, "abc")
+
+
+BRICK = scene("brick_flip:t_end=1")
+METHODS = SECOND, FOURTH, ENGINE = "reduced", "reduced:order=4", "mujoco:Euler"
+
+
+def measured(name, instead=None):
+    """The row of a method on the brick; with `instead`, measured with another one that goes by its name."""
+    point = points.Point(BRICK, method(name))
+    found = points.measure(replace(point, method=instead or point.method))
+    values, spreads = ({key: getattr(each, kind) for key, each in found.items()} for kind in ("value", "spread"))
+    labels = point.labels
+    return Row(point.id, BRICK.name, name, Status.PASSED, labels["engine"], labels["definition"], values, spreads)
+
+
+@cache
+def untouched():
+    return {name: measured(name) for name in METHODS}
+
+
+@cache
+def accepted():
+    """The baseline that accepts the untouched run."""
+    return baseline.update_baseline(None, [run()], "the first one")
+
+
+def run(**changes):
+    """The untouched run; `name={...}` merges values into those of a method."""
+    rows = [replace(row, values={**row.values, **changes.get(name, {})}) for name, row in untouched().items()]
+    return Results("here", {row.id: row for row in rows})
+
+
+def failures(kept, found):
+    """The violations as (measure, method)."""
+    verdict = compare.judge(kept, found)
+    assert verdict.passed == (not verdict.violations)
+    return {(each.measure, each.method) for each in verdict.violations}
+
+
+@pytest.mark.parametrize(
+    ("measure", "value", "spread", "expected"),
+    [
+        ("energy drift max", 1.0, 0.1, 1.5),
+        ("energy drift max", -2.0, 0.0, -2.0 + 2e-6),
+        ("energy drift max", 0.0, 0.0, 8 * 2.0**-52),
+        ("iterations", 30.0, 0.0, 30.0),
+        ("steps", 30.0, 2.0, 40.0),
+        ("observed order", 2.0, 1.0, 1.95),
+    ],
+)
+def test_the_limit_of_a_value(measure, value, spread, expected):
+    assert limit(measure, value, spread) == expected
+
+
+def test_a_first_baseline():
+    row = KEPT.rows[ROW.id]
+    assert (row.scene, row.method, row.engine, row.definition) == ("brick", "reduced", "", "hash")
+    assert row.measures["energy drift max"] == Allowed(1e-3, 1e-5, 1, 1e-3 + 5e-5)
+    assert row.measures["iterations"] == Allowed(30.0, 0.0, 1, 30.0)
+    (entry,) = KEPT.history
+    expected = {"reason": "first", "commit": "abc", "runs": 1, "machines": ["here"], "added": [ROW.id]}
+    assert {**entry, **expected, "removed": [], "changed": []} == entry
+
+
+def test_values_of_several_runs_are_their_median_and_range():
+    runs = [changed(values={"energy drift max": value}) for value in (1e-3, 4e-3, 2e-3)]
+    made = baseline.update_baseline(None, runs, "three")
+    assert made.history[0]["runs"] == 3
+    assert made.rows[ROW.id].measures["energy drift max"] == Allowed(2e-3, 3e-3, 3, pytest.approx(2e-3 + 15e-3))
+
+
+def test_the_largest_spread_within_and_between_runs_counts():
+    runs = [changed(spreads={"energy drift max": spread}) for spread in (0.1, 0.3, 0.2)]
+    found = baseline.update_baseline(None, runs, "why").rows[ROW.id].measures["energy drift max"]
+    assert (found.spread, found.limit) == (0.3, pytest.approx(1e-3 + baseline.SPREADS * 0.3, rel=1e-15))
+
+
+def test_the_history_has_every_change():
+    both = changed(values={"energy drift max": 5e-3})
+    second = baseline.update_baseline(KEPT, [replace(both, rows={**both.rows, OTHER.id: OTHER})], " again ")
+    entry = second.history[1]
+    assert (entry["reason"], entry["added"], entry["removed"], entry["changed"]) == ("again", [OTHER.id], [], [ROW.id])
+    third = baseline.update_baseline(second, [Results("here", {OTHER.id: OTHER})], "less")
+    assert (third.history[2]["removed"], third.history[2]["changed"]) == ([ROW.id], [])
+
+
+def test_runs_that_disagree_are_refused():
+    for other in (changed(definition="new"), changed(engine="new"), Results("here", {OTHER.id: OTHER})):
+        with pytest.raises(BadInput, match="disagree"):
+            baseline.update_baseline(None, [RUN, other], "why")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"status": Status.FAILED},
+        {"status": Status.ERROR},
+        {"values": {"rate error max": float("nan")}},
+        {"values": {"iterations": float("inf")}},
+        {"values": {results.ENERGY_DRIFT: 1.01}},
+    ],
+)
+def test_a_failure_cannot_be_accepted(changes):
+    with pytest.raises(BadInput):
+        baseline.update_baseline(KEPT, [changed(**changes)], "no")
+    assert not baseline.update_baseline(None, [changed(status=Status.SKIPPED)], "why").rows
+
+
+def test_a_baseline_comes_back_from_its_file_with_its_hash(tmp_path):
+    path = tmp_path / "new" / "baseline.json"
+    baseline.write(KEPT, path)
+    assert baseline.read(path) == KEPT
+    content = json.loads(path.read_text())
+    hashed = {name: value for name, value in content.items() if name != "sha256"}
+    assert content["sha256"] == hashlib.sha256(json.dumps(hashed, sort_keys=True).encode()).hexdigest()
+
+
+DAMAGED = {
+    "truncated": lambda text: text[: len(text) // 2],
+    "edited by hand": lambda text: text.replace('"limit": ', '"limit": 1', 1),
+    "another format": lambda text: text.replace('"format": 2', '"format": 3'),
+    "another format: ": lambda text: "[]",
+    "an earlier version": lambda text: text.replace('"format": 2', '"format": 1'),
+}
+
+
+@pytest.mark.parametrize("words", DAMAGED)
+def test_a_damaged_baseline_is_refused(tmp_path, words):
+    path = tmp_path / "baseline.json"
+    baseline.write(KEPT, path)
+    path.write_text(DAMAGED[words](path.read_text()))
+    with pytest.raises(baseline.NoBaseline, match=words):
+        baseline.read(path)
+    with pytest.raises(baseline.NoBaseline, match="no baseline"):
+        baseline.read(tmp_path / "nothing")
+
+
+def test_a_baseline_with_times_is_read_without_them_where_it_is_about_to_be_replaced(tmp_path):
+    path = tmp_path / "baseline.json"
+    baseline.write(KEPT, path)
+    content = json.loads(path.read_text())
+    content.pop("sha256")
+    content["format"] = 1
+    content["rows"][ROW.id]["time_ratios"] = {"a machine": {"value": 2.0, "spread": 0.1, "runs": 5, "limit": 2.2}}
+    content["sha256"] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    path.write_text(json.dumps(content))
+    with pytest.raises(baseline.NoBaseline, match="with times"):
+        baseline.read(path)
+    assert baseline.read(path, also_with_times=True) == KEPT
+
+
+def test_results_come_back_from_their_file(tmp_path):
+    path = tmp_path / "new" / "results.json"
+    found = changed(values={"energy drift max": math.nan})
+    results.write(found, path)
+    assert math.isnan(results.read(path).rows[ROW.id].values["energy drift max"])
+    results.write(RUN, path)
+    assert results.read(path) == RUN
+    for text in ("[]", "{}", "{", '{"rows": [1], "machine": "", "commit": ""}'):
+        path.write_text(text)
+        with pytest.raises(BadInput, match="results"):
+            results.read(path)
+    with pytest.raises(BadInput, match="No such file"):
+        results.read(tmp_path / "nothing.json")
+
+
+@dataclass(frozen=True)
+class NoGyroscopicTerm(cv.Method):
+    """A negative control: the body keeps its rates."""
+
+    family: ClassVar[str] = "control"
+    role: ClassVar[cv.Role] = cv.Role.OURS
+
+    @property
+    def order(self):
+        return 2
+
+    def prepare(self, scene, grid):
+        w = np.array(scene.w_WB_B0)
+        turns = np.array([rotation_about(w, np.linalg.norm(w) * t) for t in grid.t])
+        return lambda: cv.Trajectory(scene, grid.t, scene.R_WB0 @ turns, np.tile(w, (len(turns), 1)), self.label)
+
+
+# ---------------------------------------------------------------------------------------------------------- measured rows
+
+
+def test_an_untouched_run_passes():
+    again = {row.id: row for row in map(measured, METHODS)}
+    assert failures(accepted(), Results("elsewhere", again)) == set()
+
+
+def test_one_more_newton_iteration():
+    more = measured(SECOND, method("reduced:tol=1e-30")).values
+    assert ("iterations", SECOND) in failures(accepted(), run(**{SECOND: more}))  # measured 299 instead of 204 in 100 steps
+    single = {"iterations": untouched()[SECOND].values["iterations"] + 1}
+    assert failures(accepted(), run(**{SECOND: single})) == {("iterations", SECOND)}
+
+
+def test_energy_drift_10_times_larger():
+    for name, row in untouched().items():
+        worse = {"energy drift max": 10 * row.values["energy drift max"]}
+        assert failures(accepted(), run(**{name: worse})) == {("energy drift max", name)}
+
+
+def test_a_negative_control_in_place_of_the_method():
+    found = failures(accepted(), run(**{SECOND: measured(SECOND, NoGyroscopicTerm()).values}))
+    assert {("attitude error max", SECOND), ("rate error max", SECOND), ("momentum drift max", SECOND)} <= found
+
+
+def test_every_measure_of_a_row_is_gated():
+    for name, value in untouched()[SECOND].values.items():
+        worse = {name: value - 1 if name == baseline.ORDER else value + 1}
+        assert failures(accepted(), run(**{SECOND: worse})) == {(name, SECOND)}
+        assert failures(accepted(), run(**{SECOND: {name: math.nan}})) == {(name, SECOND)}
+
+
+def test_order_3_8_instead_of_4():
+    assert failures(accepted(), run(**{FOURTH: {"observed order": 3.8}})) == {("observed order", FOURTH)}
+
+
+def test_the_definition_changes_with_the_motion_and_the_engine_with_its_version():
+    longer = points.Point(scene("brick_flip:t_end=2"), method(SECOND)).definition
+    assert longer != untouched()[SECOND].definition
+    assert untouched()[ENGINE].engine.startswith("mujoco==")
+
+
+# ----------------------------------------------------------------------------------------------------- rows with chosen values
+
+
+def test_the_same_results_pass_and_values_at_their_limit():
+    assert compare.judge(KEPT, RUN) == compare.Verdict((), (), 1)
+    assert str(compare.judge(KEPT, RUN)) == "gate: passed, 1 rows, 0 violations"
+    assert compare.judge(KEPT, changed(values={"energy drift max": 1e-3 + 5e-5, "observed order": 1.95})).passed
+
+
+def test_a_violation_has_the_value_before_and_now_and_the_limit():
+    verdict = compare.judge(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
+    assert [tuple(vars(each).values()) for each in verdict.violations] == [
+        ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
+        ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
+    ]
+    assert "| observed order | brick | reduced | 2 | 1.9 |" in verdict.markdown_text()
+    assert "--update" in str(verdict)
+
+
+TWO_NEW = {"new": replace(ROW, id="new"), "z": replace(ROW, id="z")}
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (replace(RUN, rows={}), ("row", "passed", "missing", "passed")),
+        (replace(RUN, rows={"new": replace(ROW, id="new", method="other")}), ("row", "passed", "missing", "passed")),
+        (replace(RUN, rows=TWO_NEW), ("row", "passed", "renamed new", "passed")),
+        *(
+            (changed(status=Status(each)), ("row", "passed", each, "passed"))
+            for each in ("skipped", "failed", "error", "xfailed")
+        ),
+        (changed(definition="new"), ("definition", "hash", "new", "hash")),
+        (changed(engine="mujoco==9"), ("engine version", "", "mujoco==9", "")),
+    ],
+)
+def test_rows_that_cannot_be_compared(found, expected):
+    (each,) = compare.judge(KEPT, found).violations
+    assert (each.measure, each.was, each.now, each.allowed) == expected
+    assert (each.scene, each.method) == ("brick", "reduced")
+
+
+def test_a_measure_that_is_gone():
+    values = {name: value for name, value in ROW.values.items() if name != "energy drift max"}
+    gone = Results("here", {ROW.id: replace(ROW, values=values)})
+    assert failures(KEPT, gone) == {("energy drift max", "reduced")}
+
+
+def test_a_row_that_is_new_is_a_note_if_it_passed():
+    both = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", method="new")})
+    assert compare.judge(KEPT, both).notes == ("unbaselined: new",)
+    failed = replace(RUN, rows={**RUN.rows, "new": replace(ROW, id="new", status=Status.FAILED)})
+    assert compare.judge(KEPT, failed) == compare.Verdict((), (), 1)
+
+
+def test_a_baseline_without_rows_is_a_violation():
+    assert failures(baseline.Baseline({}, []), RUN) == {("rows", "all")}
+
+
+@pytest.mark.parametrize(("drift", "failed"), [(0.36, False), (1.0, False), (1.01, True), (2.7e11, True), (math.nan, True)])
+def test_a_run_that_ran_away_is_a_failure_whatever_the_baseline_is(drift, failed):
+    values = {results.ENERGY_DRIFT: drift}
+    row = replace(OTHER, values=values)
+    unknown = compare.judge(KEPT, replace(RUN, rows={**RUN.rows, row.id: row})).violations  # a row without a baseline
+    assert [each.measure for each in unknown] == [results.ENERGY_DRIFT] * failed
+    as_before = baseline.BaselineRow(
+        "top", "gauss", row.engine, "other", {results.ENERGY_DRIFT: baseline.Allowed(drift, 0, 1, 3e11)}
+    )
+    known = compare.judge(baseline.Baseline({row.id: as_before}, []), Results("here", {row.id: row}))
+    assert known.passed != failed
+
+
+def test_a_gain_as_large_as_a_failure_is_noted():
+    better = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 6e-5, "observed order": 2.06}))
+    assert better.passed
+    assert [note.partition(",")[0] for note in better.notes] == ["better: energy drift max", "better: observed order"]
+    same = compare.judge(KEPT, changed(values={"energy drift max": 1e-3 - 4e-5, "observed order": 2.04}))
+    assert not same.notes
+    assert not compare.judge(KEPT, changed(definition="new", values={"energy drift max": 0.0})).notes
+
+
+@pytest.fixture
+def gate(tmp_path, monkeypatch):
+    """Return exit code and output of the command in a folder with results, worse ones, and the baseline of the former."""
+    monkeypatch.chdir(tmp_path)
+    results.write(RUN, tmp_path / "before.json")
+    results.write(changed(values={"energy drift max": 2e-3}), tmp_path / "after.json")
+    baseline.write(KEPT, tmp_path / "kept.json")
+
+    def run(*arguments):
+        done = CliRunner().invoke(main, ["gate", "--baseline", "kept.json", *arguments])
+        return done.exit_code, done.output
+
+    return run
+
+
+def test_a_violation_exits_with_1_and_is_named(gate):
+    assert gate("before.json")[0] == 0
+    code, text = gate("after.json")
+    assert code == 1
+    assert "energy drift max, brick, reduced: was 0.001, is 0.002" in text
+    code, text = gate("after.json", "--json")
+    (verdict,) = json.loads(text)["verdicts"]
+    assert (code, verdict["passed"], verdict["violations"][0]["measure"]) == (1, False, "energy drift max")
+    assert json.loads(gate("before.json", "--json")[1])["passed"]
+
+
+def test_results_are_accepted_with_a_reason(gate, tmp_path):
+    assert gate("after.json", "--update", " ")[0] == 2
+    code, text = gate("after.json", "--update", "wanted so", "--json")
+    assert code == 0
+    assert (json.loads(text)["rows"], json.loads(text)["entry"]["reason"]) == (1, "wanted so")
+    assert gate("after.json")[0] == 0
+    assert [entry["reason"] for entry in baseline.read(tmp_path / "kept.json").history] == ["first", "wanted so"]
+
+
+def test_without_a_baseline_the_exit_code_is_2(gate, tmp_path):
+    (tmp_path / "kept.json").write_text("{}")
+    assert gate("before.json")[0] == 2
+    (tmp_path / "kept.json").unlink()
+    code, text = gate("before.json")
+    assert (code, "no baseline" in text) == (2, True)
