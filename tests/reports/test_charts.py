@@ -1,4 +1,4 @@
-"""What charts draw is in the unit that their axes name."""
+"""Axes of charts name the unit of their values, and colours of lines can be seen on light and dark pages."""
 
 import math
 import re
@@ -13,7 +13,8 @@ import vl_convert
 from conservative import Reduced
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
-from conservative.reports.charts.style import WIDTH, power_axis
+from conservative.reports.charts.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
+from conservative.reports.charts.style import _OTHERS, PALETTE, WIDTH, power_axis
 from conservative.reports.tables import orders, work_precision
 
 from .rows import frame, point, row, table
@@ -94,3 +95,26 @@ def test_labels_of_a_logarithmic_axis_do_not_overlap(low, high):
     gaps = [WIDTH * math.log(b / a) / math.log(high / low) for a, b in pairwise(values)]
     assert min(gaps) >= 30  # measured 33
     assert len(values) > 1
+
+
+COLOURS = (*PALETTE.values(), *_OTHERS)
+
+
+def test_contrast_is_that_of_the_guidelines():
+    assert contrast("#000000", "#FFFFFF") == pytest.approx(21)
+    assert contrast("#777777", "#FFFFFF") == pytest.approx(
+        4.48, abs=0.01
+    )  # the guidelines' own example of what is just too low
+    assert contrast("#661100", DARK_PAPER) == pytest.approx(1.41, abs=0.03)  # why there are stand-ins
+
+
+@pytest.mark.parametrize("paper", [LIGHT_PAPER, DARK_PAPER])
+def test_every_colour_of_a_line_is_seen(paper):
+    found = stand_ins(COLOURS, paper)
+    assert found
+    assert min(contrast(found.get(colour, colour), paper) for colour in COLOURS) >= LEAST
+    assert all(contrast(colour, paper) < LEAST for colour in found)
+
+
+def test_colours_are_found_in_a_text():
+    assert colours_in('{"color": "#0072b2", "x": "#12345", "id": "#1234567"}') == {"#0072B2"}

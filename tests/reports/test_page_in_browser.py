@@ -6,13 +6,26 @@ import os
 import shutil
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
+from conservative import registry
+from conservative.benchmarks.comparison.compare import judge
+from conservative.benchmarks.measures import measurement, samples
 from conservative.reports import document
-from conservative.reports.run.plan import plan_report
+from conservative.reports.page import figures, page
+from conservative.reports.page.versions import render_comparison
+from conservative.reports.run.measure import Measurements
+from conservative.reports.run.plan import Plan, plan_report
+from conservative.reports.run.provenance import provenance
+from conservative.reports.tables.comparison import Answer
+from conservative.reports.view import build
+
+from ..benchmarks.comparison.made_up import BASE, HEAD, found, timed
+from .made_up_engines import at_step, over_steps
 
 pytestmark = pytest.mark.browser
 
@@ -209,3 +222,92 @@ def test_page_prints(opened):
     pdf = base64.b64decode(done["data"])
     assert pdf.startswith(b"%PDF")
     assert len(pdf) > 5e4  # measured 7e5
+
+
+ENGINE_ROWS = "[...document.querySelectorAll('#engines .compact')[1].querySelectorAll('tbody tr:has(th)')]"
+VISIBLE_ENGINES = f"return {ENGINE_ROWS}.filter((row) => row.offsetHeight).length"
+
+
+@pytest.fixture(scope="module")
+def engines_page(tmp_path_factory):
+    """A page with three settings of two engines."""
+    rows = [
+        *at_step("a==1", "RK4", 1e-6),
+        *over_steps("a==1", "RK4", (1e-1, 1e-2, 1e-3, 1e-4), 4.0),
+        *at_step("a==1", "Euler", 3.0, as_installed=True),
+        *at_step("b==2", "Euler", 0.2),
+    ]
+    plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
+    view = build(plan, Measurements(measurement.frame(rows), samples.frame([])), provenance([]))
+    file = tmp_path_factory.mktemp("page") / "index.html"
+    file.write_text(page.render(view, figures.charts(view)), encoding="utf-8")
+    with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.mark.parametrize(("words", "count"), [("", 3), ("euler", 2), ("EULER  b==2", 1), ("as installed", 1), ("nothing", 0)])
+def test_rows_with_all_words_stay(engines_page, words, count):
+    field = engines_page.find_elements("css selector", "#engines .filter input")[1]
+    field.clear()
+    field.send_keys(words or " ")
+    wait(engines_page, f"{VISIBLE_ENGINES} === {count}")
+    shown = engines_page.find_elements("css selector", "#engines .filter output")[1].text
+    assert shown == (f"{count} of 3" if words else "")
+
+
+TIMES = {
+    "reduced": timed((1.1, 1.08, 1.12), (1.11, 1.09, 1.13)),
+    "gauss": timed((0.8, 0.79, 0.81)),
+    "lame": timed((1.01, 0.99, 1.02)),
+}
+VISIBLE = (
+    "return [...document.querySelectorAll('tbody tr')].filter((row) => row.offsetHeight).map((row) => row.cells[1].textContent)"
+)
+
+
+@pytest.fixture(scope="module")
+def comparison_page(tmp_path_factory):
+    """A page with three rows: one slower, one faster, one as it was."""
+    rows = {name: replace(found(), row=replace(found().row, id=name, method=name)) for name in TIMES}
+    file = tmp_path_factory.mktemp("page") / "gate.html"
+    file.write_text(render_comparison(Answer(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
+    browser = start(tmp_path_factory.mktemp("profile"))
+    try:
+        browser.get(file.as_uri())
+        yield browser
+    finally:
+        browser.quit()
+
+
+@pytest.fixture
+def visible(comparison_page):
+    """Return the methods of the rows that are shown, of a page that was opened anew."""
+    comparison_page.refresh()
+    return lambda: comparison_page.execute_script(VISIBLE)
+
+
+def click(browser, selector):
+    browser.execute_script(f"document.querySelector({selector!r}).click()")
+
+
+def test_rows_that_failed_come_first_and_every_row_is_shown(comparison_page, visible):
+    assert visible() == ["reduced", "gauss", "lame"]
+    assert comparison_page.execute_script("return document.getElementById('count').textContent") == "3 of 3 rows"
+
+
+def test_rows_are_filtered_by_text_and_by_standing(comparison_page, visible):
+    comparison_page.find_element("id", "text").send_keys("Brick LA")
+    assert visible() == ["lame"]
+    comparison_page.refresh()
+    click(comparison_page, "[value=same]")
+    assert visible() == ["reduced", "gauss"]
+    click(comparison_page, "[value=slower]")
+    assert visible() == ["gauss"]
+
+
+def test_rows_are_sorted_by_their_ratio_both_ways(comparison_page, visible):
+    click(comparison_page, "thead th:nth-child(4) button")
+    assert visible() == ["gauss", "lame", "reduced"]
+    click(comparison_page, "thead th:nth-child(4) button")
+    assert visible() == ["reduced", "lame", "gauss"]
+    assert comparison_page.execute_script("return document.querySelector('[aria-sort]').textContent") == "ratio"
