@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.benchmarks.tracking.changes import Aspect, differ, direction, find_changes, ratio
+from conservative.benchmarks.tracking.changes import Aspect, differ, find_changes, ratio
 from conservative.benchmarks.tracking.observation import NO_STEP, Fit, Point, Spread, fit_orders
 from conservative.benchmarks.tracking.track import make_plan, require_several
 from conservative.outcome import Outcome, OutcomeKind
@@ -88,15 +88,6 @@ def test_errors_of_round_off_are_alike_however_far_apart():
     before, after = (replace(GOOD, error=near(error)) for error in (1e-14, 9e-10))
     assert changes(before, after) == {}
     assert changes(before, replace(GOOD, error=near(2e-9))) == {(Aspect.ERROR, ""): False}
-
-
-def test_sizes_and_directions():
-    assert Spread(0.1, -0.2, 0.3).sizes == (0.0, 0.3)
-    assert Spread(-0.1, -0.3, -0.05).sizes == (0.05, 0.3)
-    assert Spread.of([2.0, np.nan, 1.0]) == Spread(2.0, 1.0, 2.0)
-    assert direction(near(1.0), near(-4.0)) == 1
-    assert direction(near(-4.0), near(1.0)) == -1
-    assert direction(near(1.0), near(2.9)) == 0
 
 
 # -------------------------------------------------------------------------------------------------------------------- times
