@@ -73,7 +73,7 @@ def test_the_default_report_measures_a_selection_of_methods_and_a_full_one_every
     assert default.names == studies.MAIN
     assert set(full.names) == set(studies.MAKERS) - set(studies.ENGINES)
     assert set(default.methods) < set(full.methods)
-    assert {method.family for method in default.methods} == set(selection.MAIN_METHODS) - {"exact", "precise"}
+    assert {method.family for method in default.methods} == set(selection.MAIN_METHODS) - {"exact", "precise", "substepped"}
     assert plan_report(bodies=2).names == ("random", *studies.MAIN)
     assert plan_report(engines=["scipy"]).names == (*studies.MAIN, *studies.ENGINES)
     assert set(plan_report(["lagrange_top"], full=True).names) == {*studies.MAIN, *studies.MORE}
