@@ -6,19 +6,15 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.attitude import angle_between, from_quaternion
-from conservative.errors import AccuracyNotReached
+from conservative.attitude import angle_between
 from conservative.methods import trials
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 
+from .exact_trials import random_rotation
+
 SCENES = 100
 KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
-
-
-def random_rotation(rng):
-    q = rng.normal(size=4)
-    return from_quaternion(q / np.linalg.norm(q))
 
 
 def random_scene(rng, kind):
@@ -67,26 +63,10 @@ def test_a_choice_that_trusts_too_much_is_caught(monkeypatch):
     assert max(errors) > 1e-7  # measured 2e-4
 
 
-def test_the_choice_is_told():
-    trajectory = cv.integrate(cv.scenes.asymmetric_top(t_end=5.0), error=1e-6)
-    choice = trajectory.choice
-    assert choice.reached
-    assert choice.estimate <= choice.error == 1e-6
-    assert choice.attempts[-1] == (choice.dt, choice.estimate)
-    assert trajectory.t[1] == pytest.approx(choice.dt)
-    assert cv.integrate(cv.scenes.lagrange_top(), 0.01).choice is None
-
-
 @pytest.mark.parametrize("every", [1, 2, 3, 10])
 def test_samples_fall_on_multiples_of_dt(every):
     trajectory = cv.integrate(cv.scenes.lagrange_top(), dt=0.01, error=1e-9, sample_every=every, t_end=0.3)
     np.testing.assert_allclose(trajectory.t, np.arange(0, 31, every) * 0.01, atol=1e-14)
-
-
-def test_what_round_off_forbids_is_a_warning():
-    with pytest.warns(AccuracyNotReached, match="an error of 1e-16 rad is not reached"):
-        trajectory = cv.integrate(cv.scenes.brick_flip(), error=1e-16)
-    assert not trajectory.choice.reached
 
 
 def test_other_fields_get_the_explicit_method():

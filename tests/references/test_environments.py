@@ -1,14 +1,24 @@
-"""Environments are made whole or not at all, found broken, and mended: all from a folder of wheels, without a network."""
+"""Environments of releases and of builds are made whole or not at all, and mended: from local wheels, without a network."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import zipfile
 
 import pytest
 
 import conservative as cv
 from conservative import registry
 from conservative.errors import MissingEngine
-from conservative.references.environments import environment, install, uv_command
+from conservative.references.environments import client, environment, install, uv_command
+from conservative.references.environments.builds import install_build, install_releases, newest_releases
 from conservative.references.environments.environment import Distribution
 from conservative.references.environments.lock import Source, split_requirement
 
+from ..environments import ROOT, variables
 from .local_wheels import write_numpy, write_sdist, write_wheel
 
 pytestmark = pytest.mark.slow
@@ -61,11 +71,6 @@ def test_versions_live_side_by_side_and_go_one_by_one(cache, wheels):
         registry.method("trial")
     with pytest.raises(cv.BadInput, match="a name after something is installed"):
         install.remove("trial")
-
-
-def test_an_engine_integrates_where_it_was_installed(cache, wheels):
-    installed(wheels)
-    assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial@1.10")).ok
 
 
 def test_nothing_is_written_elsewhere(cache, wheels, tmp_path):
@@ -142,3 +147,215 @@ def test_an_engine_that_cannot_be_imported_is_said(tmp_path, monkeypatch):
     write_numpy(tmp_path)
     monkeypatch.setattr(registry.engine("trial"), "distribution", Distribution("trial", "trial"))
     assert installed(tmp_path, "trial==4.0").trouble.startswith("crashed (signal 6 (SIGABRT)")
+
+
+def test_force_rebuilds_from_the_lock(cache, wheels):
+    before = installed(wheels, "trial==1.9").environment
+    for module in before.folder.glob("lib/python*/site-packages/numpy*"):
+        shutil.rmtree(module) if module.is_dir() else module.unlink()
+    client.close_workers()  # the running one has imported the package
+    assert installed(wheels, "trial==1.9").trouble
+    rebuilt = install.install("trial", Source(wheels), force=True)  # not 1.10, the newest in the folder of wheels
+    assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")
+    assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial")).ok
+    assert [path.name for path in (cache / "trial").iterdir()] == ["1.9"]
+
+
+@pytest.mark.parametrize("step", ["_fill", "_replace"])
+def test_a_rebuild_that_fails_leaves_the_environment(cache, wheels, monkeypatch, step):
+    before = installed(wheels).environment
+    if step == "_fill":
+        source = Source(cache)  # without wheels
+    else:
+        source = Source(wheels)
+        monkeypatch.setattr(install.Path, "rename", renamed_never_from(install.Path.rename, ".1.10-"))
+    with pytest.raises(cv.BadInput):
+        install.install("trial", source, force=True)
+    assert environment.list_environments() == (before,)
+    assert installed(wheels).trouble == ""
+
+
+def renamed_never_from(rename, start):
+    def fail(path, target):
+        if path.name.startswith(start):
+            raise PermissionError(13, "Permission denied")
+        return rename(path, target)
+
+    return fail
+
+
+def test_an_environment_without_a_record_is_made_again(cache, wheels):
+    (installed(wheels).environment.folder / environment.RECORD).unlink()
+    assert environment.list_environments() == ()
+    again = installed(wheels)
+    assert (again.new, again.trouble) == (True, "")
+
+
+INSTALL = (
+    "import sys; from pathlib import Path\n"
+    "from conservative.references.environments.install import install\n"
+    "from conservative.references.environments.lock import Source\n"
+    "print('start', flush=True); install('trial', Source(Path(sys.argv[1]))); print('whole', flush=True)"
+)
+
+
+def start_install(start, wheels):
+    command = [sys.executable, "-c", INSTALL, str(wheels)]
+    path = os.pathsep.join([str(ROOT), *sys.path])
+    return start(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=variables(PYTHONPATH=path),
+        text=True,
+    )
+
+
+def test_a_kill_leaves_nothing_half_installed(cache, wheels, start):
+    began = time.monotonic()
+    process = start_install(start, wheels)
+    assert process.communicate(timeout=120)[0] == "start\nwhole\n"
+    duration, whole = time.monotonic() - began, 0
+    for part in (0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
+        install.remove("trial")
+        process = start_install(start, wheels)
+        time.sleep(part * duration)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        whole += len(environment.list_environments())
+        assert installed(wheels).trouble == ""
+        assert [path.name for path in (cache / "trial").iterdir()] == ["1.10"]
+    assert whole < 6
+
+
+def test_a_full_disk_leaves_nothing_and_is_said(wheels, tmp_path, monkeypatch, trial_registered):
+    small = tmp_path / "small"
+    small.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "none", small], capture_output=True, check=False).returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    try:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(small))
+        with pytest.raises(cv.BadInput, match=r"room"):
+            installed(wheels)
+        assert environment.list_environments() == ()
+        assert not list(environment.folder_of_all().glob("trial/*"))
+    finally:
+        subprocess.run(["umount", small], check=True)
+
+
+def build(wheels, folder, version="1.10", code="VALUE = 2\n"):
+    write_wheel(folder, version, code=code)
+    return install_build("trial", folder / f"trial-{version}-py3-none-any.whl", Source(wheels))
+
+
+def test_a_build_has_a_version_of_its_own_and_integrates(wheels, tmp_path):
+    found = build(wheels, tmp_path)
+    assert (found.new, found.trouble) == (True, "")
+    version = found.environment.version
+    assert version.startswith("1.10+build.")
+    assert found.environment.is_build
+    assert not install_build("trial", tmp_path / "trial-1.10-py3-none-any.whl", Source(wheels)).new
+    method = registry.method(f"trial@{version}")
+    assert method.label == f"trial=={version}/integrate"
+    assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=method).ok
+
+
+def test_another_build_of_the_same_version_is_another_environment(wheels, tmp_path):
+    first, second = build(wheels, tmp_path), build(wheels, tmp_path, code="VALUE = 3\n")
+    assert second.new
+    assert first.environment.version != second.environment.version
+
+
+def test_a_version_with_a_local_part_keeps_it(wheels, tmp_path):
+    assert build(wheels, tmp_path, "2.0+g12").environment.version.startswith("2.0+g12.build.")
+
+
+def test_no_build_is_taken_for_the_newest_release(wheels, tmp_path):
+    install.install("trial==1.0", Source(wheels))
+    build(wheels, tmp_path, "9.0")
+    assert environment.find_environment("trial").version == "1.0"
+
+
+@pytest.mark.parametrize("name", ["other-1.0-py3-none-any.whl", "trial.whl", "trial-1.0.whl"])
+def test_a_file_that_is_no_wheel_of_the_engine_is_refused(name, tmp_path):
+    with zipfile.ZipFile(tmp_path / name, "w"):
+        pass
+    with pytest.raises(cv.BadInput, match=r"against: got .*allowed: a wheel of trial"):
+        install_build("trial", tmp_path / name, Source())
+
+
+def test_what_is_neither_wheel_nor_sources_is_refused(tmp_path):
+    for path in (tmp_path, tmp_path / "nothing.whl"):
+        with pytest.raises(cv.BadInput, match="allowed: a wheel, or a folder with"):
+            install_build("trial", path, Source())
+
+
+def test_a_wheel_for_another_python_is_refused(cache, tmp_path):
+    write_wheel(tmp_path, "2.0", "cp27-cp27m-any")
+    write_numpy(tmp_path)
+    with pytest.raises(cv.BadInput, match=r"no wheel|uv can install"):
+        install_build("trial", tmp_path / "trial-2.0-cp27-cp27m-any.whl", Source(tmp_path))
+    assert environment.list_environments() == ()
+
+
+def test_sources_are_built_only_where_that_is_allowed(tmp_path):
+    marker = tmp_path / "it_ran"
+    (tmp_path / "setup.py").write_text(f"open({str(marker)!r}, 'w')\n")
+    with pytest.raises(cv.BadInput, match="has to be built; allowed: a wheel, or --allow-build"):
+        install_build("trial", tmp_path, Source())
+    assert not marker.exists()
+
+
+BACKEND = """import shutil, pathlib
+def build_wheel(folder, settings=None, metadata=None):
+    name = "trial-3.0-py3-none-any.whl"
+    shutil.copy({source!r}, pathlib.Path(folder) / name)
+    return name
+"""
+PROJECT = """[build-system]
+requires = []
+build-backend = "backend"
+backend-path = ["."]
+[project]
+name = "trial"
+version = "3.0"
+"""
+
+
+def test_sources_are_built_where_that_is_allowed(wheels, tmp_path):
+    write_wheel(tmp_path, "3.0")
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / "pyproject.toml").write_text(PROJECT)
+    (project / "backend.py").write_text(BACKEND.format(source=str(tmp_path / "trial-3.0-py3-none-any.whl")))
+    found = install_build("trial", project, Source(wheels, allow_build=True))
+    assert found.environment.version.startswith("3.0+build.")
+    assert found.trouble == ""
+
+
+def test_sources_that_do_not_build_are_refused(wheels, tmp_path):
+    (tmp_path / "pyproject.toml").write_text(PROJECT)
+    (tmp_path / "backend.py").write_text("def build_wheel(*_):\n    raise SystemExit('no compiler')\n")
+    with pytest.raises(cv.BadInput, match="a folder that uv can build"):
+        install_build("trial", tmp_path, Source(wheels, allow_build=True))
+
+
+def test_the_newest_releases_are_those_of_the_index_oldest_first(wheels):
+    assert newest_releases("trial", 2, Source(wheels)) == ("1.9", "1.10")
+    assert newest_releases("trial", 9, Source(wheels)) == ("1.0", "1.9", "1.10")
+
+
+def test_releases_that_nobody_can_list_are_said(tmp_path):
+    with pytest.raises(cv.BadInput, match=r"no list of versions of trial .*allowed: a network, --find-links FOLDER"):
+        newest_releases("trial", 2, Source(tmp_path))
+
+
+def test_releases_are_installed_once_and_told_before(wheels):
+    told = []
+    for _ in range(2):
+        found = install_releases("trial", ("1.9", "1.0"), Source(wheels), told.append)
+        assert [each.version for each in found] == ["1.9", "1.0"]
+    assert told == ["installing trial==1.9", "installing trial==1.0"]
+    with pytest.raises(cv.BadInput, match="NAME or NAME==VERSION"):
+        install_releases("trial", ("1.10", "; true"), Source(wheels), told.append)
+    assert len(told) == 2

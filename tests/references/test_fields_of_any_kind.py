@@ -1,4 +1,9 @@
-"""heyoka and SciPy in every field whose equations we have, against the fields' own gradients and multi-precision truth."""
+"""heyoka, SciPy and multi-precision in every kind of field, also in fields that turn.
+
+No wrong convention can hide: axes are turned, inertias are not diagonal and sizes are not 1. No two programs write the
+equations of fields that turn the same way: `Precise` has the field as a function of time in the world's axes, heyoka and SciPy
+have it in axes that turn, and `Projected` at the times of its stages (compared with the textbook in `test_turning.py`).
+"""
 
 import numpy as np
 import pytest
@@ -13,9 +18,39 @@ from conservative.references.engines.scipy import SciPy
 from conservative.references.heyoka_equations import formulations, torques
 from conservative.references.heyoka_equations.accelerations import READERS, express_field
 from conservative.references.precise import Precise
+from conservative.references.truth import reference
 from conservative.scenes.random_body import random_body
 
-from .fields import FIELDS, make_fields, scene_in
+TURN = rotation_about((1, -2, 0.5), 1.1)
+R_WB0 = rotation_about((0.3, -0.5, 0.8), 0.7)
+INERTIA = TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T
+OTHER = rotation_about((-1, 0.3, 0.7), 0.6)
+POINT, ANCHOR, CENTRE = (0.3, -0.2, 0.4), (1.0, 0.5, 2.0), (0.2, -0.3, -1.0)
+
+
+def make_fields(strength=1.0):
+    """Return fields by name, with energies so many times as large."""
+    rate = 1.7 * strength**0.5
+    return {
+        "gravity": cv.UniformGravity(3.1 * strength, POINT),
+        "spring": cv.LinearSpring(3.0 * strength, POINT, ANCHOR, 0.4),
+        "spring of no length": cv.LinearSpring(3.0 * strength, POINT, ANCHOR),
+        "spring on an axis": cv.LinearSpring(3.0 * strength, TURN[:, 0] * 0.5, ANCHOR, 0.4),
+        "spring at the pivot": cv.LinearSpring(3.0 * strength, POINT, (0, 0, 0), 0.4),
+        "attraction": cv.PointAttraction(2.3 * strength, POINT, ANCHOR),
+        "repulsion of the pivot": cv.PointAttraction(-2.3 * strength, (0, 0, 0), ANCHOR),
+        "gradient": cv.GravityGradient(rate, INERTIA, CENTRE),
+        "gradient on another inertia": cv.GravityGradient(rate, OTHER @ np.diag((0.7, 1.1, 1.3)) @ OTHER.T, CENTRE),
+    }
+
+
+FIELDS = make_fields()
+
+
+def scene_in(field, name="in a field"):
+    """Return the body in a field."""
+    return cv.Scene(name, cv.RigidBody(INERTIA), R_WB0, (1.2, -2, 0.7), 1.0, field)
+
 
 GRID = Grid(0.05, 40)
 ATTITUDES = from_quaternion(np.random.default_rng(3).normal(size=(5, 4)))
@@ -138,3 +173,50 @@ def test_a_free_bodys_third_axis_is_one_about_which_its_momentum_circulates(mome
     assert (rates[:, :2].min(axis=0) < 0).all()
     assert (rates[:, :2].max(axis=0) > 0).all()
     assert problem.axes.J[2] == moments[axes[0 if slow else 2]]
+
+
+ORBIT = cv.Orbit(0.9, (0.3, -0.5, 0.8))
+ACROSS = np.cross(ORBIT.normal_W, (0.2, 1.0, 0.4))
+TURNING = {name: cv.Turning(field, ORBIT) for name, field in FIELDS.items()} | {
+    "satellite": ORBIT.gravity_gradient(INERTIA, ACROSS)
+}
+
+
+@pytest.mark.parametrize("field", TURNING)
+def test_every_formulation_gives_the_same_motion(field):
+    scene = scene_in(TURNING[field])
+    truth = cv.integrate(scene, 0.1, Precise(128))
+    for method, allowed in (
+        (Heyoka(1e-16), 1e-13),
+        (Heyoka(1e-16, "base_vectors"), 1e-13),
+        (Heyoka(1e-16, "lean"), 1e-13),
+        (SciPy(rtol=2.3e-14), 1e-12),
+        (cv.Projected(), 1e-13),
+    ):
+        found = cv.integrate(
+            scene, 0.1 if method.order is None else 0.01, method, sample_every=1 if method.order is None else 10
+        )
+        assert angle_between(truth.R_WB, found.R_WB).max() < allowed, method.name
+        assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 10 * allowed, method.name
+
+
+@pytest.mark.parametrize("method", [cv.Taylor(14), cv.Taylor(18)])
+def test_taylor_in_the_field_of_a_satellite(method):
+    scene = scene_in(TURNING["satellite"])
+    truth, found = cv.integrate(scene, 0.1, Precise(128)), cv.integrate(scene, 0.02, method, sample_every=5)
+    assert angle_between(truth.R_WB, found.R_WB).max() < 1e-13  # measured up to 1.3e-15
+    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 1e-12
+
+
+def test_truth_of_a_satellite_is_multi_precision():
+    scene = scene_in(TURNING["satellite"])
+    assert reference(scene, cv.Grid(0.1, 10)).trajectory.label.startswith("heyoka")
+
+
+def test_a_function_that_turns_has_scipy_alone_beside_ours():
+    gravity = FIELDS["gravity"]
+    scene = scene_in(cv.Turning(cv.FunctionPotential(gravity.energy, gravity.gradient), ORBIT))
+    assert "FunctionPotential" in Heyoka().unsupported(scene)
+    assert "FunctionPotential" in Precise().unsupported(scene)
+    found, known = (cv.integrate(each, 0.1, SciPy()) for each in (scene, scene_in(TURNING["gravity"])))
+    assert angle_between(found.R_WB, known.R_WB).max() < 1e-10  # measured 1.8e-12

@@ -7,8 +7,6 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.invariants import axial_direction
-from conservative.references.engine import symmetric_axes
 from conservative.references.engines.heyoka import FRAMES, Heyoka
 from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.pinocchio import Pinocchio
@@ -38,13 +36,6 @@ def test_a_name_gives_the_method_back(method):
 )
 def test_labels_have_version_and_setting(method, package, setting):
     assert method.label == f"{package}=={version(package)}/{setting}"
-
-
-def test_rooms_and_orders():
-    assert {method.role for method in EVERYTHING} == {"engine", "truth"}
-    assert [method.order for method in MuJoCo.variants()] == [1, 4, 1, 1, 1]
-    assert [method.order for method in Pinocchio.variants()] == [1, 4]
-    assert all(cls().order is None for cls in (Heyoka, SciPy, Precise))
 
 
 BAD = [
@@ -93,16 +84,6 @@ def test_lean_takes_the_form_with_the_fewest_products(free, heavy, top, spun):
     assert chosen(over_both_poles) == "non_spinning"
     at_rest = free.rename("rest", w_WB_B0=(0, 0, 0))
     assert chosen(at_rest) == "quaternion"
-
-
-def test_heights_of_a_top_are_those_it_reaches(top):
-    """n_z over a long run against the roots of the cubic; the Lagrange top's steady motion has one double root."""
-    for scene in (top, cv.scenes.nutating_top(), cv.scenes.cusped_top(), cv.scenes.lagrange_top()):
-        lowest, highest = formulations._heights(symmetric_axes(scene))
-        axis = axial_direction(scene.body, scene.potential)
-        heights = Heyoka(1e-12).run(scene, 20 / 5000, t_end=20.0).R_WB[:, 2] @ axis
-        assert heights.min() == pytest.approx(lowest, abs=1e-6)  # measured 7e-8, as samples miss the turning points
-        assert heights.max() == pytest.approx(highest, abs=1e-6)
 
 
 def test_one_compiled_integrator_serves_all_scenes_of_a_form(free):

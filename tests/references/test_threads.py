@@ -10,8 +10,6 @@ import conservative as cv
 from conservative.references import precise
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.pinocchio import Pinocchio
-from conservative.references.engines.scipy import SciPy
 from conservative.references.exact.method import Exact
 from conservative.references.heyoka_equations import forms, formulations
 from conservative.references.precise import Precise
@@ -19,15 +17,6 @@ from conservative.references.precise import Precise
 pytestmark = pytest.mark.slow
 
 THREADS = 4
-METHODS = (
-    *(Heyoka(1e-12, frame) for frame in ("body", "lean")),
-    Precise(128),
-    Precise(256),
-    Exact(),
-    MuJoCo("RK4"),
-    Pinocchio("Euler"),
-    SciPy(),
-)
 
 
 def states(trajectory):
@@ -38,16 +27,6 @@ def states(trajectory):
 def in_threads(calls):
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(lambda call: call(), calls))
-
-
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.label.partition("==")[2])
-def test_runs_that_overlap_do_not_meet(method):
-    body, grid = cv.RigidBody((1.0, 2.0, 2.5)), cv.Grid(0.02, 100)
-    scenes = [cv.Scene("own", body, np.eye(3), (0.1, k, 1.0), 2.0) for k in range(1, 1 + THREADS)]
-    alone = [states(method.prepare(scene, grid)()) for scene in scenes]
-    for _ in range(5):
-        runs = [method.prepare(scene, grid) for scene in scenes]
-        assert [states(trajectory) for trajectory in in_threads(runs)] == alone
 
 
 def test_runs_of_mujoco_that_overlap_leave_its_handler_of_warnings_as_it_was():

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 import time
@@ -12,13 +13,18 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.benchmarks.studies.case import Case, Failure, attempt
-from conservative.errors import IntegrationFailed, Unsupported
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.timing import time_interleaved
+from conservative.benchmarks.studies import engines_at_one_step, studies, study
+from conservative.benchmarks.studies.case import Case, Failure
+from conservative.benchmarks.studies.study import Study
+from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
+from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
 from conservative.method import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.environments import client, environment, worker
 from conservative.references.environments.client import Worker, time_limit
-from conservative.references.environments.failures import EngineCrashed, EngineTimeout
+from conservative.references.environments.failures import EngineCrashed
 
 from .trial_engine import Trial
 
@@ -125,13 +131,6 @@ def test_one_failure_harms_no_other_run():
 def test_what_an_engine_does_not_have_is_unsupported():
     with pytest.raises(Unsupported, match="this version turns no bodies"):
         Trial("refuse", "prepare").prepare(SCENE, grid_for(SCENE, DT))
-
-
-def test_studies_see_outcomes():
-    for do, kind in (("segfault", OutcomeKind.CRASHED), ("refuse", OutcomeKind.UNSUPPORTED), ("nan", OutcomeKind.DIVERGED)):
-        found = attempt(Case("test", SCENE, Trial(do, "prepare" if do == "refuse" else "run"), grid_for(SCENE, DT)))
-        assert isinstance(found, Failure)
-        assert found.outcome.kind is kind
 
 
 def test_integrate_raises_what_failed():
@@ -245,5 +244,87 @@ def iter_bytes(data):
     return read
 
 
-def test_a_timeout_names_its_limit():
-    assert "without an answer after 3 s" in str(EngineTimeout(3.0))
+@pytest.fixture
+def first_preparation_is_lost(monkeypatch):
+    """Have the process killed in the first preparation, and in no other one."""
+    lost, ask = [], Worker.ask
+
+    def ask_once_in_vain(self, do, **values):
+        if do == "prepare" and not lost:
+            lost.append(do)
+            raise EngineCrashed("signal 9 (SIGKILL)")
+        return ask(self, do, **values)
+
+    monkeypatch.setattr(Worker, "ask", ask_once_in_vain)
+
+
+def test_a_kill_in_a_preparation_is_an_outcome(trial_cache, first_preparation_is_lost):
+    killed = cv.integrate(SCENE, 0.01, Trial(), on_failure="return")
+    assert (killed.outcome.kind, killed.outcome.reason) == (OutcomeKind.CRASHED, "signal 9 (SIGKILL)")
+    assert cv.integrate(SCENE, 0.01, Trial()).ok
+
+
+ENDS = {"segfault": OutcomeKind.CRASHED, "hang": OutcomeKind.TIMEOUT, "shape": OutcomeKind.CRASHED, "nan": OutcomeKind.DIVERGED}
+
+
+@pytest.fixture
+def short_limits(monkeypatch):
+    monkeypatch.setattr(study, "HANG_LIMIT", 2.0)
+    monkeypatch.setattr(engines_at_one_step, "FIRST_LIMIT", 2.0)
+
+
+def rows(name, *methods):
+    return list(studies.rows(Study(name, (SCENE,), methods, quick=True, time_limit=0.05)))
+
+
+@pytest.mark.usefixtures("short_limits")
+@pytest.mark.parametrize("name", studies.ENGINES)
+@pytest.mark.parametrize("do", ENDS)
+def test_a_crash_or_a_hang_is_a_row_and_no_more(name, do):
+    found = rows(name, Trial(do), registry.method("pinocchio"), Trial())
+    measured = [row for row in found if row.measure in (Measure.ATTITUDE_MAX, Measure.TIME)]
+    wrong = [row for row in measured if row.method == Trial(do).name]
+    assert wrong[0].outcome.kind is ENDS[do]
+    assert not any(row.outcome.ok for row in wrong)
+    for method in ("pinocchio", Trial().name):
+        assert any(row.measure is Measure.TIME and row.outcome.ok and row.value > 0 for row in measured if row.method == method)
+
+
+def test_a_run_that_crashes_while_it_is_timed_is_marked_and_the_others_are_timed():
+    runs = {do: Trial(do).prepare(SCENE, grid_for(SCENE, 0.01)) for do in ("integrate", "abort")}
+    timings = time_interleaved(runs, rounds=3, min_time=1e-3)
+    assert timings["integrate"].outcome.ok
+    assert timings["integrate"].minimum > 0
+    assert timings["abort"].outcome.kind is OutcomeKind.CRASHED
+    assert timings["abort"].minimum != timings["abort"].minimum
+
+
+@pytest.mark.usefixtures("trial_registered")
+@pytest.mark.parametrize("within", [attempt_apart, attempt_here, attempt_within])
+def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
+    found = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
+    assert isinstance(found, Failure)
+    assert str(found.outcome) == "timeout (after 0.5 s)"
+
+
+@pytest.mark.usefixtures("trial_registered")
+def test_a_name_with_a_version_is_read_back():
+    for text in ("trial", "trial:segfault", "trial@1.0", "trial@1.0:do=print,at=prepare"):
+        method = registry.method(text)
+        assert registry.method(method.name) == method
+        assert pickle.loads(pickle.dumps(method)) == method
+    assert registry.method("trial@1.0").label == "trial==1.0/integrate"
+
+
+@pytest.mark.usefixtures("trial_registered")
+def test_a_version_that_is_not_installed_is_missing():
+    with pytest.raises(MissingEngine, match=r"'trial==2.0'.*installed are 1.0.*conservative engines install trial==2.0"):
+        registry.method("trial@2.0")
+
+
+@pytest.mark.usefixtures("trial_registered")
+def test_an_unknown_name_names_the_nearest():
+    with pytest.raises(cv.BadInput, match="'trial' \\(nearest\\)"):
+        registry.method("trail:segfault")
+    with pytest.raises(cv.BadInput, match="with @ and a version"):
+        registry.method("reduced@1.0")

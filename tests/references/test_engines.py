@@ -1,0 +1,360 @@
+"""Engines in this process: conventions, orders, counters, limits of steps, and what all engines share.
+
+All must land on the same motion on scenes where a wrong convention cannot hide. What depends on an engine's version says which
+one was measured.
+"""
+
+from importlib.metadata import version
+from types import SimpleNamespace
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import angle_between, orthonormality, rotation_about
+from conservative.method import Grid
+from conservative.references import engine
+from conservative.references.engine import principal_axes
+from conservative.references.engines import heyoka
+from conservative.references.engines.heyoka import Heyoka
+from conservative.references.engines.inside.mujoco import prepare_with
+from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.pinocchio import Pinocchio
+from conservative.references.engines.scipy import SciPy
+from conservative.references.environments.plain_numbers import describe
+from conservative.references.exact.method import Exact
+from conservative.references.exact.motion import _BLOCK
+from conservative.references.precise import Precise
+from conservative.scenes.lagrange_top import cone
+from conservative.trajectory import Counters
+
+# Attitude and rates; measured beside: the largest over the four scenes.
+TIGHT = [
+    (SciPy(rtol=3e-14), 1e-12),  # measured 4e-13, its interpolant's
+    (Heyoka(1e-16), 3e-14),  # measured 3e-15
+    (Heyoka(1e-16, "non_spinning"), 3e-14),  # measured 2e-15
+    (Heyoka(1e-16, "lean"), 3e-14),  # measured 3e-15
+    (Heyoka(1e-16, "base_vectors"), 3e-14),  # measured 3e-15
+    (MuJoCo("RK4"), 2e-8),  # measured 4e-9 at dt = 0.025
+    (Pinocchio("RK4"), 2e-8),  # measured 7e-9
+]
+
+
+@pytest.mark.parametrize(("method", "bound"), TIGHT, ids=lambda value: getattr(value, "name", ""))
+def test_an_engine_agrees_with_truth(method, bound, generic):
+    if method.unsupported(generic):  # that it says so is tested elsewhere
+        assert getattr(method, "frame", "") == "non_spinning"
+        return
+    truth = Precise(113).prepare(generic, Grid(0.025, 80))()
+    found = method.prepare(generic, Grid(0.025, 80))()
+    assert found.ok
+    assert len(found) == 81
+    assert angle_between(truth.R_WB, found.R_WB).max() < bound
+    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < bound
+
+
+@pytest.mark.parametrize("method", [m for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for m in cls.variants()])
+def test_a_run_starts_afresh_each_time_and_samples_do_not_change_it(method, top, heavy):
+    run = method.prepare(top, Grid(0.05, 40))
+    first = run()
+    other = method.prepare(top.rename("other", w_WB_B0=(0.1, 0.2, 0.3)), Grid(0.05, 3))()
+    second = run()
+    np.testing.assert_array_equal(first.R_WB, second.R_WB)
+    np.testing.assert_array_equal(first.w_WB_B, second.w_WB_B)
+    assert len(other) == 4
+    sparse = method.prepare(top, Grid(0.05, 40, 20))()
+    assert sparse.t.tolist() == [0, 1, 2]
+    # Adaptive ones cut steps at samples or do not: equal to their tolerance.
+    bound = 0.0 if method.order else 1e-7 if "1e-06" in method.name else 1e-11  # measured 0, 8e-9, 9e-13
+    assert angle_between(first.R_WB[::20], sparse.R_WB).max() <= bound
+    np.testing.assert_allclose(first.R_WB[0], top.R_WB0, atol=1e-15)
+    np.testing.assert_allclose(first.w_WB_B[0], top.w_WB_B0, atol=1e-15)
+
+
+STEEP = [MuJoCo("Euler"), MuJoCo("RK4"), Pinocchio("Euler"), Pinocchio("RK4"), SciPy()]
+STEEP += [Heyoka(frame=frame) for frame in ("body", "lean", "base_vectors")]
+
+
+@pytest.mark.parametrize("every", [1, 100])
+@pytest.mark.parametrize("method", STEEP, ids=lambda m: m.name)
+def test_a_run_that_ends_early_says_so_and_writes_no_file(method, every, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scene = cv.Scene("hopeless", cv.RigidBody((1, 2, 2.5)), np.eye(3), (1e30, 1e30, 1e30), 2.0, dt=0.1)
+        found = method.run(scene, 0.01, sample_every=every)
+    assert str(found.outcome).startswith("diverged after t = 0")
+    assert len(found) <= 3  # Euler's method overflows in the third step
+    assert isinstance(found.failure, cv.Diverged)
+    assert not list(tmp_path.iterdir())
+
+
+def test_explicit_steps_that_are_too_long_diverge():
+    found = MuJoCo("Euler").run(cv.scenes.brick_flip(), 1.0, t_end=2000, sample_every=1)
+    assert "MuJoCo warned of" in str(found.outcome)
+    assert 0 < found.t[-1] < 2000
+    assert np.isfinite(found.energy).all()
+
+
+STEPS = (40, 80, 160, 320)
+
+mujoco_4 = pytest.mark.skipif(version("mujoco") != "4.0.0", reason="measured with MuJoCo 4.0.0; it changes between versions")
+METHODS = [
+    *(pytest.param(method, marks=mujoco_4, id=method.name) for method in MuJoCo.variants()),
+    *(pytest.param(method, id=method.name) for method in Pinocchio.variants()),
+]
+
+
+def errors(scene, method):
+    """Return errors at the end for each number of steps: attitude, rates, energy, world momentum."""
+    truth = Precise(113).prepare(scene, Grid(scene.t_end / 4, 4))()
+    rows = []
+    for n in STEPS:
+        found = method.prepare(scene, Grid(scene.t_end / n, n, n))()
+        rows.append(
+            [
+                angle_between(truth.R_WB[-1], found.R_WB[-1]),
+                np.abs(truth.w_WB_B[-1] - found.w_WB_B[-1]).max(),
+                abs(found.energy[-1] - truth.energy[0]),
+                np.linalg.norm(found.momentum_W[-1] - truth.momentum_W[-1]),
+            ]
+        )
+    return np.array(rows)
+
+
+def slopes(values):
+    """Return orders from a log-log fit over all steps."""
+    return -np.polyfit(np.log(STEPS), np.log(values), 1)[0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", ["free", "heavy"])
+def test_observed_order_is_the_one_claimed(method, name, request):
+    attitude, rates, energy, momentum = slopes(errors(request.getfixturevalue(name), method))
+    # Measured over both scenes: 0.98 to 1.01 and 3.96 to 4.01.
+    assert attitude == pytest.approx(method.order, abs=0.1)
+    assert rates == pytest.approx(method.order, abs=0.1)
+    assert momentum > method.order - 0.1
+    assert energy > method.order - 0.1
+
+
+# Relative drift of energy on the brick after 6 s of steps of 0.01 s: (method, least, most).
+DRIFTS = [("Euler", 0.2, 0.25), ("RK4", -3e-8, -1e-8), ("implicit", -0.2, -0.15)]
+DRIFTS += [("implicitfast", -0.2, -0.15), ("discrete", -0.2, -0.15)]
+
+
+@mujoco_4
+@pytest.mark.parametrize(("integrator", "least", "most"), DRIFTS)  # measured 0.224, -1.7e-8, -0.168, -0.168, -0.168
+def test_energy_drift_of_mujoco_on_the_brick(integrator, least, most):
+    found = cv.integrate(cv.scenes.brick_flip(), 0.01, MuJoCo(integrator))
+    assert least < found.energy[-1] / found.energy[0] - 1 < most
+
+
+@mujoco_4
+def test_implicitfast_and_discrete_are_semi_implicit_euler_on_a_ball_joint(heavy):
+    """The implicit treatment of the gyroscopic term that they give a free joint is not given to a ball joint."""
+    euler, *others = (MuJoCo(name).run(heavy, 0.01) for name in ("Euler", "implicitfast", "discrete"))
+    for other in others:
+        assert angle_between(euler.R_WB, other.R_WB).max() < 1e-12  # measured 0
+
+
+@pytest.mark.parametrize("method", [*MuJoCo.variants(), *Pinocchio.variants()], ids=lambda method: method.name)
+def test_evaluations_are_those_of_the_stages_of_each_step(method, free):
+    counters = method.run(free, 0.1, t_end=0.7).counters
+    assert (counters.steps, counters.evaluations) == (7, 7 * (4 if method.order == 4 else 1))
+
+
+def test_evaluations_of_an_adaptive_method_are_more_than_its_steps(free):
+    counters = SciPy("DOP853").run(free, 0.5).counters
+    assert counters.evaluations >= 12 * counters.steps > 12  # twelve stages a step
+
+
+def test_steps_from_sample_to_sample_are_all_counted(free):
+    few, many = (Heyoka(1e-9).prepare(free, Grid(free.t_end / n, n))() for n in (4, 40))
+    assert few.counters.steps >= many.counters.steps > 4  # steps that are cut at samples are not fewer
+
+
+@pytest.mark.parametrize("bad", [1, 3])
+def test_a_run_was_good_up_to_the_last_sample_that_is_finite(bad, free):
+    grid = Grid(0.1, 5)
+    R = np.broadcast_to(np.eye(3), (6, 3, 3))
+    w = np.ones((6, 3))
+    w[bad] = np.nan
+    found = principal_axes(free).trajectory(grid, "planted", R, w, Counters(5))
+    assert len(found) == bad
+    assert isinstance(found.failure, cv.Diverged)
+    assert found.outcome.time == found.t[-1] == grid.t[bad - 1]
+
+
+def test_a_closed_form_has_every_sample_of_many(top):
+    n = 2 * _BLOCK + 3
+    many = Exact().prepare(top, Grid(2.0 / n, n))()
+    for k in (_BLOCK - 1, _BLOCK, 2 * _BLOCK - 1, n):
+        alone = Exact().prepare(top, Grid(float(many.t[k]), 1))()
+        assert angle_between(alone.R_WB[-1], many.R_WB[k]) < 1e-13, k  # measured 1e-16
+        np.testing.assert_allclose(alone.w_WB_B[-1], many.w_WB_B[k], atol=1e-13)
+
+
+class Counted:
+    """A module whose function `mj_step` is counted: the steps of each call."""
+
+    def __init__(self, module):
+        self.module, self.steps = module, []
+
+    def __getattr__(self, name):
+        return getattr(self.module, name)
+
+    def mj_step(self, model, data, nstep=1):
+        self.steps.append(nstep)
+        return self.module.mj_step(model, data, nstep)
+
+
+def test_mujoco_makes_the_steps_between_samples_in_one_call(free):
+    """A loop over `mj_step` in Python has the same states and takes many times as long."""
+    mj, grid = Counted(mujoco), Grid(0.01, 60, 20)
+    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
+    assert mj.steps == [20, 20, 20]
+
+
+def test_mujoco_makes_close_samples_in_one_call(free, monkeypatch):
+    mj, grid, calls = Counted(mujoco), Grid(0.01, 60, 2), []
+    rollout = mujoco.rollout.rollout
+    monkeypatch.setattr(mujoco.rollout, "rollout", lambda *args, **how: calls.append(how["nstep"]) or rollout(*args, **how))
+    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
+    assert calls == [60]
+    assert mj.steps == []
+
+
+BRICK = cv.scenes.brick_flip(t_end=1.0)
+FAST = BRICK.rename("fast", w_WB_B0=(0.0, 1e30, 1e29))
+
+
+@pytest.mark.parametrize("n_steps", [2, 20])
+@pytest.mark.parametrize("name", ["scipy", "scipy:LSODA", "scipy:Radau", "precise:64"])
+def test_a_run_that_would_take_for_ever_ends_at_once(name, n_steps):
+    found = cv.integrate(FAST, 1 / n_steps, registry.method(name), on_failure="return")
+    assert found.outcome.kind is cv.OutcomeKind.DIVERGED
+    assert "step limit of 10000000 out of reach" in found.outcome.reason
+    np.testing.assert_array_equal(found.w_WB_B, [FAST.w_WB_B0])
+
+
+@pytest.mark.parametrize("n_steps", [2, 20])
+def test_heyoka_ends_too(n_steps):
+    found = cv.integrate(BRICK.rename("fast", w_WB_B0=(0.0, 1e20, 1e19)), 1 / n_steps, Heyoka(1e-9), on_failure="return")
+    assert found.outcome.kind is cv.OutcomeKind.DIVERGED
+    assert "step limit" in found.outcome.reason
+
+
+@pytest.mark.parametrize("n_steps", [2, 20])
+def test_heyoka_stops_at_the_limit_itself(monkeypatch, n_steps):
+    for module in (engine, heyoka):
+        monkeypatch.setattr(module, "STEP_LIMIT", 5)
+    found = cv.integrate(BRICK, 1 / n_steps, Heyoka(1e-12), on_failure="return")
+    assert found.outcome.reason == "step limit of 5 reached"
+    assert 1 <= len(found) <= n_steps
+    assert found.counters.steps == 5
+
+
+def test_scipy_stops_at_the_limit_itself(monkeypatch):
+    monkeypatch.setattr(engine, "STEP_LIMIT", 5)
+    found = cv.integrate(BRICK, 0.1, SciPy(), on_failure="return")
+    assert found.outcome.reason == "step limit of 5 reached"
+
+
+def test_a_function_that_fails_in_an_engine_is_named():
+    hook, calls = np.array([0.0, 0.1, 0.4]), []
+
+    def gradient(R):
+        calls.append(R)
+        if len(calls) > 50:
+            raise ZeroDivisionError("gone")
+        return np.outer([0, 0, 1], 4 * (R[2] @ hook) ** 3 * hook)
+
+    field = cv.FunctionPotential(lambda R: (R[2] @ hook) ** 4, gradient)
+    scene = cv.Scene("s", BRICK.body, np.eye(3), (0.1, 0.2, 3.0), 1.0, field)
+    with pytest.raises(cv.PotentialFailed) as caught:
+        cv.integrate(scene, 0.1, SciPy())
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+def test_what_is_timed_does_not_look_for_a_reason_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr(heyoka, "pace_reason", lambda *given: asked.append(given) or "")
+    run = Heyoka(1e-6).prepare(registry.scene("brick_flip"), cv.Grid(0.1, 10))
+    for _ in range(3):
+        assert run().outcome.ok
+    assert len(asked) == 1
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept():
+    yield
+    engine.version.cache_clear()
+
+
+def test_a_missing_engine_is_an_error_with_the_line_that_installs_it():
+    with pytest.raises(cv.MissingEngine, match="pip install no-such-engine"):
+        engine.version("no-such-engine", "NoSuch")
+    with pytest.raises(cv.MissingEngine, match="pip install no-such-engine"):
+        engine.load("no_such_engine", "no-such-engine", "NoSuch")
+
+
+@pytest.mark.parametrize("name", ["mujoco:RK4", "pinocchio:RK4", "heyoka:1e-9", "precise:128"])
+def test_methods_of_a_missing_engine_cannot_be_made(name, monkeypatch):
+    def missing(package):
+        raise engine.metadata.PackageNotFoundError(package)
+
+    engine.version.cache_clear()
+    monkeypatch.setattr(engine.metadata, "version", missing)
+    with pytest.raises(cv.MissingEngine, match=r"pip install (mujoco|pin|heyoka)$"):
+        registry.method(name)
+
+
+def test_symmetric_axes_end_with_the_axis(top, heavy):
+    axes = engine.symmetric_axes(top)
+    assert orthonormality(axes.R_BF) < 1e-15  # measured 3e-16
+    np.testing.assert_allclose(axes.R_BF @ np.diag(axes.J) @ axes.R_BF.T, top.body.inertia, atol=1e-14)  # measured 1.3e-15
+    assert axes.J[0] == pytest.approx(2.1, rel=1e-14)
+    assert axes.moment[2] == pytest.approx(3.1 * 0.5, rel=1e-14)
+    assert engine.symmetric_axes(heavy) is None
+
+
+def test_a_mass_model_gives_back_inertia_and_weight(heavy, top):
+    for scene in (heavy, top, cv.scenes.lagrange_top(), cv.scenes.lie_group_top()):
+        axes = engine.principal_axes(scene)
+        mass = engine.mass_model(axes)
+        c = mass.com
+        about_pivot = mass.body.inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        np.testing.assert_allclose(about_pivot, np.diag(axes.J), atol=1e-15 * axes.J.max())  # measured 0
+        np.testing.assert_allclose(mass.mass * mass.gravity * c, axes.moment, atol=1e-13)  # measured 2e-16
+        a, b, largest = np.sort(mass.body.moments)
+        assert a + b >= largest
+
+
+def test_the_paper_s_cone_has_its_own_mass_and_so_has_its_slow_motion():
+    """With another mass it would be another body to engines whose joints are constraints between free bodies."""
+    mass, lever, J1, _ = cone(0.1, 2700.0)
+    for scene in (cv.scenes.lagrange_top(), cv.scenes.lagrange_top(slow=4)):
+        found = engine.mass_model(engine.principal_axes(scene))
+        assert np.isclose(found.mass, mass, rtol=1e-12)
+        ball = (J1 - mass * lever**2) * np.eye(3)
+        np.testing.assert_allclose(found.body.inertia, ball, rtol=1e-12, atol=1e-12 * J1)
+
+
+def test_bodies_without_a_mass_distribution_have_no_mass_model():
+    gravity = cv.UniformGravity(2, (0, 0, 1))
+    for inertia, potential in (((1, 1, 3), None), ((1, 2, 3), gravity)):  # the second: planar, weight out of its plane
+        scene = cv.Scene("odd", cv.RigidBody(inertia), np.eye(3), (1, 2, 3), 1.0, potential)
+        assert "no mass distribution" in engine.mass_model_reason(scene)
+        with pytest.raises(cv.Unsupported, match="no mass distribution"):
+            cv.integrate(scene, 0.1, registry.method("mujoco:RK4"))
+
+
+def test_a_planar_body_with_its_weight_in_its_plane_has_a_mass_model():
+    B = rotation_about((1, 2, -1), 2.0)
+    scene = cv.Scene(
+        "plate", cv.RigidBody(B @ np.diag((1, 2, 3)) @ B.T), B, (1, 2, 3), 1.0, cv.UniformGravity(2, B @ (0.3, 0.4, 0))
+    )
+    assert engine.mass_model_reason(scene) is None
