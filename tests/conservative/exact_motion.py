@@ -67,6 +67,11 @@ def move(scene, t):
     return y[:, :9].reshape(-1, 3, 3), y[:, 9:]
 
 
+def drift(trajectory):
+    """The largest drift of any invariant of the scene, relative to its scale."""
+    return max(float(np.abs(trajectory.drift(invariant)).max()) for invariant in trajectory.scene.invariants)
+
+
 MOVES = {}
 
 

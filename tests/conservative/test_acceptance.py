@@ -1,7 +1,9 @@
-"""What a method gives is ok only if it is a trajectory of the scene on the grid, finite, and keeps what the method names."""
+"""A result is ok only if it is a finite trajectory of the scene on the grid and keeps the invariants within its bounds."""
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -10,8 +12,12 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.attitude import axes_about, rotation_about
 from conservative.errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
+from conservative.invariants import kept_sizes
+from conservative.kernels import drifts
 from conservative.method import Grid, Method, Role
+from conservative.methods.bounds import bounds_of
 from conservative.outcome import OutcomeKind
 from conservative.trajectory import Bounds, Trajectory
 
@@ -199,3 +205,107 @@ def test_ill_conditioned_bodies_are_right_or_an_outcome() -> None:
 def test_default_bounds_are_stated() -> None:
     assert Foreign().bounds(BRICK, GRID) == Bounds(drift=1e-3, orthonormality=0.1)
     assert issubclass(NotConserved, IntegrationFailed)
+
+
+EPS = sys.float_info.epsilon
+ALLOWED = 1e-9
+
+
+def scene(moments=(3.0, 4.0, 6.0)):
+    return cv.Scene("free", cv.RigidBody(moments), np.eye(3), (1, 2, 3), 1.0)
+
+
+def test_rounding_and_tolerances_add_up_over_the_steps():
+    assert bounds_of(scene(), Grid(0.1, 90)).drift == pytest.approx(4 * EPS * 100 * 2, rel=1e-12, abs=0)
+    assert bounds_of(scene((1.0, 7.0, 7.5)), Grid(0.1, 90)).drift == pytest.approx(4 * EPS * 100 * 7.5, rel=1e-12, abs=0)
+    assert bounds_of(scene(), Grid(0.1, 90), tol=1e-9).drift == pytest.approx(10 * 90 * 1e-9, rel=1e-6, abs=0)
+    assert bounds_of(scene(), Grid(0.1, 90), tol=1.0).drift == 1e-3
+
+
+def test_attitudes_from_quaternions_are_orthonormal_and_others_as_good_as_the_rest():
+    assert bounds_of(scene(), Grid(0.1, 90)).orthonormality == 1e-13
+    loose = bounds_of(scene(), Grid(0.1, 90), 1e-9, None)
+    assert loose.orthonormality == loose.drift > 1e-7
+
+
+def test_bounds_of_methods_with_a_tolerance():
+    grid = Grid(0.1, 90)
+    assert cv.Reduced(tol=1e-9).bounds(scene(), grid) == bounds_of(scene(), grid, 1e-9)
+    assert cv.Convected(1e-7).bounds(scene(), grid) == bounds_of(scene(), grid, 1e-7, None)
+
+
+def test_bounds_of_parts_are_those_of_all_parts():
+    grid = Grid(0.1, 90)
+    assert cv.Substepped(most=8).bounds(scene(), grid) == cv.Reduced().bounds(scene(), Grid(0.0125, 720))
+
+
+def samples(n_steps=7, every=3):
+    """Samples of a body that turns steadily, at their times, with what is kept of it."""
+    grid, w = Grid(0.1, n_steps, every), np.array([0.3, -0.2, 0.4])
+    R = np.array([rotation_about(w, np.linalg.norm(w) * t) for t in grid.t])
+    constants = np.zeros((5, 4))
+    constants[0] = 1.0, 0.0, 0.0, 0.5 * w @ w + 2.0
+    constants[1, :3], constants[1, 3] = w, w @ w
+    return [0.1, every, n_steps, grid.t.copy(), R, np.tile(w, (len(R), 1)), np.full(len(R), 2.0), np.eye(3), constants]
+
+
+def is_kept(*given):
+    return drifts.are_kept(*given, ALLOWED, ALLOWED)
+
+
+@pytest.mark.parametrize("n_steps", [1, 6, 7])
+def test_good_samples_are_kept(n_steps):
+    assert is_kept(*samples(n_steps))
+
+
+@pytest.mark.parametrize("sample", [0, 1, 2, 3])
+@pytest.mark.parametrize("array", [3, 4, 5, 6])
+@pytest.mark.parametrize("value", [1.1, np.nan])
+def test_one_number_that_is_off_is_noticed(sample, array, value):
+    given = samples()
+    given[array][sample] = given[array][sample] * value + 1e-3
+    assert not is_kept(*given)
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.98, True), (1.02, False)])
+def test_the_bounds_are_where_they_are_said_to_be(share, kept):
+    given = samples()
+    given[6][2] += share * ALLOWED
+    assert is_kept(*given) is kept
+    given = samples()
+    given[7] = np.zeros((3, 3))  # without any momentum attitudes count for their skewness alone
+    given[8][:] = 0.0
+    given[4][1] *= np.sqrt(1 + share * ALLOWED / 3)
+    assert is_kept(*given) is kept
+
+
+MOMENTS = np.array((1.0, 4.0, 25.0))
+
+
+def test_momentum_is_relative_to_what_all_the_energy_makes_with_the_largest_moment():
+    scene = cv.Scene("near rest", cv.RigidBody(MOMENTS), np.eye(3), (1e-3, 0, 0), 1.0, cv.UniformGravity(2, (0, 0, 3)))
+    (found,) = kept_sizes(scene, frozenset({"vertical momentum"})).values()
+    assert found == pytest.approx(math.sqrt(2 * scene.energy_scale * 25), rel=1e-12)
+    (own,) = kept_sizes(scene, frozenset({"energy"})).values()
+    assert own == scene.energy_scale
+
+
+@pytest.mark.parametrize("along", range(3))
+@pytest.mark.parametrize("off", [1, 2])
+def test_a_momentum_that_turns_aside_is_not_kept(along, off):
+    """The momentum is along one axis of the world, and the last sample is turned so that one other component changes."""
+    w = np.array((0.3, -0.5, 0.4))
+    axes = np.roll(axes_about(w * MOMENTS / np.linalg.norm(w * MOMENTS)), along - 2, axis=1)  # column `along` is the momentum's
+    scene = cv.Scene("turned", cv.RigidBody(MOMENTS), axes.T, w, 1.0)
+    about = np.eye(3)[(along + off) % 3]
+
+    def turn(good):
+        R_WB = good.R_WB.copy()
+        R_WB[-1] = rotation_about(about, 0.01) @ R_WB[-1]
+        return replace(good, R_WB=R_WB)
+
+    grid = Grid(0.01, 3)
+    assert WithKernel(kept=frozenset({"momentum"})).solve(scene, grid).ok
+    found = WithKernel(turn, frozenset({"momentum"})).solve(scene, grid)
+    assert found.outcome.kind is cv.OutcomeKind.NOT_CONSERVED
+    assert len(found) == 3

@@ -88,11 +88,3 @@ def test_the_default_set_is_the_best_of_its_order() -> None:
             run = cv.Reduced(order, rival.name).run(TOP, 3.0 / n, sample_every=10**9)
             errors[rival.name] = float(angle_between(reference(), run.R_WB[-1]))
         assert min(errors, key=lambda rival: errors[rival]) == name
-
-
-@pytest.mark.parametrize(
-    ("order", "name"), [(3, None), (0, None), (True, None), ("4", None), (4, "kahan_li_9"), (4, "no_such")]
-)
-def test_unknown_orders_and_names_are_refused(order: object, name: str | None) -> None:
-    with pytest.raises(cv.BadInput):
-        cv.Reduced(order, name)

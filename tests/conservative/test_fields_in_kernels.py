@@ -5,18 +5,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from conservative import LinearSpring
-from conservative.kernels import fields, point_fields
+from conservative.kernels import fields
 
 from .exact_motion import FIELDS, TURN, in_field, torque
 
 FIELDS_WITH_REST = {**FIELDS, "spring at 0": LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0.2, 0.3))}
 SCENES = {name: in_field("gravity").rename(name, potential=field) for name, field in FIELDS_WITH_REST.items()}
-KINDS = {"gravity": "Uniform", "gradient": "Gradient", "function": "Function", "attraction": "Attraction"}
 Q = (0.9, -0.5, 0.7, 1.1)
 A = np.array([0.31, -0.22, 0.43])
 EPSILON = 1e-5
-X, ORIGIN = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-FUNCTIONS = (fields.energy, fields.body_torque, fields.finite_torque, fields.finite_derivative, point_fields.slope)
 
 
 def matrix(q):
@@ -32,7 +29,7 @@ def columns(R):
     return np.ascontiguousarray(R.T).reshape(9)
 
 
-@pytest.fixture(params=list(SCENES), ids=lambda name: f"{KINDS.get(name, 'Spring')}, {name}")
+@pytest.fixture(params=SCENES)
 def case(request):
     """A scene, and its field in the body's principal axes, which are not those of the body."""
     scene = SCENES[request.param]
@@ -86,29 +83,3 @@ def test_finite_derivative_is_the_potentials(case):
     for k, e in enumerate(EPSILON * np.eye(9)):
         ends = [fields.finite_derivative(field, columns(R0), columns(R1) + side * e)[0] for side in (1, -1)]
         np.testing.assert_allclose(dV_star[:, k], (ends[0] - ends[1]) / (2 * EPSILON), atol=3e-9)
-
-
-@pytest.mark.parametrize(
-    "field", [point_fields.Spring((1, 0, 0), (0, 0, 0), 3.0, 0.4), point_fields.Attraction((1, 0, 0), (0, 0, 0), 2.0)]
-)
-def test_slope_is_a_divided_difference(field):
-    """Of Spring and Attraction, over the square of the distance."""
-
-    def F(s):
-        spring = isinstance(field, point_fields.Spring)
-        return 0.5 * field.stiffness * (np.sqrt(s) - field.rest) ** 2 if spring else -field.strength / np.sqrt(s)
-
-    value, change = point_fields.slope(field, 1.3, 2.1)
-    assert value == pytest.approx((F(2.1) - F(1.3)) / 0.8, rel=1e-14)
-    ends = [point_fields.slope(field, 1.3, 2.1 + side * EPSILON)[0] for side in (1, -1)]
-    assert change == pytest.approx((ends[0] - ends[1]) / (2 * EPSILON), rel=1e-8)
-    assert point_fields.slope(field, 1.3, 1.3)[0] == pytest.approx((F(1.3 + 1e-4) - F(1.3 - 1e-4)) / 2e-4, rel=1e-7)
-
-
-@pytest.mark.parametrize(
-    "function", [fields.energy, fields.body_torque, fields.finite_torque, fields.finite_derivative, point_fields.slope]
-)
-def test_what_is_no_field_is_refused(function):
-    """Whether it is Uniform, Spring, Attraction, Gradient or Function."""
-    with pytest.raises(TypeError, match="not a field: 'none'"):
-        function("none", 1.0, 2.0) if function not in (fields.energy, fields.body_torque) else function("none", 1.0)

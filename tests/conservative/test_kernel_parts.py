@@ -1,17 +1,20 @@
-"""Parts of kernels whose faults a whole run hides: carries, limits of trust, the kind of a failure, ends of series."""
+"""Parts of kernels whose faults a whole run hides: carries, limits of trust, kinds of failure, ends of series, rare steps."""
 
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
 from mpmath import MPContext
+from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import angle_between
-from conservative.kernels import gauss, moser_veselov, reduced
+from conservative.kernels import gauss, moser_veselov, reduced, samples, twofold, vector
 from conservative.method import Grid
+from conservative.methods import reduced as reduced_method
 from conservative.methods.coefficients.gauss_legendre import tableau
 from conservative.methods.gauss import convert, find_coefficients
 from conservative.methods.moser_veselov import find_polhode
@@ -166,3 +169,106 @@ def test_a_step_of_moser_and_veselov_has_the_error_of_its_order(order: int) -> N
         return float(np.abs(found - exact).max())
 
     assert np.log2(error(0.8) / error(0.4)) == pytest.approx(order + 1, abs=0.6)
+
+
+BRICK = cv.scenes.brick_flip()
+
+
+@pytest.mark.parametrize("pause", [4, 5, 7])
+def test_samples_are_where_they_are_without_pauses(pause):
+    model, coefficients = reduced_method.convert(BRICK, cv.Reduced())[2], reduced_method.find_coefficients(2, None, 1e-20, 0.01)
+    found = []
+    for length in (0, pause):
+        q, L = np.zeros((8, 4)), np.zeros((8, 3))
+        reduced.enter(*model, *coefficients, 20, 3, length, q, L)
+        found.append((q, L))
+    for whole, parts in zip(*found, strict=True):
+        np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-14)
+
+
+def test_a_long_quaternion_is_divided_with_what_it_lost():
+    q, carry = (1.3, -0.4, 0.7, 0.2), (1e-3, -2e-3, 3e-3, 4e-3)
+    ends = (0.0, 0.6, 0.8), (0.6, 0.0, 0.8)
+    long = gauss.LONGEST
+    short, left = gauss.carry_attitude(q, carry, (0.0, 0.0, 1.0), 1.0, *ends)
+    divided = gauss.carry_attitude(tuple(long * x for x in q), tuple(long * x for x in carry), (0.0, 0.0, 1.0), 1.0, *ends)
+    assert divided == (short, left)
+    assert max(map(abs, left)) > 0
+
+
+RNG = np.random.default_rng(7)
+P = tuple(float(x) for x in RNG.normal(size=4))
+
+
+def plain(function: Any) -> Any:
+    """A kernel as Python, so that nothing is compiled for a test."""
+    return getattr(function, "py_func", function)
+
+
+def matrix(q):
+    return Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
+
+
+def close(found, expected):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=4e-15)
+
+
+def test_a_compensated_sum_keeps_what_it_rounds_away():
+    total, carry = 1.0, 0.0
+    for _ in range(1000):
+        total, carry = plain(vector.accumulate)(total, carry, 1e-17)
+    assert total == 1.0 + 45 * 2.0**-52  # 1e-14
+    assert total - carry == pytest.approx(1.0 + 1e-14, abs=3e-16)
+
+
+def exact(x):
+    return Fraction(x[0]) + Fraction(x[1])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_twofold_numbers_have_thirty_digits(seed):
+    rng = np.random.default_rng(seed)
+
+    def number():
+        high = float(rng.normal())
+        return (high, float(high * 1e-17 * rng.uniform(-1, 1)))
+
+    x, y, f = number(), number(), float(rng.normal())
+    for found, expected in (
+        (twofold.plus(x, y), exact(x) + exact(y)),
+        (twofold.minus(x, y), exact(x) - exact(y)),
+        (twofold.times(x, y), exact(x) * exact(y)),
+        (twofold.scale(f, x), Fraction(f) * exact(x)),
+        (twofold.over(x, y), exact(x) / exact(y)),
+        (twofold.two(f), Fraction(f)),
+    ):
+        size = max(abs(expected), abs(exact(x)), abs(exact(y))) if expected else 1
+        assert abs(exact(found) - expected) <= size * Fraction(1, 10**30)
+        assert found[0] + found[1] == found[0]
+
+
+@pytest.mark.parametrize("spin", [None, (0.8, 1 / 3)])
+@pytest.mark.parametrize("turn", [None, matrix(P)])
+def test_samples_in_body_axes(spin, turn):
+    n, J_inverse = 3, (1.0, 0.5, 0.25)
+    t, q, L = np.array([0.0, 0.7, 1.9]), RNG.normal(size=(n, 4)), RNG.normal(size=(n, 3))
+    R, w = np.empty((n, 3, 3)), np.empty((n, 3))
+    assert samples.to_body_axes(t, q, L, J_inverse, spin, turn, R, w) == n
+    frame = np.eye(3) if turn is None else turn
+    for i in range(n):
+        angle, rates = (0.0, L[i] * J_inverse) if spin is None else (spin[0] * t[i], L[i] * (*J_inverse[:2], spin[1]))
+        own = Rotation.from_rotvec([0, 0, angle]).as_matrix()
+        close(R[i], matrix(q[i]) @ own @ frame.T)
+        close(w[i], frame @ own.T @ rates)
+
+
+@pytest.mark.parametrize("broken", [0, 1, 2])
+@pytest.mark.parametrize("turn", [None, matrix(P)])
+def test_samples_that_are_not_finite_are_counted_from_the_first(broken, turn):
+    t, q, L = np.zeros(3), np.tile(P, (3, 1)), np.tile((0.5, -0.4, 0.9), (3, 1))
+    for place in (q[broken, 1:2], L[broken, 2:], L[broken, :1]):
+        kept = place.copy()
+        place[:] = np.nan
+        found = samples.to_body_axes(t, q, L, (1.0, 1.0, 1.0), None, turn, np.empty((3, 3, 3)), np.empty((3, 3)))
+        assert found == broken
+        place[:] = kept

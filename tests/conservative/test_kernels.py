@@ -7,19 +7,18 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 
 import conservative as cv
 from conservative.deferred_imports import kernels
-from conservative.kernels.protocol import Result, Workspace, find_ends
-from conservative.methods.principal_axes import principal_start
-from conservative.methods.run_kernel import prepare_run
+from conservative.kernels.protocol import Result, Workspace
 from conservative.registry import list_families
+
+from ..environments import run_python
 
 SHORT_RUNS = Path(__file__).with_name("short_runs.py")
 PACKAGE = Path(cv.__file__).parent
@@ -110,30 +109,14 @@ def test_a_kernel_takes_loose_values_by_the_fields_of_its_tuples(name: str, monk
             plain_enter(module)(*wrong)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_field_that_only_one_side_has_is_an_error(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The ends are those of the fields before: a model with one more does not shift what comes behind it."""
-    module = kernels(name)
-    more = NamedTuple("Model", [(field, Any) for field in (*module.Model._fields, "another")])  # type: ignore[misc]
-    assert find_ends(more, module.Coefficients) == (module.MODEL_END + 1, module.COEFFICIENTS_END + 1)
-    monkeypatch.setattr(module, "Model", more)
-    with pytest.raises(TypeError, match="another"):
-        plain_enter(module)(*named(more), *named(module.Coefficients), *named(Workspace))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_machine_code_is_not_made_for_another_number_of_values(name: str) -> None:
-    module = kernels(name)
-    n = module.COEFFICIENTS_END + len(Workspace._fields)
-    for wrong in (n - 1, n + 1):
-        with pytest.raises((TypeError, TypingError), match="Workspace"):
-            module.enter(*[1.0] * wrong)
-
-
-@pytest.mark.parametrize("values", [5, 7])
-def test_the_runner_takes_no_other_number_of_results(values: int) -> None:
-    scene = cv.scenes.brick_flip()
-    kernel = SimpleNamespace(enter=lambda *loose: (0,) * values, FAILURE="", PAUSE=1)
-    run = prepare_run(scene, cv.Grid(0.1, 1), "label", principal_start(scene), kernel, (), ())
-    with pytest.raises(ValueError, match="to unpack"):
-        run()
+@pytest.mark.slow
+def test_without_a_folder_for_compiled_code_a_run_works_and_warns() -> None:
+    code = (
+        "import warnings, conservative as cv\n"
+        "with warnings.catch_warnings(record=True) as told:\n    warnings.simplefilter('always')\n"
+        "    print(cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, 'reduced').ok)\n"
+        "print(['NUMBA_CACHE_DIR' in str(each.message) for each in told])"
+    )
+    nowhere = {"NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "NUMBA_CACHE_DIR": "/dev/null/nowhere"}
+    status, out, error = run_python(code, **nowhere)
+    assert (status, out) == (0, "True\n[True]\n"), error

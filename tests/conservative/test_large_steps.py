@@ -199,21 +199,3 @@ def test_substepping_passes_on_what_its_method_is() -> None:
     assert found.conserves == found.inner.conserves
     top = cv.Substepped("reduced:order=2/frame=non_spinning")
     assert top.unsupported(cv.scenes.brick_flip()) == top.inner.unsupported(cv.scenes.brick_flip())
-
-
-@pytest.mark.parametrize(
-    ("settings", "argument"),
-    [
-        ({"most": 0}, "most"),
-        ({"most": 2.0}, "most"),
-        ({"method": "reducd"}, "method"),
-        ({"method": "lame"}, "method"),
-        ({"method": "substepped"}, "method"),
-        ({"method": 3}, "method"),
-        ({"method": "reduced:order=3"}, "order"),
-    ],
-)
-def test_bad_substepping(settings, argument) -> None:
-    with pytest.raises(cv.BadInput) as caught:
-        cv.Substepped(**settings)
-    assert caught.value.argument == argument

@@ -5,6 +5,7 @@ import pytest
 
 import conservative as cv
 from conservative import check, registry
+from conservative.check import most_samples, require_memory
 from conservative.method import Grid, grid_for
 
 BRICK = cv.scenes.brick_flip()
@@ -40,7 +41,7 @@ def test_a_grid_holds_a_float_and_integers_whatever_numbers_it_is_given():
     np.testing.assert_array_equal(grid.t, [0, 0.5, 1, 1.5, 2])
 
 
-@pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10"])
+@pytest.mark.parametrize("text", ["reduced", "reduced:tol=1e-12", "convected:tol=1e-10", "taylor:tolerance=1e-10"])
 def test_names_are_read_back(text):
     assert registry.method(text).name == text
     assert registry.method(registry.method(text).name) == registry.method(text)
@@ -71,16 +72,24 @@ def test_what_was_reached_before_a_failure_can_be_had():
     np.testing.assert_allclose(trajectory.w_WB_B[0], BRICK.w_WB_B0, rtol=1e-15)
 
 
-def test_a_run_starts_afresh_each_time():
-    run = cv.Reduced().prepare(BRICK, Grid(0.01, 50))
-    np.testing.assert_array_equal(run().R_WB, run().R_WB)
-
-
-def test_samples_do_not_depend_on_how_many_are_kept():
-    all_of_them = cv.integrate(BRICK, 0.01, sample_every=1)
-    few = cv.integrate(BRICK, 0.01, sample_every=50)
-    np.testing.assert_array_equal(few.R_WB, all_of_them.R_WB[::50])
-    np.testing.assert_array_equal(few.w_WB_B, all_of_them.w_WB_B[::50])
+@pytest.mark.parametrize(
+    ("method", "scene"),
+    [
+        (cv.Reduced(), BRICK),
+        (cv.Gauss(2), BRICK),
+        (cv.MoserVeselov(), BRICK),
+        (cv.Lame(), cv.scenes.lagrange_top()),
+        (cv.Projected(), cv.scenes.asymmetric_top()),
+        (cv.Taylor(), cv.scenes.asymmetric_top()),
+        (cv.Taylor(tolerance=1e-10), cv.scenes.asymmetric_top()),
+    ],
+    ids=lambda value: value.name,
+)
+def test_samples_do_not_depend_on_how_many_are_kept(method, scene):
+    every, few = (method.solve(scene, Grid(0.01, 100, n)) for n in (1, 7))
+    np.testing.assert_array_equal(few.R_WB[:-1], every.R_WB[::7])
+    np.testing.assert_array_equal(few.R_WB[-1], every.R_WB[-1])
+    np.testing.assert_array_equal(few.w_WB_B[:-1], every.w_WB_B[::7])
 
 
 def test_what_does_not_turn_stays():
@@ -111,3 +120,13 @@ def test_a_name_is_the_method_of_that_name():
     )
     assert by_name.label == by_value.label
     assert np.array_equal(by_name.R_WB, by_value.R_WB)
+
+
+@pytest.mark.parametrize("rest", [0, 1, 3])
+def test_what_is_said_to_fit_fits_and_nothing_less_does(rest):
+    n_steps = 10 * (most_samples() - 1) + rest
+    least = 10 if rest == 0 else 11
+    require_memory("sample_every", n_steps, least)
+    with pytest.raises(cv.BadInput) as caught:
+        require_memory("sample_every", n_steps, least - 1)
+    assert caught.value.allowed.startswith(f"{least} or more")

@@ -183,11 +183,3 @@ def test_bad_parameters_are_named(make, argument):
     assert caught.value.argument == argument
     assert str(caught.value.got)
     assert caught.value.allowed
-
-
-def test_parameters_cannot_be_changed():
-    spring = POTENTIALS["spring"]
-    with pytest.raises(AttributeError):
-        spring.stiffness = 2.0
-    with pytest.raises(ValueError, match="read-only"):
-        spring.point_B[0] = 1.0

@@ -1,4 +1,4 @@
-"""Explicit steps projected onto the invariants, against collocation of high order, in every kind of field."""
+"""Explicit steps projected onto the invariants, against collocation of high order in every field; the projection itself."""
 
 from dataclasses import replace
 
@@ -7,7 +7,11 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, orthonormality, rotation_about
+from conservative.kernels import projected, reduced
 from conservative.methods.coefficients.explicit import DORMAND_PRINCE_8, ExplicitTableau
+from conservative.methods.projected import convert
+
+from .exact_motion import drift, in_field
 
 TURN = rotation_about((1, -2, 0.5), 1.1)
 BODY = cv.RigidBody(TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T)
@@ -32,11 +36,6 @@ SLOW = ("two functions", "no axis")
 
 def scene(field: str, t_end: float = 2.0) -> cv.Scene:
     return cv.Scene("generic", BODY, rotation_about((0.3, -0.5, 0.8), 0.7), (1.2, -2.0, 0.7), t_end, FIELDS[field])
-
-
-def drift(trajectory: cv.Trajectory) -> float:
-    """The largest drift of any invariant of the scene, relative to its scale."""
-    return max(float(np.abs(trajectory.drift(invariant)).max()) for invariant in trajectory.scene.invariants)
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -77,23 +76,6 @@ def test_a_body_at_rest_in_equilibrium_stays() -> None:
     assert angle_between(trajectory.R_WB[0], trajectory.R_WB[-1]) < 1e-15  # measured 0
 
 
-def test_a_step_that_cannot_be_projected_says_so() -> None:
-    trajectory = cv.integrate(scene("gravity"), 2.0, cv.Projected(), on_failure="return")
-    assert str(trajectory.outcome).startswith("not converged in step 1")
-    assert "too far from the invariants" in str(trajectory.outcome)
-    assert len(trajectory) == 1
-
-
-def test_samples_do_not_change_the_motion() -> None:
-    all_of_them, few = (cv.integrate(scene("gravity"), 0.05, cv.Projected(), sample_every=every) for every in (1, 7))
-    assert np.array_equal(all_of_them.R_WB[[0, 7, 14, 21, 28, 35, 40]], few.R_WB)
-
-
-def test_a_free_body_has_a_better_method() -> None:
-    with pytest.raises(cv.Unsupported, match="bodies in a field"):
-        cv.integrate(cv.scenes.brick_flip(), 0.01, cv.Projected())
-
-
 @pytest.mark.parametrize("digit", range(12))
 def test_a_wrong_digit_in_the_weights_is_noticed(digit: int) -> None:
     b = list(DORMAND_PRINCE_8.b)
@@ -110,3 +92,106 @@ def test_a_wrong_digit_in_a_stage_is_noticed() -> None:
         replace(DORMAND_PRINCE_8, A=tuple(tuple(row) for row in rows))
     with pytest.raises(cv.BadInput, match="rows of"):
         ExplicitTableau("none", 1, ((), ()), (0.5, 0.5))
+
+
+J = np.array([1.0, 1.4, 2.0])
+L = np.array([0.8, -1.9, 1.1])
+Q = (0.5, -0.5, 0.5, 0.5)
+FIELD = in_field("gravity").potential.kernel_field(TURN)
+
+
+def triple(v):
+    return tuple(float(x) for x in v)
+
+
+def test_projected_brings_a_state_back_to_its_invariants():
+    scene = in_field("gravity")
+    field, axis, scales = scene.potential.kernel_field(TURN), (0.0, 0.0, 1.0), (3.0, 2.0)
+    inverse, q = triple(1 / J), (0.5, -0.5, 0.5, 0.5)
+    kept = projected.values(inverse, field, axis, None, q, triple(L))
+    for away in (1e-3, 1e-6):
+        moved_q, moved_L = triple(np.array(q) + away * np.array([1, 2, -1, 0.5])), triple(L + away * np.array([1, -2, 3]))
+        back_q, back_L, corrections, defect = projected.project(inverse, field, axis, None, kept, scales, moved_q, moved_L)
+        now = projected.values(inverse, field, axis, None, back_q, back_L)
+        np.testing.assert_allclose(now, kept, atol=4e-15)
+        assert defect <= 2.0**-51
+        assert 1 <= corrections <= 3
+        assert np.linalg.norm(back_q) == pytest.approx(1, abs=1e-10)
+        assert np.abs(np.subtract(back_L, moved_L)).max() < 10 * away
+
+
+def test_projected_leaves_a_state_that_is_too_far_away():
+    field, axis, scales = FIELD, (0.0, 0.0, 1.0), (3.0, 2.0)
+    inverse = triple(1 / J)
+    kept = projected.values(inverse, field, axis, None, Q, triple(L))
+    for factor, corrected in ((1.02, True), (1.5, False)):
+        _, found, corrections, defect = projected.project(inverse, field, axis, None, kept, scales, Q, triple(factor * L))
+        assert (corrections > 0) == corrected == (defect < 1e-15)
+        assert corrected or found == triple(factor * L)
+    failed = cv.Projected().prepare(in_field("gravity"), cv.Grid(4.0, 6, 1))()
+    assert failed.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
+    assert failed.outcome.residual > 1e-6
+    assert failed.counters.evaluations == 12 * failed.counters.steps
+
+
+def test_projected_moves_the_state_least():
+    """The correction is in the plane of the two gradients, and first order in what is asked for."""
+    field, size, w = FIELD, 2.0, L / J
+    for axis in (None, (0.0, 0.0, 1.0)):
+        e, m = 1e-5, (0.0 if axis is None else -2e-5)
+        dL, turn = projected.shortest_move(triple(1 / J), field, axis, None, size, e, m, Q, triple(L))
+        T = np.array(reduced.body_torque(field, Q))
+        assert w @ dL - T @ turn == pytest.approx(e, rel=1e-6)
+        gradients = [np.concatenate([size * w, -T])]
+        if axis is not None:
+            v = np.array(projected.in_body(Q, axis))
+            gradients.append(np.concatenate([size * v, np.cross(L, v)]))
+            assert v @ dL + np.cross(L, v) @ turn == pytest.approx(m, rel=1e-6)
+        move = np.concatenate([np.array(dL) / size, turn])
+        left = np.linalg.lstsq(np.array(gradients).T, move, rcond=None)[1]
+        assert left < 1e-22
+
+
+@pytest.mark.parametrize(("off", "defect"), [((30.0, 0.0), 10.0), ((0.0, -30.0), 15.0)])
+def test_defects_are_relative_to_the_scale_of_their_invariant(off, defect):
+    inverse, scales = triple(1 / J), (3.0, 2.0)
+    kept = np.add(projected.values(inverse, FIELD, (0.0, 0.0, 1.0), None, Q, triple(L)), off)
+    found = projected.project(inverse, FIELD, (0.0, 0.0, 1.0), None, triple(kept), scales, Q, triple(L))
+    assert found[2:] == (0, pytest.approx(defect))
+
+
+START = rotation_about((0.3, -0.5, 0.8), 0.7)
+SYMMETRIC = cv.Scene(
+    "top",
+    cv.RigidBody(TURN @ np.diag((1.1, 1.1, 0.6)) @ TURN.T),
+    START,
+    (1, -2, 3),
+    2.0,
+    cv.UniformGravity(4, 0.5 * TURN[:, 2]),
+)
+HEAVY = cv.Scene(
+    "heavy",
+    cv.RigidBody(TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T),
+    START,
+    (1.2, -2, 0.7),
+    2.0,
+    cv.UniformGravity(4, (0.3, -0.2, 0.4)),
+)
+
+
+def test_a_top_is_kept_on_its_invariants():
+    found = cv.integrate(SYMMETRIC, 0.1, cv.Lame(), t_end=200.0)
+    assert drift(found) < 1e-14  # measured 2e-15
+    assert orthonormality(found.R_WB).max() < 1e-14
+
+
+@pytest.mark.parametrize(("defect", "done"), [(1e-16, 3), (1e-7, 3), (1e-5, 0), (1e-2, 0), (1.0, 0), (np.nan, 0)])
+def test_a_step_that_is_left_off_its_invariants_is_a_failure(defect, done, monkeypatch):
+    """The loop in Python, with a made-up projection: a real one ends on the invariants or far from them."""
+    monkeypatch.setattr(projected, "take_step", lambda *given: given[-3:-1])
+    monkeypatch.setattr(projected, "project", lambda *given: (*given[-2:], 8, defect))
+    coefficients = projected.Coefficients(*DORMAND_PRINCE_8.packed, np.array(DORMAND_PRINCE_8.c), 0.1)
+    march = getattr(projected.march, "py_func", projected.march)
+    found = march(convert(HEAVY, cv.Projected())[2], coefficients, (3, 1, 0, np.empty((4, 4)), np.empty((4, 3))))
+    assert found.done == done
+    assert found.size == pytest.approx(defect, nan_ok=True)

@@ -7,14 +7,6 @@ from conservative import deferred_imports, registry
 from conservative.errors import BadInput, NotLoadable
 
 
-@pytest.mark.parametrize("name", registry.list_scenes())
-def test_every_scene_builds_under_its_name(name):
-    scene = registry.scene(name)
-    assert scene.name == name
-    assert scene.source
-    assert scene.group != "your own"
-
-
 @pytest.mark.parametrize("name", registry.list_methods())
 def test_every_method_is_a_frozen_value_that_is_read_back_from_its_name(name):
     family = deferred_imports.list_entries(deferred_imports.METHODS)[name].load()

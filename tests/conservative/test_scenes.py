@@ -14,6 +14,8 @@ import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.invariants import JACOBI_INTEGRAL
+from conservative.references.environments.engine_method import rate_limit_reason
+from conservative.scenes import slow_motion
 from conservative.scenes.turned_frame import in_body_frame
 
 NAMES = tuple(registry.list_scenes())
@@ -188,3 +190,46 @@ def test_stable_spin_stays_within_its_polhode():
     w = cv.integrate(cv.scenes.stable_spin(1000), sample_every=50).w_WB_B
     assert np.abs(w[:, 1:]).max() < 0.2  # measured 0.153, the polhode's half-axes
     assert w[:, 0].min() > 9.999  # measured 9.99968
+
+
+LIMIT = 100.0
+"""Rate, rad/s, that PhysX and Bullet keep bodies below as they are installed."""
+SLOWER = [
+    *("cusped_top", "falling_top", "lagrange_top", "lie_group_top", "looping_top"),
+    *("needle", "nutating_top", "sleeping_top", "unduloid_top"),
+]
+
+
+def fastest_rate(scene):
+    return np.linalg.norm(cv.integrate(scene, scene.dt).w_WB_B, axis=1).max()
+
+
+@pytest.mark.parametrize("name", SLOWER)
+def test_a_slow_motion_has_the_attitudes_of_the_fast_one(name):
+    slow, fast = registry.scene(f"{name}:slow=4"), registry.scene(name)
+    here, there = (cv.integrate(scene, scene.dt, t_end=100 * scene.dt) for scene in (slow, fast))
+    assert np.array_equal(here.R_WB, there.R_WB)
+    assert np.array_equal(4 * here.w_WB_B, there.w_WB_B)
+    assert slow.name == f"{name}:slow=4"
+
+
+def test_every_scene_that_is_too_fast_for_game_engines_has_a_slow_motion():
+    rates = {name: np.linalg.norm(registry.scene(name).w_WB_B0) for name in registry.list_scenes()}
+    assert {name for name, rate in rates.items() if rate > LIMIT} == set(SLOWER)
+    assert max(fastest_rate(registry.scene(f"{name}:slow=4")) for name in SLOWER) < LIMIT / 2  # measured 46.8
+
+
+def test_an_engine_that_limits_rates_names_the_slow_motion():
+    assert rate_limit_reason(cv.scenes.lagrange_top(slow=4), LIMIT) is None
+    reason = (
+        "as installed it limits rates to 100 rad/s, and the scene starts with 141 rad/s; lagrange_top:slow=4 is a slower one"
+    )
+    assert rate_limit_reason(cv.scenes.lagrange_top(), LIMIT) == reason
+    assert rate_limit_reason(cv.scenes.lagrange_top().rename("mine"), LIMIT).endswith("starts with 141 rad/s")
+
+
+def test_a_slow_motion_needs_a_field_that_can_be_scaled():
+    for scene in (cv.scenes.sprung_body(), cv.scenes.kovalevskaya_top()):
+        with pytest.raises(cv.BadInput) as caught:
+            slow_motion(scene)
+        assert caught.value.argument == "scene"

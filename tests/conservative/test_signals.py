@@ -60,6 +60,22 @@ def test_an_interrupt_ends_runs_of_a_billion_steps() -> None:
     assert done.stdout.splitlines() == runs
 
 
+THREADS = 4
+
+
+def quartic(k):
+    """A potential whose Python functions hand the interpreter over to other threads in the middle of every answer."""
+    hook = np.array([0.0, 0.1 * k, 0.4])
+
+    def energy(R):
+        return sum(x**4 for x in (R @ hook).tolist())
+
+    def gradient(R):
+        return np.outer(4 * (R @ hook) ** 3, hook)
+
+    return cv.FunctionPotential(energy, gradient)
+
+
 class Stop(BaseException):
     """What a handler of the tests raises."""
 
@@ -116,20 +132,13 @@ def test_samples_without_end_are_interrupted_too() -> None:
     assert states(run()) == reference
 
 
-def quartic() -> cv.FunctionPotential:
-    hook = np.array([0.0, 0.1, 0.4])
-    return cv.FunctionPotential(
-        lambda R: float((R[2] @ hook) ** 4), lambda R: np.outer((0, 0, 1), 4 * (R[2] @ hook) ** 3 * hook)
-    )
-
-
 def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
     """Signals come before, during and after the Python functions; what follows is not spoiled by a half-finished evaluation."""
 
     def stop(*_: object) -> None:
         raise Stop
 
-    scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic())
+    scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic(1))
     short, long = (cv.Reduced().prepare(scene, Grid(1e-6, n, n)) for n in (5, 10**6))
     reference = states(short())
     for k in range(20):
@@ -199,3 +208,23 @@ def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: st
         pool.submit(run).result()
     assert kernel.pauses == [kernel.PAUSE, 0]
     assert kernel.PAUSE > 1000
+
+
+def in_threads(runs):
+    """Call the runs at once, all of them prepared here, and return their states."""
+    with ThreadPoolExecutor(len(runs)) as pool:
+        return [states(trajectory) for trajectory in pool.map(lambda run: run(), runs)]
+
+
+def test_one_potential_of_functions_serves_several_runs_at_once():
+    potential, body, grid = quartic(1), cv.RigidBody((1.0, 2.0, 2.5)), cv.Grid(0.01, 12)
+    scenes = [cv.Scene("own", body, np.eye(3), (0.1, k, 1.0), 1.0, potential) for k in range(THREADS)]
+    for method in (cv.Reduced(), cv.Convected()):
+        alone = [states(method.prepare(scene, grid)()) for scene in scenes]
+        assert in_threads([method.prepare(scene, grid) for scene in scenes] * 2) == alone * 2
+
+
+def test_one_scene_of_functions_runs_several_times_at_once():
+    scene = cv.Scene("own", cv.RigidBody((1.0, 2.0, 2.5)), np.eye(3), (0.1, 2.0, 1.0), 1.0, quartic(2))
+    run = cv.Reduced().prepare(scene, cv.Grid(0.01, 12))
+    assert in_threads([run] * THREADS) == [states(run())] * THREADS

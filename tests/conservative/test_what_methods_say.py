@@ -50,17 +50,21 @@ def test_order_and_invariants(method, name, order, conserves):
     [
         (lambda: cv.Gauss(0), "stages"),
         (lambda: cv.Gauss(11), "stages"),
+        (lambda: cv.Gauss(2.0), "stages"),
+        (lambda: cv.Gauss(True), "stages"),
         (lambda: cv.Gauss(2, "own"), "frame"),
         (lambda: cv.Reduced(3), "order"),
         (lambda: cv.Reduced(12), "order"),
         (lambda: cv.Reduced(True), "order"),
         (lambda: cv.Reduced(4, "one_step"), "composition"),
+        (lambda: cv.Reduced(4, "kahan_li_9"), "composition"),
         (lambda: cv.Reduced(tol=0), "tol"),
         (lambda: cv.Reduced(frame="own"), "frame"),
         (lambda: cv.Convected(-1), "tol"),
         (lambda: cv.MoserVeselov(3), "order"),
         (lambda: cv.MoserVeselov(True), "order"),
         (lambda: cv.MoserVeselov(12), "order"),
+        (lambda: cv.MoserVeselov("best"), "order"),
         (lambda: cv.Taylor(3), "order"),
         (lambda: cv.Taylor(19), "order"),
         (lambda: cv.Taylor(True), "order"),
@@ -69,6 +73,8 @@ def test_order_and_invariants(method, name, order, conserves):
         (lambda: cv.Substepped("substepped"), "method"),
         (lambda: cv.Substepped("lame"), "method"),
         (lambda: cv.Substepped(3), "method"),
+        (lambda: cv.Substepped("reducd"), "method"),
+        (lambda: cv.Substepped("reduced:order=3"), "order"),
         (lambda: Composition("odd", 3, "", ("1",)), "order"),
         (lambda: Composition("none", 0, "", ("1",)), "order"),
         (lambda: Composition("sum", 2, "", ("0.3", "0.5")), "half"),
@@ -106,6 +112,7 @@ def test_what_methods_do_not_support():
     assert cv.Projected().unsupported(FREE) == "it is for bodies in a field"
     assert cv.Reduced(frame="non_spinning").unsupported(FREE).startswith("frame non_spinning needs")
     assert cv.Substepped("gauss").unsupported(SPRUNG) == said[0]
+    assert "recurrence" in cv.Taylor().unsupported(in_field("function"))
     for method, scene in (
         (cv.Gauss(), FREE),
         (cv.Lame(), TOP),
@@ -135,43 +142,3 @@ def test_the_longest_step_of_moser_veselov():
         with pytest.raises(cv.BadInput, match="dt"):
             cv.MoserVeselov(order).prepare(FREE, cv.Grid(bound, 1, 1))
     assert cv.MoserVeselov().prepare(FREE, cv.Grid(0.999 * moser_veselov.step_limit(FREE, exact=True), 1, 1))
-
-
-@pytest.mark.parametrize("J", [(1.0, 1.4, 2.0), (2.0, 1.0, 1.4), (1.0, 1.0, 2.0), (2.0, 1.0, 1.0), (1.0, 1.0, 1.0)])
-@pytest.mark.parametrize("L", [(1.0, 0.1, 0.1), (-0.1, -1.0, 0.2), (0.1, 0.2, -1.0), (0.0, 0.0, 0.0)])
-def test_axes_of_the_polhode(J, L):
-    J, L = np.array(J), np.array(L)
-    R = moser_veselov.polhode_axes(J, L)
-    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(R) == pytest.approx(1)
-    own, momentum = np.abs(R.T) @ J, R.T @ L
-    assert momentum[2] >= 0
-    assert sorted(J)[1] == own[1]
-    above = momentum @ momentum - np.sum(momentum**2 / own) * own[1]
-    assert above * (own[2] - own[0]) >= 0
-
-
-def test_the_papers_method_stops_where_it_cannot_go_on():
-    long = cv.Convected(1e-10).prepare(GRAVITY, cv.Grid(6.0, 4, 1))()
-    assert long.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
-    assert long.counters.steps == long.outcome.step - 1 == len(long) - 1
-    assert long.outcome.residual > 1e-10
-    assert long.outcome.time == pytest.approx((long.outcome.step - 1) * 6.0)
-
-
-def test_substeps_double_until_the_steps_are_solved():
-    grid = cv.Grid(0.6, 4, 2)
-    scene = cv.scenes.lagrange_top()
-    found = cv.Substepped().prepare(scene, grid)()
-    parts = found.counters.steps // 4
-    assert parts in (2, 4, 8, 16, 32)
-    assert found.label == f"{cv.Substepped().label}, {parts} parts a step"
-    np.testing.assert_allclose(found.t, grid.t)
-    same = cv.Reduced().prepare(scene, cv.Grid(0.6 / parts, 4 * parts, 2 * parts))()
-    np.testing.assert_array_equal(found.R_WB, same.R_WB)
-    assert not cv.Reduced().prepare(scene, cv.Grid(1.2 / parts, 2 * parts, parts))().ok
-    assert cv.Substepped(most=parts).prepare(scene, grid)().ok
-    few = cv.Substepped(most=parts // 2).prepare(scene, grid)()
-    assert few.outcome.kind in (cv.OutcomeKind.NOT_CONVERGED, cv.OutcomeKind.WRONG_BRANCH)
-    easy = cv.Substepped().prepare(scene, cv.Grid(0.001, 4, 2))()
-    assert (easy.label, easy.counters.steps) == (cv.Substepped().label, 4)
