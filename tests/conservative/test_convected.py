@@ -30,13 +30,6 @@ def test_identities_9_and_10_on_orthonormal_base_vectors():
     np.testing.assert_allclose(G @ G.T, 2 * np.eye(3), atol=1e-15)
 
 
-@pytest.mark.parametrize("every", [1, 2, 3, 100])
-def test_the_last_state_is_a_sample_whatever_the_number_of_steps(every):
-    found = cv.integrate(cv.scenes.brick_flip(), 0.01, cv.Convected(), t_end=0.07, sample_every=every)
-    np.testing.assert_array_equal(found.t, cv.Grid(0.01, 7, every).t)
-    assert len(found.R_WB) == len(found.w_WB_B) == len(found.t)
-
-
 def test_conjugate_momentum_obeys_12_and_17():
     w = RNG.normal(size=3)
     p = paper.conjugate_momentum(ORTHONORMAL, J @ w)

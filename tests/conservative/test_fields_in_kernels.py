@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from conservative import LinearSpring
 from conservative.kernels import fields
 
-from .exact_motion import FIELDS, TURN, in_field, torque
+from .one_body import FIELDS, TURN, in_field, torque
 
 FIELDS_WITH_REST = {**FIELDS, "spring at 0": LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0.2, 0.3))}
 SCENES = {name: in_field("gravity").rename(name, potential=field) for name, field in FIELDS_WITH_REST.items()}

@@ -8,7 +8,7 @@ import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
 from conservative.methods.coefficients.gauss_legendre import MOST_STAGES, tableau
 
-from .exact_motion import drift
+from .one_body import drift
 
 
 def generic(kind: str, seed: int = 0) -> cv.Scene:

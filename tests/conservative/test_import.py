@@ -39,15 +39,5 @@ def test_type_checkers_see_what_the_interpreter_sees():
     assert typed == set(conservative.__all__)
 
 
-def test_the_package_lists_its_names():
-    assert printed("import conservative; print(set(conservative.__all__) <= set(dir(conservative)))") == "True"
-    assert conservative.__version__ == conservative.VERSION
-
-
-def test_a_name_that_is_not_there_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="Phantom"):
-        _ = conservative.Phantom
-
-
 def test_classes_come_back_from_a_pickle():
     assert pickle.loads(pickle.dumps(conservative.Reduced)) is conservative.Reduced

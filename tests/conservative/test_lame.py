@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import conservative as cv
 from conservative.attitude import angle_between, orthonormality, rotation_about
 
-from .exact_motion import drift
+from .one_body import drift
 
 
 def top(

@@ -11,10 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
-from conservative.kernels import COMPILED, kernel
-from conservative.kernels import moser_veselov_many as lanes
-from conservative.kernels.lanes import load_rows, save_rows
-from conservative.kernels.moser_veselov import Shift, State, take_steps
+from conservative.kernels import COMPILED
 from conservative.methods import columns
 from conservative.methods.many import Block, Bodies
 from conservative.references.precise import Precise
@@ -268,40 +265,6 @@ def test_pieces_and_repetitions_change_nothing(monkeypatch: pytest.MonkeyPatch) 
     for block in (again(), again()):
         np.testing.assert_array_equal(block.R_WB, whole.R_WB)
         np.testing.assert_array_equal(block.w_WB_B, whole.w_WB_B)
-
-
-@kernel
-def advance_four(table, states, first):
-    """200 steps of four bodies."""
-    n, flat, states_flat = table.shape[1], table.reshape(-1), states.reshape(-1)
-    at = State(*load_rows(states_flat, first, n, 5, 4))
-    save_rows(states_flat, first, n, take_steps(Shift(*load_rows(flat, first, n, 15, 4)), at, 0, 200))
-
-
-@kernel
-def advance_alone(table, states, i):
-    """200 steps of one body."""
-    c, s = table[:, i], states[:, i]
-    k = Shift(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12], c[13], c[14])
-    at = take_steps(k, State(s[0], s[1], s[2], s[3], s[4]), 0, 200)
-    for j in range(5):
-        states[j, i] = at[j]
-
-
-@pytest.mark.skipif(not COMPILED, reason="plain Python has lanes of one width only")
-def test_steps_of_any_width_are_the_same_bit_for_bit() -> None:
-    bodies, limits = mixed(21)[8:16], (6.0, 2.7, 0.2)
-    table, eight = np.empty((lanes.ROWS, 8)), np.empty((lanes.STATE_ROWS, 8))
-    moments, R_BP = bodies.principal
-    lanes.prepare(moments, R_BP, bodies.R_WB0, bodies.w_WB_B0, 1.0, 0.3, 0, limits, table, eight)
-    four, alone = eight.copy(), eight.copy()
-    lanes.march(table, eight, 0, 200, 200, 200, np.empty((8, 2, 3, 3)), np.empty((8, 2, 3)))
-    for i in range(0, 8, 4):
-        advance_four(table, four, i)
-    for i in range(8):
-        advance_alone(table, alone, i)
-    np.testing.assert_array_equal(four, eight)
-    np.testing.assert_array_equal(alone, eight)
 
 
 TURN = Rotation.from_rotvec((0.3, -0.5, 0.8)).as_matrix()

@@ -1,4 +1,7 @@
+"""Trajectories and many bodies as tables, cards and pictures, and the distributions of attitudes in them."""
+
 import json
+import math
 import re
 import subprocess
 import sys
@@ -9,8 +12,14 @@ import pytest
 
 import conservative as cv
 from conservative import presentation
-from conservative.attitude import rotation_about
+from conservative.attitude import angle_between, rotation_about
 from conservative.errors import Diverged
+from conservative.integration import distributions, pictures
+from conservative.integration.distributions import QUANTILES, angle_quantiles, blocks, directions, mean_attitudes, project
+from conservative.integration.spread import spread
+from conservative.method import Grid
+from conservative.methods.many import Bodies
+from conservative.scenes import brick_flip
 
 R0 = rotation_about((0.3, -1.2, 0.7), 0.83)
 TENSOR = [[3.1, 0.2, -0.1], [0.2, 2.7, 0.3], [-0.1, 0.3, 1.9]]
@@ -67,12 +76,6 @@ def test_a_drift_is_asked_for_by_name(trajectory):
         trajectory.drift("enrgy")
 
 
-def test_a_scene_shows_its_start(trajectory):
-    shown = repr(trajectory.scene)
-    assert "w_WB_B0=[0.5, -1.5, 2.5]" in shown
-    assert f"R_WB0={R0.tolist()}" in shown
-
-
 def test_a_short_run_is_drawn_as_it_is(trajectory):
     few = replace(trajectory, t=trajectory.t[:2], R_WB=trajectory.R_WB[:2], w_WB_B=trajectory.w_WB_B[:2])
     specification = json.loads(few.plot().to_json())
@@ -127,3 +130,170 @@ def test_scipy_rotations_go_in_wherever_an_attitude_does():
 
     given, same = free_body(scene.body, rotation, (0.5, -1.5, 2.5), [2.0]), free_body(scene.body, R0, (0.5, -1.5, 2.5), [2.0])
     np.testing.assert_allclose(given[0], same[0], atol=1e-14)  # measured 0
+
+
+SCENE = cv.scenes.brick_flip()
+GRID = Grid(0.1, 600)
+
+
+def ensemble(n, grid=GRID, attitude="2deg"):
+    """Bodies that turn about an axis fixed in the world, at rates of their own, and drifts of any kind."""
+    starts = cv.spread(SCENE, n, attitude=attitude)
+    turns = np.stack([rotation_about((1, 2, 3), 0.01 * t) for t in grid.t])
+    drifts = {"energy": np.linspace(1e-16, 3e-13, n), "momentum": np.full(n, 2e-15)}
+    bodies = Bodies(SCENE, starts["R_WB0"], starts["w_WB_B0"], None, {})
+    R = turns[None] @ starts["R_WB0"][:, None]
+    return cv.Ensemble(bodies, grid, R, np.zeros((n, grid.n_samples, 3)), drifts, "mine==1/turn", {})
+
+
+def drawn(found, **options):
+    """Return the specification, and the rows of each of its charts by what they are."""
+    spec = json.loads(found.plot(**options).to_json())
+    discs, over_time, drifts = spec["vconcat"]
+    rows = {
+        "discs": [spec["datasets"][layer["data"]["name"]] for disc in discs["hconcat"] for layer in disc["layer"]],
+        "spread": spec["datasets"][over_time["layer"][0].get("data", over_time.get("data"))["name"]],
+        "drifts": spec["datasets"][drifts["data"]["name"]],
+    }
+    return spec, rows
+
+
+def test_few_bodies_are_points_and_many_are_counted():
+    few, many = ensemble(pictures.MOST_POINTS, Grid(0.1, 3)), ensemble(3000, Grid(0.1, 3))
+    assert len(drawn(few)[1]["discs"][0]) == pictures.MOST_POINTS
+    cells = drawn(many)[1]["discs"][0]
+    assert sum(row["bodies"] for row in cells) == 3000
+    assert len(cells) < 1700  # 41 by 41
+
+
+def test_a_picture_of_any_number_has_few_rows_and_the_spread_is_that_of_all():
+    found = ensemble(1500)
+    _, rows = drawn(found)
+    assert all(len(part) <= 2000 for part in [*rows["discs"], rows["spread"], rows["drifts"]])
+    assert len(rows["spread"]) == pictures.MOST_TIMES < len(found.t)
+    last = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB))[-1]
+    shown = [rows["spread"][-1][key] for key in ("low", "middle", "high")]
+    assert shown == pytest.approx(np.degrees(last), rel=1e-12)
+
+
+def test_drifts_are_counted_in_bins_of_decades():
+    _, rows = drawn(ensemble(1500, Grid(0.1, 3)))
+    counts = {(row["of"], round(math.log10(row["drift"]), 2)): row["bodies"] for row in rows["drifts"]}
+    assert counts["momentum", -14.75] == 1500
+    assert counts["momentum", -15.0] == 0.5  # none, below the axis
+    energies = np.linspace(1e-16, 3e-13, 1500)
+    assert counts["energy", -13.25] == np.count_nonzero((energies >= 10**-13.25) & (energies < 1e-13))
+
+
+def test_the_axis_is_that_of_symmetry_where_there_is_one():
+    turned = cv.scenes.brick_flip().rename("turned", body=cv.RigidBody((2.0, 1.0, 1.0)))
+    few = ensemble(5, Grid(0.1, 1))
+    spec, _ = drawn(replace(few, bodies=replace(few.bodies, scene=turned)))
+    assert spec["vconcat"][0]["hconcat"][0]["title"]["text"].startswith("Body axis 1 ")
+    assert drawn(few)[0]["vconcat"][0]["hconcat"][0]["title"]["text"].startswith("Body axis 3 ")
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 0), (1, 2, math.nan)])
+def test_an_axis_that_is_no_direction_is_refused(axis):
+    with pytest.raises(cv.BadInput, match=r"axis_B: got .*allowed: a direction"):
+        ensemble(3, Grid(0.1, 1)).plot(axis_B=axis)
+
+
+def test_bodies_that_fail_are_counted_and_left_out_even_all_of_them():
+    found = ensemble(3, Grid(0.1, 2))
+    found.R_WB[1, 1:] = math.nan
+    found.drifts["energy"][1] = math.nan
+    one = replace(found, failures={1: cv.Diverged(0.1)})
+    assert len(drawn(one)[1]["discs"][0]) == 2
+    found.R_WB[:, 1:] = math.nan
+    for values in found.drifts.values():
+        values[:] = math.nan
+    _, rows = drawn(replace(found, failures=dict.fromkeys(range(3), cv.Diverged(0.1))))
+    assert rows["discs"][0] == []
+    assert [row["middle"] for row in rows["spread"]][1:] == [None, None]
+    assert {row["bodies"] for row in rows["drifts"]} == {0.5}
+
+
+N = 5000
+SPREADS = ("3e-7", "2deg", "any")
+
+
+@pytest.fixture(scope="module")
+def R_WB():
+    """Attitudes (N, 3, 3, 3): three samples, each of another spread about another attitude, two bodies of which fail."""
+    about = [rotation_about((1, 2, k), 0.5 + k) for k in range(3)]
+    R = np.stack([R @ spread(brick_flip(), N, attitude=each)["R_WB0"] for R, each in zip(about, SPREADS, strict=True)], axis=1)
+    R[17, 1:] = R[3000, 2] = math.nan
+    return R
+
+
+class OnDisk:
+    """What an array on a disk offers, and how much was read of it at once."""
+
+    def __init__(self, values, chunk):
+        self.values, self.shape, self.chunks, self.read = values, values.shape, (chunk, *values.shape[1:]), []
+
+    def __getitem__(self, part):
+        self.read.append((part.start, len(self.values[part])))
+        return self.values[part].tolist()
+
+
+def test_blocks_are_those_of_the_disk(R_WB, monkeypatch):
+    monkeypatch.setattr(distributions, "_BLOCK", 2**17)  # 606 bodies of three samples
+    stored = OnDisk(R_WB, 100)
+    np.testing.assert_array_equal(np.concatenate(list(blocks(stored))), R_WB)
+    assert stored.read[:2] == [(0, 600), (600, 600)]
+    np.testing.assert_array_equal(np.concatenate(list(blocks(R_WB, [0, 2]))), R_WB[:, [0, 2]])
+    assert max(map(len, blocks(R_WB))) == 606
+
+
+def finite(R_WB, sample):
+    return R_WB[np.isfinite(R_WB[:, sample]).all(axis=(1, 2)), sample]
+
+
+def test_the_mean_is_the_attitude_that_is_nearest_to_all(R_WB, monkeypatch):
+    monkeypatch.setattr(distributions, "_BLOCK", 2**16)
+    for sample, mean in enumerate(mean_attitudes(R_WB)):
+        R = finite(R_WB, sample)
+        assert np.abs(mean.T @ mean - np.eye(3)).max() < 1e-14  # measured 9e-16
+        assert np.linalg.det(mean) > 0
+        beside = [mean @ rotation_about(axis, angle) for axis in np.eye(3) for angle in (1e-3, -1e-3)]
+        assert all(np.sum((R - mean) ** 2) < np.sum((R - other) ** 2) for other in beside)
+    np.testing.assert_array_equal(mean_attitudes(R_WB, [1]), mean_attitudes(R_WB)[[1]])
+
+
+def test_quantiles_are_right_to_a_quarter_of_a_percent(R_WB):
+    mean = mean_attitudes(R_WB)
+    found = angle_quantiles(R_WB, mean)
+    for sample in range(3):
+        exact = np.quantile(angle_between(mean[sample], finite(R_WB, sample)), QUANTILES, method="inverted_cdf")
+        assert np.abs(found[sample] / exact - 1).max() < 0.0026  # measured 0.0022
+    np.testing.assert_array_equal(angle_quantiles(R_WB, mean[[2]], [2]), found[[2]])
+
+
+def test_quantiles_of_equal_attitudes_and_of_none():
+    R = np.tile(rotation_about((1, 2, 3), 1.0), (4, 2, 1, 1))
+    R[:, 1] = math.nan
+    found = angle_quantiles(R, R[0] * 1.0)
+    assert found[0].tolist() == [0, 0, 0]
+    assert np.isnan(found[1]).all()
+
+
+def test_directions_of_what_is_finite(R_WB):
+    found = directions(R_WB, np.array([0, 0.6, 0.8]), [0, 2])
+    assert found.shape == (2, N - 2, 3)
+    np.testing.assert_allclose(found[1, 17], R_WB[18, 2] @ (0, 0.6, 0.8), rtol=1e-15)
+
+
+@pytest.mark.parametrize("centre", [(0.6, 0.0, 0.8), (0, 0, 1), (0, 0, -1)])
+def test_the_disc_is_seen_from_outside_and_keeps_areas(centre):
+    around = np.stack([np.cross(centre, (0.28, 0.96, 0)), np.cross(centre, (-0.28, -0.96, 0)), centre])
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    angle = np.array([0.4, 0.4, 0])[:, None]
+    points, mean = project(np.cos(angle) * centre + np.sin(angle) * around)
+    assert mean == pytest.approx(centre, abs=1e-15)
+    assert np.linalg.norm(points, axis=1) == pytest.approx([2 * math.sin(0.2), 2 * math.sin(0.2), 0], abs=1e-15)
+    up = np.array([0, 0, 1.0] if abs(centre[2]) < 0.99 else [1.0, 0, 0])
+    highest, _ = project(np.stack([centre + 0.1 * up, centre + 0.1 * np.cross(up, centre)]) / math.sqrt(1))
+    assert highest[0, 1] > abs(highest[0, 0])
+    assert highest[1, 0] > highest[0, 0]

@@ -71,13 +71,6 @@ def test_energy_error_walks_and_does_not_run(order: int) -> None:
     assert np.abs(error).max() < 1e-14  # measured 4e-15 at order 6, in 2.7 million stages
 
 
-def test_large_steps_converge_to_the_continuous_branch() -> None:
-    scene = symmetric(False)
-    trajectory = cv.Reduced().run(scene, 0.3)
-    assert trajectory.ok
-    assert np.ptp(trajectory.energy) / scene.energy_scale < 1e-14  # measured 5e-16
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("free", [True, False])
 def test_the_frame_that_does_not_spin_has_the_same_motion(free: bool, side: float) -> None:

@@ -149,7 +149,6 @@ def test_every_ready_made_potential(written, text, potential):
 # what is wrong: (text, line, key, part of what was got, part of what is allowed)
 BAD = {
     "unknown at the top": (replaced("t_end =", "t_ende ="), 2, "t_ende", "unknown key 't_ende'", "'t_end' (nearest)"),
-    "unknown in the body": (replaced("inertia =", "inertai ="), 6, "body.inertai", "unknown key", "'inertia' (nearest)"),
     "unknown after a long array": (
         replaced("weight =", "wheight ="),
         14,
@@ -157,7 +156,6 @@ BAD = {
         "unknown key 'wheight'",
         "'weight' (nearest)",
     ),
-    "unknown in the start": (replaced("w_WB_B =", "w_WB_W ="), 18, "start.w_WB_W", "unknown key", "'w_WB_B' (nearest)"),
     "unknown form": (replaced("R_WB.angle", "R_WB.angel"), 20, "start.R_WB.angel", "unknown key", "'angle' (nearest)"),
     "unknown table": (replaced("[potential]", "[potental]"), 12, "potental", "unknown key", "'potential' (nearest)"),
     "unknown kind": (
@@ -172,7 +170,6 @@ BAD = {
     "no start": (GOOD.split("[start]")[0], 1, "start", "table [start] is missing", "w_WB_B"),
     "empty body": (body_of(""), 5, "body.inertia", "the body is missing", "inertia, shape, mjcf, urdf"),
     "no rates": (replaced("w_WB_B = [0.5, -1.5, 2.5]", ""), 17, "start.w_WB_B", "the key is missing", "rad/s"),
-    "no weight": (replaced("weight = 12.5", ""), 12, "potential.weight", "the key is missing", "weight, com_B"),
     "no kind": (
         replaced('kind = "uniform_gravity"', ""),
         12,
@@ -191,18 +188,10 @@ BAD = {
     "two bodies": (replaced("[body]", '[body]\nshape = "box"'), 7, "body.inertia", "inertia beside shape", "one of inertia"),
     "text t_end": (replaced("t_end = 3", 't_end = "3"'), 2, "t_end", "'3'", "above 0, s"),
     "true dt": (replaced("dt = 0.01", "dt = true"), 3, "dt", "True", "above 0, s"),
-    "a date": (replaced("dt = 0.01", "dt = 2026-01-01"), 3, "dt", "datetime.date", "above 0, s"),
     "number for a table": ("start = 3\n" + GOOD.split("[start]")[0], 1, "start", "3", "a table"),
     "array of tables": (replaced("[body]", "[[body]]"), 5, "body", "inertia", "a table"),
     "number for a name": ("name = 3\n" + GOOD, 1, "name", "3", "a text"),
     "empty name": ('name = ""\n' + GOOD, 1, "name", "''", "one character or more"),
-    "texts for numbers": (
-        replaced("[0.5, -1.5, 2.5]", '["0.5", "-1.5", "2.5"]'),
-        18,
-        "start.w_WB_B",
-        "['0.5'",
-        "arrays of them",
-    ),
     "truths for numbers": (
         replaced("[0.1, -0.2, 0.3]", "[true, false, true]"),
         15,
@@ -213,13 +202,11 @@ BAD = {
     "two rates": (replaced("[0.5, -1.5, 2.5]", "[0.5, -1.5]"), 18, "start.w_WB_B", "shape (2,)", "three finite rates"),
     "ragged": (replaced("[0.5, -1.5, 2.5]", "[0.5, [-1.5], 2.5]"), 18, "start.w_WB_B", "[0.5, [-1.5], 2.5]", "three finite"),
     "nan rate": (replaced("2.5]\nR_WB", "nan]\nR_WB"), 18, "start.w_WB_B", "nan", "three finite rates"),
-    "infinite t_end": (replaced("t_end = 3", "t_end = inf"), 2, "t_end", "inf", "above 0, s"),
     "negative dt": (replaced("dt = 0.01", "dt = -0.01"), 3, "dt", "-0.01", "above 0, s"),
     "nan weight": (replaced("12.5", "nan"), 14, "potential.weight", "nan", "a finite number, N"),
     "too large an integer": (replaced("12.5", "1" + 400 * "0"), 14, "potential.weight", "1000", "numbers"),
     "integer of 9,999 digits": (replaced("12.5", 9999 * "1"), 20, "", "not TOML", "TOML 1.0"),
     "not symmetric": (replaced("[3.1, 0.2, -0.1]", "[3.1, 0.9, -0.1]"), 6, "body.inertia", "not symmetric", "kg m^2"),
-    "not positive": (replaced("2.7, 0.3]", "-2.7, 0.3]"), 6, "body.inertia", "not all positive", "kg m^2"),
     "no rotation": (
         replaced(f"R_WB.axis = {AXIS.tolist()}\nR_WB.angle = {ANGLE}", "R_WB = [[1, 0, 0], [0, 1, 0], [0, 0, 1.1]]"),
         19,
@@ -258,10 +245,8 @@ BAD = {
     "no such file": (body_of('urdf = "no.urdf"\nname = "x"'), 6, "body.urdf", "No such file", "<robot>"),
     "no name": (body_of('mjcf = "no.xml"'), 5, "body.name", "the key is missing", "name of the body in"),
     "not TOML": (replaced("dt = 0.01", "dt = = 0.01"), 3, "", "Invalid value", "TOML 1.0"),
-    "unclosed": (GOOD + "\nR_WB.x = [", 22, "", "not TOML", "TOML 1.0"),
     "twice": (replaced("dt = 0.01", "dt = 0.01\ndt = 0.02"), 4, "", "Cannot overwrite", "TOML 1.0"),
     "not UTF-8": (GOOD.encode() + b"\n# \xff", 22, "", "not UTF-8", "TOML file"),
-    "code": (replaced("12.5", "__import__('os').getpid()"), 14, "", "Invalid value", "TOML 1.0"),
     "deep": (replaced("12.5", 5000 * "["), None, "", "not TOML", "TOML 1.0"),
 }
 

@@ -8,7 +8,7 @@ import pytest
 import conservative as cv
 from conservative.methods import gauss, principal_axes, units
 
-from .exact_motion import START, free, in_field, top
+from .one_body import START, free, in_field, top
 
 TOP, FREE, GRAVITY = top(), free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity")
 

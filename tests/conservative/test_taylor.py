@@ -12,7 +12,7 @@ from conservative.methods import columns
 from conservative.methods.many import Block, Bodies
 from conservative.references.precise import Precise
 
-from .exact_motion import drift
+from .one_body import drift
 
 TURN = rotation_about((1, -2, 0.5), 1.1)
 BODY = cv.RigidBody(TURN @ np.diag((0.9, 1.7, 1.2)) @ TURN.T)

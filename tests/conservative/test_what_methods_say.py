@@ -11,7 +11,7 @@ from conservative.methods import moser_veselov
 from conservative.methods.coefficients import explicit
 from conservative.methods.coefficients.compositions import BEST, COMPOSITIONS, Composition, composition_of
 
-from .exact_motion import free, in_field, top
+from .one_body import free, in_field, top
 
 TOP, FREE, GRAVITY, SPRUNG = top(), free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity"), in_field("spring")
 AXIS = "momentum along the field's axis"

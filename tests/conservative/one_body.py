@@ -1,7 +1,6 @@
-"""Motions of scenes by SciPy's DOP853 from the textbook's equations, as truth for runs of a few steps."""
+"""One body in each field, the torque of a potential, and the largest drift of a run."""
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 import conservative as cv
 from conservative.attitude import rotation_about
@@ -41,10 +40,6 @@ def top(moments=(1.0, 1.0, 0.3), w=(0.4, -0.7, 9.0), weight=5.0, turn=TURN):
     )
 
 
-def hat(w):
-    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-
-
 def torque(scene, R):
     """Torque in body axes of the potential of a scene, N m: minus the derivative along turns about each axis."""
     if scene.potential is None:
@@ -53,33 +48,6 @@ def torque(scene, R):
     return -np.array([across[2, 1] - across[1, 2], across[0, 2] - across[2, 0], across[1, 0] - across[0, 1]])
 
 
-def move(scene, t):
-    """Attitudes (n, 3, 3) and rates (n, 3), rad/s, at the times t (n,), s."""
-    J = scene.body.inertia
-    inverse = np.linalg.inv(J)
-
-    def rates(_, y):
-        R, w = y[:9].reshape(3, 3), y[9:]
-        return np.concatenate([(R @ hat(w)).ravel(), inverse @ (torque(scene, R) - np.cross(w, J @ w))])
-
-    start = np.concatenate([scene.R_WB0.ravel(), scene.w_WB_B0])
-    y = solve_ivp(rates, (0, t[-1]), start, method="DOP853", rtol=1e-13, atol=1e-14, t_eval=t).y.T
-    return y[:, :9].reshape(-1, 3, 3), y[:, 9:]
-
-
 def drift(trajectory):
     """The largest drift of any invariant of the scene, relative to its scale."""
     return max(float(np.abs(trajectory.drift(invariant)).max()) for invariant in trajectory.scene.invariants)
-
-
-MOVES = {}
-
-
-def distance(scene, method, dt, n):
-    """Return how far a run is from the truth after each of n steps: of the attitude, and relative of the rates."""
-    run = method.prepare(scene, cv.Grid(dt, n, 1))()
-    key = (scene.name, dt, n)
-    if key not in MOVES:
-        MOVES[key] = move(scene, run.t)
-    R, w = MOVES[key]
-    return max(abs(run.R_WB - R).max(), abs(run.w_WB_B - w).max() / max(abs(w).max(), 1.0))
