@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import MPContext
-from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import angle_between
-from conservative.kernels import gauss, moser_veselov, reduced, samples, twofold, vector
+from conservative.kernels import gauss, moser_veselov, reduced, twofold, vector
 from conservative.method import Grid
 from conservative.methods import reduced as reduced_method
 from conservative.methods.coefficients.gauss_legendre import tableau
@@ -200,20 +199,11 @@ def test_a_long_quaternion_is_divided_with_what_it_lost():
 
 
 RNG = np.random.default_rng(7)
-P = tuple(float(x) for x in RNG.normal(size=4))
 
 
 def plain(function: Any) -> Any:
     """A kernel as Python, so that nothing is compiled for a test."""
     return getattr(function, "py_func", function)
-
-
-def matrix(q):
-    return Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
-
-
-def close(found, expected):
-    np.testing.assert_allclose(found, expected, rtol=0, atol=4e-15)
 
 
 def test_a_compensated_sum_keeps_what_it_rounds_away():
@@ -248,33 +238,6 @@ def test_twofold_numbers_have_thirty_digits(seed):
         size = max(abs(expected), abs(exact(x)), abs(exact(y))) if expected else 1
         assert abs(exact(found) - expected) <= size * Fraction(1, 10**30)
         assert found[0] + found[1] == found[0]
-
-
-@pytest.mark.parametrize("spin", [None, (0.8, 1 / 3)])
-@pytest.mark.parametrize("turn", [None, matrix(P)])
-def test_samples_in_body_axes(spin, turn):
-    n, J_inverse = 3, (1.0, 0.5, 0.25)
-    t, q, L = np.array([0.0, 0.7, 1.9]), RNG.normal(size=(n, 4)), RNG.normal(size=(n, 3))
-    R, w = np.empty((n, 3, 3)), np.empty((n, 3))
-    assert samples.to_body_axes(t, q, L, J_inverse, spin, turn, R, w) == n
-    frame = np.eye(3) if turn is None else turn
-    for i in range(n):
-        angle, rates = (0.0, L[i] * J_inverse) if spin is None else (spin[0] * t[i], L[i] * (*J_inverse[:2], spin[1]))
-        own = Rotation.from_rotvec([0, 0, angle]).as_matrix()
-        close(R[i], matrix(q[i]) @ own @ frame.T)
-        close(w[i], frame @ own.T @ rates)
-
-
-@pytest.mark.parametrize("broken", [0, 1, 2])
-@pytest.mark.parametrize("turn", [None, matrix(P)])
-def test_samples_that_are_not_finite_are_counted_from_the_first(broken, turn):
-    t, q, L = np.zeros(3), np.tile(P, (3, 1)), np.tile((0.5, -0.4, 0.9), (3, 1))
-    for place in (q[broken, 1:2], L[broken, 2:], L[broken, :1]):
-        kept = place.copy()
-        place[:] = np.nan
-        found = samples.to_body_axes(t, q, L, (1.0, 1.0, 1.0), None, turn, np.empty((3, 3, 3)), np.empty((3, 3)))
-        assert found == broken
-        place[:] = kept
 
 
 SCENE = cv.Scene("free", cv.RigidBody((1, 2, 2.5)), np.eye(3), (0.3, 0.2, 1), 1.0)

@@ -1,18 +1,75 @@
-"""Many bodies at once: the numbers of one at a time, whatever the blocks, the threads and what is given."""
+"""Many bodies at once: numbers, drifts and failures are those of each alone; what cannot be used is refused first."""
 
+from __future__ import annotations
+
+import pickle
+import signal
 import threading
+import time
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
+from conservative.attitude import from_quaternion, orthonormality, rotation_about
 from conservative.integration import blocks, shared_choice
+from conservative.integration.drifts import find_drifts, list_drifts
 from conservative.integration.inputs import read_bodies
+from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
+from conservative.method import Method, Role
 from conservative.methods.between import Samples
-from conservative.methods.many import Bodies
+from conservative.methods.many import Block, Bodies, pause
+from conservative.trajectory import Trajectory
 
-from .many_bodies import BODY, fields, scene, starts, tensors
+TURN = rotation_about((3, -1, 2), 1.3)
+BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
+
+
+def starts(n, seed=14):
+    """Attitudes (n, 3, 3) and rates (n, 3), rad/s."""
+    rng = np.random.default_rng(seed)
+    q = rng.normal(size=(n, 4))
+    return from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]), rng.normal(size=(n, 3))
+
+
+def tensors(n, seed=14):
+    """Inertia (n, 3, 3), kg m^2, with moments that are well apart."""
+    rng = np.random.default_rng(seed)
+    axes = from_quaternion(rng.normal(size=(n, 4)))
+    axes /= np.cbrt(np.linalg.det(axes))[:, None, None]
+    moments = np.array([1.0, 1.4, 2.0]) * rng.uniform(0.9, 1.1, (n, 3))
+    found = axes @ (moments[:, :, None] * np.swapaxes(axes, 1, 2))
+    return (found + np.swapaxes(found, 1, 2)) / 2
+
+
+def scene(potential=None, body=BODY, **more):
+    """A scene of 2 s."""
+    return cv.Scene("generic", body, rotation_about((1, 0.2, -1), 0.7), (0.3, -2.0, 1.0), 2.0, potential, **more)
+
+
+def fields(n, seed=14):
+    """Potentials by a name, and numbers of them that differ from body to body."""
+    rng = np.random.default_rng(seed)
+    points, anchors = rng.uniform(0.1, 0.3, (n, 3)), rng.uniform(0.6, 0.9, (n, 3))
+    size = rng.uniform(1.0, 3.0, n)
+    gradient = cv.GravityGradient(0.7, BODY.inertia, (1, 0, 1))
+    orbit = cv.Orbit(0.7, (0, 0, 1)).gravity_gradient(BODY.inertia, (1, 0, 0))
+    own = cv.FunctionPotential(lambda R: R[2, 0] ** 3, lambda R: np.outer([0, 0, 1], [3 * R[2, 0] ** 2, 0, 0]), 1.0)
+    return {
+        "free": (None, {}),
+        "gravity": (cv.UniformGravity(3.0, (0.1, 0.2, 0.3)), {"weight": size, "com_B": points}),
+        "gravity, one number": (cv.UniformGravity(3.0, (0.1, 0.2, 0.3)), {"com_B": points}),
+        "spring": (cv.LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0, 0.3), 0.1), {"stiffness": size, "anchor_W": anchors}),
+        "rest length": (cv.LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0, 0.3), 0.1), {"rest_length": size, "point_B": points}),
+        "attraction": (cv.PointAttraction(2.0, (0.2, 0.1, 0.4), (1.5, 0, 0.3)), {"strength": -size, "anchor_W": anchors}),
+        "gradient": (gradient, {"rate": size, "direction_W": anchors, "inertia": tensors(n)}),
+        "orbit": (orbit, {"inertia": tensors(n)}),
+        "function": (own, {}),
+    }
+
 
 N = 11
 WAYS = {
@@ -174,3 +231,353 @@ def test_an_error_below_round_off_is_a_warning():
     with pytest.warns(cv.AccuracyNotReached):
         found = cv.integrate_many(scene(body=BODY), *starts(3), error=1e-18, t_end=1.0)
     assert not found.choice.reached
+
+
+FIVE, TIMES = 5, 4
+T = np.linspace(0.0, 1.5, TIMES)
+
+
+def samples():
+    """Attitudes and rates of no motion at all, so that drifts are large; attitudes are not quite orthonormal."""
+    R, w = starts(FIVE * TIMES, seed=1)
+    R += 1e-3 * np.random.default_rng(2).normal(size=R.shape)
+    return R.reshape(FIVE, TIMES, 3, 3), w.reshape(FIVE, TIMES, 3)
+
+
+def require_drifts(bodies):
+    """Compare with each body alone; return the names that were compared."""
+    R, w = samples()
+    found, compared = find_drifts(bodies, T, R, w), set()
+    for i in range(FIVE):
+        own = bodies.take(i)
+        alone = cv.Scene("alone", own.body, own.R_WB0, own.w_WB_B0, 2.0, own.potential)
+        if bodies.scene.extra_invariants:
+            alone = alone.rename("alone", extra_invariants=bodies.scene.extra_invariants)
+        trajectory = Trajectory(alone, T, R[i], w[i], "")
+        kept = kept_sizes(alone, frozenset(each.name for each in alone.invariants))
+        for column, name in enumerate(list_drifts(bodies)):
+            invariant = next((each for each in alone.invariants if each.name == name), None)
+            if invariant is None and column > 0:
+                assert np.isnan(found.values[i, column])
+                continue
+            off = orthonormality(R[i]) if invariant is None else sizes(trajectory.drift(invariant))
+            assert found.values[i, column] == pytest.approx(off.max(), rel=1e-13)  # 5e-15
+            scale = 1.0 if invariant not in kept else invariant.scale / kept[invariant]
+            assert found.bounded[i, column] == pytest.approx(off.max() * scale, rel=1e-13)
+            compared.add(name)
+    return compared
+
+
+@pytest.mark.parametrize("name", fields(1))
+@pytest.mark.parametrize("own_inertia", [False, True])
+def test_drifts_are_those_of_each_body_alone(name, own_inertia):
+    potential, parameters = fields(FIVE)[name]
+    if own_inertia and hasattr(getattr(potential, "potential", potential), "inertia") != ("inertia" in parameters):
+        pytest.skip("a field with the inertia of the body")
+    bodies = read_bodies(scene(potential), *starts(FIVE), tensors(FIVE) if own_inertia else None, parameters)
+    assert len(require_drifts(bodies)) >= 2
+
+
+def test_without_numbers_of_their_own_bodies_have_the_field_of_the_scene():
+    for potential, _ in fields(FIVE).values():
+        require_drifts(read_bodies(scene(potential), *starts(FIVE), None, None))
+
+
+def test_bodies_at_rest_have_the_scale_of_what_their_field_can_do():
+    R, w = starts(FIVE)
+    require_drifts(read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), R, 0 * w, None, None))
+    require_drifts(read_bodies(scene(), R, 0 * w, None, None))
+
+
+def test_axial_momentum_is_that_of_the_bodies_that_have_one():
+    symmetric = cv.RigidBody(TURN @ np.diag([1.0, 1.0, 2.0]) @ TURN.T)
+    inertia = tensors(FIVE)
+    inertia[2] = 3 * symmetric.inertia
+    for own in (None, inertia):
+        assert "axial momentum" in require_drifts(read_bodies(scene(body=symmetric), *starts(FIVE), own, None))
+
+
+def test_invariants_of_the_scene_itself_count_where_all_have_its_body():
+    extra = Invariant("first momentum", "kg m^2/s", 2.0, lambda R, w: momentum_W(BODY, R, w)[..., 0])
+    with_extra = scene(extra_invariants=(extra,))
+    assert "first momentum" in require_drifts(read_bodies(with_extra, *starts(FIVE), None, None))
+    assert "first momentum" not in list_drifts(read_bodies(with_extra, *starts(FIVE), tensors(FIVE), None))
+
+
+def test_a_sample_that_is_not_finite_has_no_drift():
+    bodies, (R, w) = read_bodies(scene(), *starts(FIVE), None, None), samples()
+    R[1, 2, 0, 0], w[3, 0, 2] = np.nan, np.inf
+    found = find_drifts(bodies, T, R, w).values
+    assert np.isnan(found[[1, 3]]).all()
+    assert np.isfinite(found[[0, 2, 4]]).all()
+
+
+FEW = 9
+INNER = cv.Reduced()
+EVERY_OTHER = {"dt": 0.05, "t_end": 0.5, "sample_every": 2}
+
+
+@dataclass(frozen=True)
+class Damaged(Method):
+    """The method `INNER` on lanes, which `damage` changes before they are looked at."""
+
+    damage: Any
+
+    family: ClassVar[str] = "damaged"
+    role: ClassVar[Role] = Role.OURS
+    order = INNER.order
+    conserves = INNER.conserves
+
+    def bounds(self, scene, grid):
+        return INNER.bounds(scene, grid)
+
+    def prepare(self, scene, grid):
+        return INNER.prepare(scene, grid)
+
+    def prepare_many(self, bodies, grid):
+        def run():
+            found = [INNER.solve(bodies.take(i), grid) for i in range(len(bodies))]
+            samples = np.stack([each.R_WB for each in found]), np.stack([each.w_WB_B for each in found])
+            block = Block(*samples, np.ones(len(bodies), dtype=bool))
+            self.damage(block)
+            return block
+
+        return run
+
+
+def leave_unfinished(block):
+    block.finished[3] = False
+    block.R_WB[3] = 7.0
+
+
+def break_sample(block):
+    block.w_WB_B[3, 2, 1] = np.nan
+
+
+def lose_energy(block):
+    block.w_WB_B[3, -1] *= 1 + 1e-9
+
+
+def shear(block):
+    block.R_WB[3, 1, 0, 2] += 1e-9
+
+
+@pytest.mark.parametrize("damage", [leave_unfinished, break_sample, lose_energy, shear])
+@pytest.mark.parametrize("own_inertia", [False, True])
+def test_lanes_that_are_not_right_are_run_alone(damage, own_inertia, monkeypatch):
+    given = {"w_WB_B0": starts(FEW)[1], "inertia": tensors(FEW) if own_inertia else None}
+    right, alone = cv.integrate_many(scene(), **given, method=Damaged(repr), **EVERY_OTHER), []  # which changes nothing
+    monkeypatch.setattr(blocks, "run_alone", lambda *what: (alone.append(what[3]), run_alone(*what))[1])
+    found = cv.integrate_many(scene(), **given, method=Damaged(damage), **EVERY_OTHER)
+    assert alone == [3]
+    np.testing.assert_array_equal(found.R_WB, right.R_WB)
+    np.testing.assert_array_equal(found.w_WB_B, right.w_WB_B)
+    np.testing.assert_array_equal(found.drifts["energy"], right.drifts["energy"])
+    assert found.ok.all()
+
+
+run_alone = blocks.run_alone
+
+
+def test_a_body_that_fails_has_the_outcome_that_it_has_alone():
+    R, w = starts(FEW)
+    w[4] *= 1e5  # of which a step of this length keeps less than it should
+    found = cv.integrate_many(scene(), R, w, method=cv.Reduced(), **EVERY_OTHER)
+    others = np.delete(np.arange(FEW), 4)
+    alone = cv.integrate(found.bodies.take(4), 0.05, cv.Reduced(), 0.5, 2, on_failure="return")
+    assert not alone.ok
+    assert list(found.failures) == [4]
+    assert found.outcome(4) == alone.outcome == found[4].outcome
+    assert list(found.ok) == [i != 4 for i in range(FEW)]
+    np.testing.assert_array_equal(found[4].R_WB, alone.R_WB)
+    assert np.isnan(found.R_WB[4, len(alone) :]).all()
+    assert np.isnan(found.drifts["energy"][4])
+    assert found[3:6].failures.keys() == {1}
+    assert "8 ok, 1 not conserved (body 4)" in repr(found)
+    assert found.to_pandas("bodies").loc[4, "outcome"] == str(alone.outcome)
+    without = cv.integrate_many(scene(), R[others], w[others], method=cv.Reduced(), **EVERY_OTHER)
+    np.testing.assert_array_equal(found.R_WB[others], without.R_WB)
+    single = cv.integrate_many(scene(), R[4:5], w[4:5], method=cv.Reduced(), **EVERY_OTHER)
+    assert single.outcome(0) == alone.outcome
+    np.testing.assert_array_equal(single.R_WB[0], found.R_WB[4])
+
+
+def test_a_body_that_the_method_does_not_take_is_not_run():
+    inertia = np.array([[1.0, 1.0, 2.0]] * 3 + [[1.0, 1.4, 2.0]])
+    given = {"inertia": inertia, "method": cv.Reduced(frame="non_spinning"), **EVERY_OTHER}
+    found = cv.integrate_many(scene(body=cv.RigidBody([1, 1, 2])), **given)
+    assert list(found.failures) == [3]
+    assert isinstance(found.failures[3], cv.NotRun)
+    assert found.outcome(3).kind == cv.OutcomeKind.UNSUPPORTED
+    assert len(found[3]) == 0
+
+
+FAILURES = [
+    cv.NotConverged(3, 0.1, 0.2, "singular"),
+    cv.WrongBranch(3, 0.1, 0.2),
+    cv.Diverged(0.1),
+    cv.NotConserved(0.1, "energy", 1e-3, 1e-9),
+    cv.InvalidResult("mine", "nothing"),
+    cv.NotRun("it is for others"),
+]
+
+
+@pytest.mark.parametrize("failure", FAILURES)
+def test_failures_come_back_from_other_processes(failure):
+    again = pickle.loads(pickle.dumps(failure))
+    assert type(again) is type(failure)
+    assert vars(again) == vars(failure)
+    assert str(again) == str(failure)
+
+
+def wait_for_ever(block):
+    """A run in pieces that does not end by itself."""
+    while True:
+        time.sleep(0.01)
+        pause()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_interrupt_ends_all_threads(threads, monkeypatch):
+    monkeypatch.setattr(blocks, "MOST_BODIES", 2)
+    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    begun = threading.active_count()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        cv.integrate_many(scene(), *starts(FEW), method=Damaged(wait_for_ever), threads=threads, **EVERY_OTHER)
+    timer.join()
+    assert threading.active_count() == begun
+
+
+def test_a_failure_of_one_block_ends_the_others(monkeypatch):
+    monkeypatch.setattr(blocks, "MOST_BODIES", 2)
+    begun = threading.active_count()
+
+    def fail(block):
+        if len(block.finished) < 2:  # the last one
+            raise RuntimeError("broken")
+        wait_for_ever(block)
+
+    with pytest.raises(RuntimeError, match="broken"):
+        cv.integrate_many(scene(), *starts(3), method=Damaged(fail), threads=2, **EVERY_OTHER)
+    assert threading.active_count() == begun
+
+
+THOUSAND = 1000
+GRAVITY = cv.UniformGravity(3.0, (0.1, 0.2, 0.3))
+
+
+def changed(values, i, value):
+    """A copy with another value in place i."""
+    found = np.array(values, dtype=float)
+    found[i] = value
+    return found
+
+
+R, W, J = *starts(THOUSAND), tensors(THOUSAND)
+SHAPES = {
+    "n differs": (
+        {"R_WB0": R, "w_WB_B0": W[:7]},
+        r"^w_WB_B0: got shape \(7, 3\); allowed: .* \(1000, 3\): 1000 bodies, as R_WB0 has",
+    ),
+    "n of a number": (
+        {"w_WB_B0": W, "parameters": {"weight": [1.0, 2.0]}},
+        r"^parameters\['weight'\]: got shape \(2,\); allowed: numbers of shape \(1000,\): 1000 bodies",
+    ),
+    "one start": ({"w_WB_B0": W[0]}, r"^w_WB_B0: got shape \(3,\); allowed: numbers of shape \(n, 3\)"),
+    "no body": ({"w_WB_B0": np.empty((0, 3))}, r"^w_WB_B0: got shape \(0, 3\)"),
+    "a text": ({"w_WB_B0": "fast"}, r"^w_WB_B0: got 'fast'"),
+    "unknown number": ({"parameters": {"wieght": [1.0]}}, r"^parameters: got 'wieght'; allowed: 'weight' \(nearest\)"),
+    "no mapping": ({"parameters": [1.0]}, r"^parameters: got \[1.0\]; allowed: a mapping"),
+}
+
+
+@pytest.mark.parametrize("what", SHAPES)
+def test_shapes_that_do_not_match(what):
+    given, message = SHAPES[what]
+    with pytest.raises(cv.BadInput, match=message):
+        cv.integrate_many(scene(GRAVITY), **given)
+
+
+ONE_BAD = {
+    "nan": ({"w_WB_B0": changed(W, 7, np.nan)}, r"^w_WB_B0\[7\]: got \[nan, nan, nan\], not finite"),
+    "too fast": ({"w_WB_B0": changed(W, 5, (0, 1e101, 0))}, r"^w_WB_B0\[5\]: got .*1e\+101.* the largest 0 or of magnitude"),
+    "too slow": ({"w_WB_B0": changed(W, 5, (0, 1e-101, 0))}, r"^w_WB_B0\[5\]: got .*1e-101.* the largest 0 or of magnitude"),
+    "no rotation": ({"R_WB0": changed(R, 500, np.diag([1, 1, 1.1]))}, r"^R_WB0\[500\]: got a matrix with \|R'R - 1\| = 0.21"),
+    "a reflection": ({"R_WB0": changed(R, 0, -np.eye(3))}, r"^R_WB0\[0\]: got a reflection"),
+    "not positive": (
+        {"inertia": changed(J, 4, np.diag([1.0, -1, 1]))},
+        r"^inertia\[4\]: got principal moments .* not all positive",
+    ),
+    "not symmetric": (
+        {"inertia": changed(J, 4, J[4] + [[0, 1e-3, 0]] * 3)},
+        r"^inertia\[4\]: got a matrix that is not symmetric",
+    ),
+    "far apart": (
+        {"inertia": changed(J, 4, BODY.R_BP @ np.diag([1e-14, 1, 1]) @ BODY.R_BP.T)},
+        r"^inertia\[4\]: got principal moments .*(ratio up to 1e\+13|not all positive)",
+    ),
+    "nan weight": ({"parameters": {"weight": changed(np.ones(THOUSAND), 8, np.nan)}}, r"^parameters\['weight'\]\[8\]: got nan"),
+    "huge lever": ({"parameters": {"com_B": changed(W, 8, 1e101)}}, r"^parameters\['com_B'\]\[8\]: got \[1e\+101"),
+}
+
+
+@pytest.mark.parametrize("what", ONE_BAD)
+def test_one_bad_body_is_named(what, monkeypatch):
+    monkeypatch.setattr(cv.Gauss, "prepare", None)  # no work
+    given, message = ONE_BAD[what]
+    with pytest.raises(cv.BadInput, match=message):
+        cv.integrate_many(scene(GRAVITY), **given, method=cv.Gauss())
+
+
+BAD_FIELDS = {
+    "stiffness": ("spring", "stiffness", 0.0, r"^parameters\['stiffness'\]\[2\]: got 0.0"),
+    "rate": ("gradient", "rate", -1.0, r"^parameters\['rate'\]\[2\]: got -1.0"),
+    "inertia of a field": ("gradient", "inertia", -np.eye(3), r"^parameters\['inertia'\]\[2\]: got principal moments"),
+    "direction": ("gradient", "direction_W", 0.0, r"^parameters\['direction_W'\]\[2\]: got \[0.0, 0.0, 0.0\]"),
+    "inertia in an orbit": ("orbit", "inertia", -np.eye(3), r"^parameters\['inertia'\]\[2\]: got principal moments"),
+}
+
+
+@pytest.mark.parametrize("what", BAD_FIELDS)
+def test_what_one_potential_refuses_is_refused_of_many(what):
+    field, name, value, message = BAD_FIELDS[what]
+    potential, parameters = fields(5)[field]
+    parameters = parameters | {name: changed(parameters[name], 2, value)}
+    with pytest.raises(cv.BadInput, match=message):
+        cv.integrate_many(scene(potential), parameters=parameters)
+
+
+def test_numbers_of_a_field_are_those_that_it_makes_of_them():
+    potential, parameters = fields(5)["gradient"]
+    found = read_bodies(scene(potential), None, None, None, parameters)
+    np.testing.assert_allclose(np.linalg.norm(found.parameters["direction_W"], axis=1), 1, rtol=1e-15)
+
+
+OTHERS = {
+    "threads": ({"threads": 0}, r"^threads: got 0"),
+    "progress": ({"progress": 3}, r"^progress: got 3"),
+    "error": ({"error": 0.0}, r"^error: got 0"),
+    "no numbers": (
+        {"scene": scene(), "parameters": {"weight": [1.0]}},
+        r"^parameters: got 'weight'; allowed: none: .* no potential",
+    ),
+    "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 1, for 2000001000 samples of 1000 bodies"),
+    "two inertias": (
+        {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
+        r"^parameters: got None; allowed: .* an inertia of its own",
+    ),
+    "cannot do": ({"method": cv.Projected(), "scene": scene(), "w_WB_B0": W}, r"^method: got projected"),
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_other_arguments(what):
+    given, message = OTHERS[what]
+    with pytest.raises(cv.BadInput, match=message):
+        cv.integrate_many(**{"scene": scene(GRAVITY), "threads": 1} | given)
+
+
+def test_a_step_that_is_too_long_for_the_fastest_is_refused_before_any_work():
+    with pytest.raises(cv.BadInput, match=r"^dt: got 0.05.*\(body 321\)"):
+        cv.integrate_many(scene(), w_WB_B0=changed(W, 321, (300.0, 20, 10)), method="moser_veselov", dt=0.05, t_end=1.0)

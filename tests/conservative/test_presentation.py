@@ -15,7 +15,7 @@ from conservative import presentation
 from conservative.attitude import angle_between, rotation_about
 from conservative.errors import Diverged
 from conservative.integration import distributions, pictures
-from conservative.integration.distributions import QUANTILES, angle_quantiles, blocks, directions, mean_attitudes, project
+from conservative.integration.distributions import QUANTILES, angle_quantiles, blocks, mean_attitudes, project
 from conservative.integration.spread import spread
 from conservative.method import Grid
 from conservative.methods.many import Bodies
@@ -277,12 +277,6 @@ def test_quantiles_of_equal_attitudes_and_of_none():
     found = angle_quantiles(R, R[0] * 1.0)
     assert found[0].tolist() == [0, 0, 0]
     assert np.isnan(found[1]).all()
-
-
-def test_directions_of_what_is_finite(R_WB):
-    found = directions(R_WB, np.array([0, 0.6, 0.8]), [0, 2])
-    assert found.shape == (2, N - 2, 3)
-    np.testing.assert_allclose(found[1, 17], R_WB[18, 2] @ (0, 0.6, 0.8), rtol=1e-15)
 
 
 @pytest.mark.parametrize("centre", [(0.6, 0.0, 0.8), (0, 0, 1), (0, 0, -1)])

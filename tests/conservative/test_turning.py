@@ -111,12 +111,6 @@ def test_taylor_refuses_other_fields_that_turn():
     assert "recurrence" in cv.Taylor().unsupported(scene("two functions"))
 
 
-def test_order_eight_in_a_field_that_turns():
-    truth = cv.integrate(scene(), 0.005, cv.Projected()).R_WB[-1]
-    coarse, fine = (angle_between(truth, cv.integrate(scene(), T_END / n, cv.Projected()).R_WB[-1]) for n in (24, 48))
-    assert np.log2(coarse / fine) == pytest.approx(8, abs=0.8)
-
-
 def test_a_field_that_turns_about_its_own_axis_stays():
     gravity = cv.UniformGravity(4.0, COM)
     turned = cv.Scene("turned", cv.RigidBody(INERTIA), R_WB0, RATES, 3.0, cv.Turning(gravity, cv.Orbit(0.9, (0, 0, 2))))

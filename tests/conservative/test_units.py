@@ -13,9 +13,12 @@ from conservative.attitude import angle_between, rotation_about
 from conservative.errors import NotConverged
 from conservative.invariants import sizes
 from conservative.method import Grid, Method
+from conservative.methods import gauss, principal_axes
 from conservative.methods.units import SI, Units, bound_rate, find_units
 from conservative.registry import list_scenes, method
 from conservative.registry import scene as registered
+
+from .one_body import START, free, in_field
 
 TURN = rotation_about((3, -1, 2), 1.3)
 MOMENTS = {"top": (1.3, 1.3, 0.6)}
@@ -167,3 +170,36 @@ def test_scales_of_invariants_neither_overflow_nor_vanish() -> None:
 def test_a_step_of_a_million_turns_is_refused() -> None:
     with pytest.raises(cv.BadInput, match="dt: got 1e"):
         cv.integrate(scene("top"), 1e30, cv.Lame(), t_end=1e30)
+
+
+BRICK = cv.scenes.brick_flip()
+
+
+def test_the_time_of_a_failure_is_in_seconds():
+    units, grid = Units(2.0**16, 2.0**32), Grid(0.1 * 2.0**32, 8)
+    R, w = np.repeat(BRICK.R_WB0[None], 3, axis=0), np.repeat(BRICK.w_WB_B0[None] * units.time, 3, axis=0)
+    found = cv.Trajectory(BRICK, np.array((0.0, 0.1, 0.2)), R, w, "made up", failure=NotConverged(3, 0.2, 0.5, "made up"))
+    restored = units.restore(found, BRICK, grid)
+    assert (restored.outcome.step, restored.outcome.time, restored.outcome.residual) == (3, 0.2 * units.time, 0.5)
+    assert restored.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
+    np.testing.assert_array_equal(restored.t, grid.t[:3])
+    np.testing.assert_array_equal(restored.w_WB_B, np.repeat(BRICK.w_WB_B0[None], 3, axis=0))
+
+
+FREE, GRAVITY = free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity")
+
+
+def test_units_of_the_closed_system():
+    model = gauss.closed_system(principal_axes.principal_start(GRAVITY))
+    size = np.linalg.norm(principal_axes.principal_start(GRAVITY).L)
+    assert 0.5 < size / model.unit <= 1
+    np.testing.assert_allclose(model.J_inverse, model.unit / GRAVITY.body.moments)
+    assert math.log2(model.unit).is_integer()
+    np.testing.assert_allclose(model.gamma, START[2] @ GRAVITY.body.R_BP, atol=1e-15)
+    rest = gauss.closed_system(principal_axes.principal_start(free((1, 1.4, 2), (0, 0, 0))))
+    assert (rest.unit, rest.L) == (1.0, (0.0, 0.0, 0.0))
+    hanging = cv.Scene("at rest", GRAVITY.body, START, (0, 0, 0), 1.0, GRAVITY.potential)
+    moment = 2.0 * np.linalg.norm((0.2, 0.1, 0.4))
+    expected = 2.0 ** math.ceil(math.log2(math.sqrt(2.0 * moment)))
+    assert gauss.closed_system(principal_axes.principal_start(hanging)).unit == expected
+    assert np.linalg.norm(gauss.closed_system(principal_axes.principal_start(FREE)).gamma) == pytest.approx(1)
