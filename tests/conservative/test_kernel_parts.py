@@ -198,9 +198,6 @@ def test_a_long_quaternion_is_divided_with_what_it_lost():
     assert max(map(abs, left)) > 0
 
 
-RNG = np.random.default_rng(7)
-
-
 def plain(function: Any) -> Any:
     """A kernel as Python, so that nothing is compiled for a test."""
     return getattr(function, "py_func", function)
