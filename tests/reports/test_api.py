@@ -8,7 +8,6 @@ from types import ModuleType
 import pytest
 
 import conservative
-from conservative.references.exact import method
 
 pytestmark = pytest.mark.slow
 
@@ -41,22 +40,6 @@ def test_every_public_name_is_described(pages):
             assert builder.__name__ in described(pages[f"{builder.__module__.replace('.', '/')}.html"])
 
 
-def test_exact_solutions_and_engines_are_described(pages):
-    public = {name for name, found in vars(method).items() if getattr(found, "__module__", "") == method.__name__}
-    assert {"free_body", "lagrange_top", "Exact"} <= {name for name in public if not name.startswith("_")}
-    assert {name for name in public if not name.startswith("_")} <= described(
-        pages["conservative/references/exact/method.html"]
-    )
-    for engine, family in (("mujoco", "MuJoCo"), ("pinocchio", "Pinocchio"), ("heyoka", "Heyoka"), ("scipy", "SciPy")):
-        assert {family, f"{family}.prepare"} <= described(pages[f"conservative/references/engines/{engine}.html"])
-
-
 def test_pages_load_nothing_from_elsewhere(pages):
     loaded = {"".join(found) for page in pages.values() for found in LOADED.findall(page)}
     assert not [address for address in loaded if re.match(r"https?:|//", address)]
-
-
-def test_signatures_name_arrays_briefly(pages):
-    text = re.sub(r"<[^>]+>", "", pages["conservative/references/exact/method.html"])
-    assert "w_WB_B0: ArrayLike" in text
-    assert "tuple[Array, Array]" in text

@@ -72,11 +72,6 @@ def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder, t
     assert contents(folder) == before
 
 
-def test_a_report_without_room_does_not_say_that_it_kept_what_it_could_not(folder):
-    _, _, err = run_python(LIMITED, "2000", str(folder), *SMALL)
-    assert "are finished" not in err
-
-
 def test_results_are_whole_or_as_before(folder):
     before = contents(folder)
     code = """

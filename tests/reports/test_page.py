@@ -1,6 +1,5 @@
 import copy
 import json
-import re
 from html.parser import HTMLParser
 
 import numpy as np
@@ -53,20 +52,6 @@ def test_page_refers_to_nothing_outside_itself(text):
     assert "url(" not in text.partition("</style>")[0]
     assert all(anchor.startswith("#") and anchor[1:] in parser.ids for anchor in parser.anchors)
     assert len(parser.ids) == len(set(parser.ids))
-
-
-def test_page_without_data_leaves_room_for_it(text):
-    assert len(text.encode()) < 0.9e6  # measured 0.7e6; the page of three scenes, all methods, is 1.3e6 of 3e6
-
-
-def test_sections_come_in_the_order_of_a_reader_who_chooses(text):
-    titles = [re.sub(r"\s+", " ", title) for title in re.findall(r"<h[23][^>]*>(.*?)</h[23]>", text.partition("<script")[0])]
-    wanted = ["brick_flip", "Work against precision", "Drift over time", "Convergence", "The motion itself"]
-    assert titles[:7] == ["Verdict", "Where an engine beats us", *wanted]
-    assert titles[7:9] == ["What is paid once", "What failed, what is not supported, and the truth"]
-    assert titles[-1] == "How this was made"
-    for part in ("conservative report", "commit", "processor", "mujoco"):
-        assert part in text[text.index("<footer") :]
 
 
 def test_text_cannot_become_markup():

@@ -52,25 +52,6 @@ def test_folder_has_the_answer_and_the_picture(answered):
         assert part in picture
 
 
-def test_text_lists_all_integrators_and_what_stands_behind_it():
-    done = conservative("brick_flip", *COMMON, "--engine", "mujoco")
-    assert done.exit_code == 0, done.output
-    for part in (
-        "What reaches it",
-        "RK4",
-        "Euler",
-        "implicit",
-        "implicitf",
-        "discrete",
-        "probe runs",
-        "Reference solution:",
-        "change of the initial rates",
-    ):
-        assert part in done.stdout
-    assert done.stderr == ""  # progress is for terminals
-    assert "timing" not in done.stdout
-
-
 def test_what_cannot_reach_an_error_says_how_far_it_gets():
     done = conservative("brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01")
     assert done.exit_code == 0, done.output
@@ -82,14 +63,6 @@ def test_an_unstable_motion_is_said_to_be_one():
     text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20").stdout.split())
     assert "and by any angle after that" in text
     assert "the motion is unstable and amplifies errors" in text
-
-
-def test_a_file_of_somebody_else_is_not_replaced(tmp_path):
-    (tmp_path / "recommendation.json").write_text("mine")
-    done = conservative("brick_flip", *COMMON, "--engine", "mujoco", "--out", tmp_path)
-    assert done.exit_code == 2
-    assert (tmp_path / "recommendation.json").read_text() == "mine"
-    assert [path.name for path in tmp_path.iterdir()] == ["recommendation.json"]
 
 
 @pytest.mark.parametrize(

@@ -38,14 +38,6 @@ def made_up(monkeypatch):
     return table
 
 
-def test_a_study_of_random_bodies_shows_its_ratios(made_up):
-    done = conservative(*RANDOM)
-    assert done.exit_code == 0, done.output
-    text = " ".join(done.stdout.split())
-    assert "spring 1e-2 2 of 2 ✓ 1.00 ✗ 0.50 ✓ 2.00 1" in text
-    assert "on the worst body 0.50 times" in text
-
-
 def test_json_has_ratios_and_rows(made_up):
     found = json.loads(conservative(*RANDOM, "--json").stdout)
     assert (found["study"], len(found["rows"])) == ("random", len(made_up))
@@ -133,20 +125,6 @@ def test_a_row_that_failed_says_why():
     assert good[-1] == ""
 
 
-def test_a_study_of_times_has_no_scheduler():
-    done = conservative("study", "speed", "--scenes", "brick_flip", "--methods", "gauss", "--scheduler", "tcp://127.0.0.1:1")
-    assert done.exit_code == 2
-    assert done.output.splitlines()[-1].startswith(
-        "Error: scheduler: got one for the study 'speed'; allowed: none for a study of"
-    )
-
-
-def test_a_scheduler_that_is_not_there_is_said_before_any_work():
-    done = conservative("study", "long_runs", "--scenes", "brick_flip", "--methods", "gauss", "--scheduler", "nowhere")
-    assert done.exit_code == 2
-    assert "Error: scheduler: got 'nowhere', where no scheduler answers" in done.output.splitlines()[-1]
-
-
 class Here:
     """A cluster that runs its tasks in this process, from bytes and to bytes as a real one does."""
 
@@ -180,3 +158,10 @@ def test_every_study_is_timed_or_is_not():
     timed = {"speed", "work_precision", "each_step", *studies.ENGINES, "random", "throughput"}
     assert set(on_cluster.UNTIMED) | timed == set(studies.MAKERS)
     assert not set(on_cluster.UNTIMED) & timed
+
+
+@pytest.mark.parametrize(("name", "words"), [("speed", "got one for the study 'speed'"), ("long_runs", "got 'nowhere'")])
+def test_a_scheduler_that_cannot_be_used_is_refused(name, words):
+    done = conservative("study", name, "--scenes", "brick_flip", "--methods", "gauss", "--scheduler", "nowhere")
+    assert done.exit_code == 2
+    assert done.stderr.splitlines()[-1].startswith(f"Error: scheduler: {words}")

@@ -10,10 +10,8 @@ from click.testing import CliRunner
 
 import conservative as cv
 from conservative.integration.distributions import angle_quantiles, mean_attitudes
-from conservative.outcome import ProgressOfMany
 from conservative.reports.cli.main import main
 from conservative.reports.run import sweep as work
-from conservative.reports.run.sweep import rate_text
 
 SPREAD = ("--spread", "attitude=5deg,rate=2%", "--seed", "3")
 COMMON = ("brick_flip", "--starts", "1500", *SPREAD, "--dt", "0.1", "--t-end", "1.15", "--samples", "5")
@@ -144,14 +142,6 @@ def test_an_error_instead_of_a_step():
     assert content["error"]["estimate"] < 1e-3
     assert content["error"]["reached"]
     assert content["samples"] == 6  # by default
-
-
-def test_progress_is_told_with_rates():
-    planned = work.plan("brick_flip", 10, {}, 0, samples=5, dt=0.1, t_end=1.0, error=None, resume=False, path=None)
-    assert planned.size == "4.8 kB"
-    told = work._progress_text(planned, ProgressOfMany(2.0, 4_000_500, 9_000_000, 500))
-    assert told == "2M bodies/s, 20M steps/s"
-    assert [rate_text(each) for each in (0.1234, 99.96, 123.4, 12_345, 2.3456e9)] == ["0.123", "100", "123", "12,300", "2.35G"]
 
 
 @pytest.mark.parametrize(

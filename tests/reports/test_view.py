@@ -17,10 +17,9 @@ from conservative.reports import document, view
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import Lock, provenance
-from conservative.reports.tables import lines, scene_views, work_precision
+from conservative.reports.tables import lines, work_precision
 
-from .made_up import convergence, curves, measurements
-from .made_up_engines import at_step, over_steps
+from .made_up import at_step, convergence, curves, measurements, over_steps
 from .rows import frame, parts, point, row
 
 
@@ -173,14 +172,3 @@ def test_curves_that_are_missing_are_named(built):
     table = built[2]
     found = view.build(drawn, Measurements(table, curve), provenance(["report"]))
     assert "reduced" not in found.scenes[0].without_curve
-
-
-def test_views_are_frozen_and_compared_as_objects(built):
-    found = built[0]
-    for value in (found, found.paper, found.scenes[0]):
-        with pytest.raises(dataclasses.FrozenInstanceError):
-            setattr(value, dataclasses.fields(value)[0].name, None)
-        assert dataclasses.replace(value) != value
-        assert isinstance(hash(value), int)
-    assert scene_views.SceneViews.__dataclass_params__.frozen
-    assert not scene_views.SceneViews.__dataclass_params__.eq
