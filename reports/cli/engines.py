@@ -28,7 +28,10 @@ Value = TypeVar("Value")
     ),
 )
 def engines() -> None:
-    """Install engines, in any version, each in its own environment in the user's cache folder."""
+    """Install engines, in any version, each in its own environment in the user's cache folder.
+
+    Engines that are installed with the package itself, such as MuJoCo, need no environment. `conservative list` shows them.
+    """
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -69,7 +72,7 @@ def install(
 @engines.command("list", short_help="List engines and environments.", epilog=epilog("conservative engines list --json"))
 @json_option
 def list_engines(as_json: bool) -> None:
-    """List the available engines, and the installed environments with the version of every package."""
+    """List the engines that can be installed, and the environments with the version of every package."""
     require_extra("conservative engines", "environments")
     from ..tables.engines import json_text, lines
 

@@ -28,29 +28,40 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
     cls=OutputCommand,
     short_help="Compare benchmarks with a baseline, or two versions with each other.",
     epilog=epilog(
-        "conservative gate --against main              the files in this folder against a branch, on any machine",
+        "conservative gate --against main              compare the files in this folder with a branch; needs no baseline",
         "conservative gate --against v1.2 --methods my_method --html gate.html",
-        "pytest --benchmark --gate                     run and compare with the baseline; leaves the results for this command",
-        "conservative gate                             compare them again",
-        'conservative gate --update "Fewer corrections"   accept them, with the reason',
+        "pytest --benchmark --gate                     run benchmarks, compare with the baseline, keep the results",
+        "conservative gate                             compare these results again",
+        'conservative gate --update "Fewer corrections"   accept these results as the baseline, with the reason',
         "conservative gate --json | jq '.verdicts[].violations'",
     ),
 )
 @click.argument("results", nargs=-1, type=FilePath())
 @click.option("--baseline", type=FilePath(), help="The baseline.  [default: benchmarks/baseline.json]")
 @click.option(
-    "--update", metavar="REASON", help="Accept RESULTS, all runs of one commit, and write the reason into the history."
+    "--update",
+    metavar="REASON",
+    help="Accept RESULTS, all of one commit, as the new baseline, and record the reason in its history.",
 )
 @click.option(
     "--against",
     metavar="REF|FOLDER|WHEEL",
-    help="Run two versions of a project in turn, each in its environment, and compare this one with the other.",
+    help="The older version. Both versions run in turn, each in its own environment; no baseline is needed.",
 )
 @click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: the newer version.  [default: this folder]")
 @click.option(
-    "--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="With --against. [default: the suite's]"
+    "--scenes",
+    multiple=True,
+    metavar="A,B",
+    shell_complete=completion.scenes,
+    help="With --against: scenes.  [default: those of the benchmarks]",
 )
-@click.option("--methods", multiple=True, metavar="A,B", help="With --against. [default: all with the role `ours`]")
+@click.option(
+    "--methods",
+    multiple=True,
+    metavar="A,B",
+    help="With --against: methods.  [default: all except engines and reference solutions]",
+)
 @click.option(
     "--with",
     "requirements",
@@ -59,7 +70,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
     help="With --against: more packages for both environments.",
 )
 @click.option(
-    "--processes", type=click.IntRange(2), metavar="N", help="With --against: processes of each version.  [default: 7]"
+    "--processes", type=click.IntRange(2), metavar="N", help="With --against: number of processes per version.  [default: 7]"
 )
 @find_links_option
 @allow_build_option
@@ -68,15 +79,15 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
 @click.option(
     "--html", type=OutputFile("<title>conservative gate: "), help="With --against: write a page with rows, ratios and filters."
 )
-@click.option("--json", "as_json", is_flag=True, help="Violations and notes, or the new entry of the history, as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print violations and notes, or the new entry of the history, as JSON.")
 @click.pass_context
 def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
     """Compare RESULTS of `pytest --benchmark` with the baseline; by default those of the last run with --gate.
 
-    With --against, compare two versions instead: errors, drifts, orders, counts and times of both, measured now. A row that is
-    5 % slower with 99 % confidence is measured again in new processes, and fails if it still is.
+    With --against, measure two versions and compare their errors, drifts, orders, work counts and times. A row that is 5 %
+    slower with 99 % confidence is measured again in new processes, and fails if it is slower again.
 
-    Exits with 1 and a line for each violation, or with 2 if the comparison cannot be made.
+    The exit code is 1, with a line for each violation, or 2 if the comparison cannot be made.
     """
     two_versions = options["against"] is not None
     for name in OF_BASELINE if two_versions else OF_VERSIONS:

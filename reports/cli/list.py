@@ -19,7 +19,7 @@ from .options import epilog
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_all(as_json: bool) -> None:
-    """List scenes and methods with their invariants and installed engines."""
+    """List the scenes, our methods and the installed engines, with the invariants that they conserve."""
     require_extra("conservative list", "report", "rich")
     from ..tables.catalogue import json_text, tables
     from ..terminal.tables import print_tables

@@ -74,9 +74,9 @@ def _as_click(error: Exception) -> Exception:
 @click.group(
     cls=Commands,
     epilog=epilog(
-        "conservative report                      measure the main scenes, write report/",
+        "conservative report                      measure the paper's two scenes, write report/",
         "conservative run brick_flip --dt 0.01    integrate a scene once",
-        "conservative list                        show scenes and methods",
+        "conservative list                        list scenes and methods",
     ),
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
@@ -84,7 +84,7 @@ def _as_click(error: Exception) -> Exception:
 def main() -> None:
     """Integrate the rotation of rigid bodies with conserved energy and momentum, and compare with physics engines.
 
-    Tab completion: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)"; or zsh_source, fish_source.
+    Tab completion in bash: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)". In zsh and fish: zsh_source, fish_source.
     """
 
 

@@ -26,16 +26,20 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Wr
     ),
 )
 @click.argument("scene", shell_complete=completion.scenes)
-@click.option("--error", type=float, default=1e-6, show_default=True, help="Largest attitude error over the duration, rad.")
+@click.option(
+    "--error", type=float, default=1e-6, show_default=True, help="Target: the largest attitude error over the duration, rad."
+)
 @click.option("--duration", type=float, help="Duration, s.  [default: the scene's]")
 @click.option(
     "--engine",
     multiple=True,
     metavar="A,B",
     shell_complete=completion.methods,
-    help="Engines to probe.  [default: all installed]",
+    help="Engines to probe, in addition to our method.  [default: all installed]",
 )
-@click.option("--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time per simulated second, s.")
+@click.option(
+    "--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time of a setting per simulated second, s."
+)
 @click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--out", type=OutputFolder(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
@@ -49,9 +53,10 @@ def recommend(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Probe our methods and every engine on SCENE, a name or a file, and list which reach the error, at what cost and drift.
+    """List which methods reach the error on SCENE, a name or a file, at what cost and drift.
 
-    Errors beyond the end of a probe are extrapolated by a law that is shown with the result.
+    Our method for the scene and the engines make short probe runs at several settings. Errors after the end of a probe are
+    extrapolated, and the result states how.
     """
     require_extra("conservative recommend", "report")
     from conservative import registry

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         "conservative report --quick --out quick_report",
         "conservative report --scenes lagrange_top,my_body.toml --methods reduced,mujoco:RK4,heyoka",
         "conservative report --engines all --methods reduced",
-        "conservative report --resume                 go on after Ctrl-C, with the same options",
+        "conservative report --resume                 continue after Ctrl-C, with the same options",
     ),
 )
 @click.option(
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     multiple=True,
     metavar="M,N",
     shell_complete=completion.methods,
-    help="Methods.  [default: a selection; all with --full]",
+    help="Methods. A name without settings, such as mujoco, selects all its variants.  [default: a selection; with --full all]",
 )
 @click.option(
     "--engines",
     multiple=True,
     metavar="E,F",
     shell_complete=completion.engine_lists,
-    help="Add a section that compares engines: NAME, NAME==VERSION, or all (see `conservative engines`).",
+    help="Add a section that compares engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`).",
 )
 @click.option(
     "--bodies",
@@ -54,7 +54,8 @@ if TYPE_CHECKING:
 @click.option(
     "--full",
     is_flag=True,
-    help="Measure all methods and more: random bodies, many bodies, hard cases, stability, each step, the paper's figures.",
+    help="Measure all methods, and add random bodies, many bodies, hard cases, longest steps, runs with every step stored, "
+    "and the paper's figures.",
 )
 @click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
@@ -65,10 +66,16 @@ if TYPE_CHECKING:
     help="Time budget per run, s. Slower methods get fewer points. A run beyond ten times the budget (at least 60 s) is "
     "stopped.  [default: 0.6, with --quick 0.15]",
 )
-@click.option("--png", is_flag=True, help="Write pictures as PNG, too.")
-@click.option("--json", "as_json", is_flag=True, help="Print measurements.json.")
+@click.option("--png", is_flag=True, help="Write pictures as PNG as well.")
+@click.option("--json", "as_json", is_flag=True, help="Print the content of measurements.json instead of tables.")
 @click.option("--resume", is_flag=True, help="Continue an interrupted report, with the same options.")
-@click.option("--out", type=FilePath(), default="report", show_default=True, help="Folder, replaced as a whole.")
+@click.option(
+    "--out",
+    type=FilePath(),
+    default="report",
+    show_default=True,
+    help="Folder of the report. An earlier report there is replaced.",
+)
 def report(
     out: Path,
     resume: bool,
@@ -88,7 +95,7 @@ def report(
 
     The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
     error. Open OUT/index.html. The folder OUT is replaced when the report is complete. Until then, finished studies are in
-    OUT.partial.json. The name of a family, such as mujoco, selects all its variants.
+    OUT.partial.json.
     """
     require_extra("conservative report", "report")
     from .. import document

@@ -30,16 +30,17 @@ from .options import OutputCommand, OutputFile, epilog
     "methods",
     multiple=True,
     shell_complete=completion.methods,
-    help=f"Method with settings; repeat it for a table.  [default: {DEFAULT_METHOD}, or the first that supports the field]",
+    help="Method, or method:settings, such as taylor:order=12 (see `conservative list`). Repeat the option for a table.  "
+    f"[default: {DEFAULT_METHOD}, or the first method that supports the scene's potential]",
 )
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write the samples t, R_WB, w_WB_B, energy, momentum.")
+@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write t, R_WB, w_WB_B, energy and momentum of each sample.")
 def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
 
-    Every step is stored, or at most a million evenly spaced samples. If the run fails, the file contains the samples
+    Every step is stored, but at most a million evenly spaced samples. If the run fails, the CSV file contains the samples
     before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")

@@ -44,20 +44,26 @@ COLUMNS = 7
 )
 @click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="Methods.  [default: all]")
 @click.option(
-    "--engines", multiple=True, metavar="E,F", shell_complete=completion.engine_lists, help="More engines, in environments."
+    "--engines",
+    multiple=True,
+    metavar="E,F",
+    shell_complete=completion.engine_lists,
+    help="Add engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`).",
 )
 @click.option(
     "--bodies",
     type=click.IntRange(1),
     metavar="N",
-    help="Number of random bodies per field (or kind, in throughput).  [default: 10, 64]",
+    help="Number of random bodies per field in `random`, per kind in `throughput`.  [default: 10; in `throughput` 64]",
 )
 @click.option("--seed", type=click.IntRange(0), metavar="S", help="Seed of the random bodies.  [default: 0]")
 @click.option("--sizes", multiple=True, metavar="N,M", help="For throughput: batch sizes.  [default: 1,10,...,1e6]")
 @click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
 @click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
 @click.option("--time-limit", type=float, metavar="S", help="Time budget per run, s.  [default: 0.6, with --quick 0.15]")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on this Dask scheduler; only for studies without times.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler; only for studies that measure no times."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print rows and samples as JSON.")
 @click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
@@ -75,9 +81,11 @@ def study(
     out: Path | None,
     **numbers: Any,
 ) -> None:
-    """Run the study NAME and show its rows, or the time ratios of random bodies.
+    """Run one study and show its rows, or for `random` the time ratios.
 
-    Names are those of the studies in a report. `random` and `throughput` use random bodies.
+    NAME is paper, convergence, speed, work_precision, each_step, long_runs, sphere_curves, paper_figures, engines_at_one_step,
+    engines_over_steps, stability, hard_cases, random or throughput. A report consists of the same studies. benchmarks/README.md
+    describes them.
     """
     require_extra("conservative study", "report")
     from conservative.files import make_folder, text_file

@@ -35,12 +35,20 @@ SVG_MARK = "<!-- Written by conservative -->"
     required=True,
     metavar="WHAT=HOW,...",
     shell_complete=completion.spreads,
-    help="Standard deviations: attitude=5deg or any; rate=0.1 (rad/s), 5deg/s, 10% or any; inertia=1%; potential.weight=2%.",
+    help="Standard deviations: attitude=5deg or 0.1 (rad); rate=5deg/s, 0.1 (rad/s) or 10%; inertia=1%; potential.weight=2%. "
+    "attitude=any and rate=any: uniformly distributed attitudes and directions.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")
-@click.option("--method", "-m", shell_complete=completion.methods, help="Method with settings.  [default: chosen by the scene]")
+@click.option(
+    "--method",
+    "-m",
+    shell_complete=completion.methods,
+    help="Method, or method:settings.  [default: as for `conservative run`]",
+)
 @click.option("--dt", type=float, help="Step size, s.  [default: the scene's]")
-@click.option("--error", type=float, help="Target attitude error, rad; chooses method and step size.")
+@click.option(
+    "--error", type=float, help="Target attitude error, rad. Chooses the method and the step size; not with --method or --dt."
+)
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
 @click.option(
     "--samples",
@@ -48,11 +56,19 @@ SVG_MARK = "<!-- Written by conservative -->"
     default=6,
     show_default=True,
     metavar="M",
-    help="Samples kept of each body, at most: 2 are the initial and the final state. Each takes 96 bytes.",
+    help="Largest number of samples per body, including the initial and the final state; 96 bytes each.",
 )
 @click.option("--out", type=FilePath(), help="Write the samples to a new folder (Zarr).")
-@click.option("--resume", is_flag=True, help="Compute missing and damaged blocks of the folder --out, with the same options.")
-@click.option("--picture", type=OutputFile(SVG_MARK), help="Draw how attitudes spread and drifts are distributed (SVG).")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Continue an interrupted sweep in the folder --out, with the same options. Damaged blocks are computed again.",
+)
+@click.option(
+    "--picture",
+    type=OutputFile(SVG_MARK),
+    help="Write a picture of the spread of attitudes and the distribution of drifts (SVG).",
+)
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads.  [default: one per processor]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
@@ -66,11 +82,11 @@ def sweep(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Integrate many random initial states, and bodies, near those of SCENE, and show how they spread, drifted and ended.
+    """Integrate random variations of SCENE, and show the spread of attitudes, the drifts and the failures.
 
-    Deviations are normally distributed: attitudes are turned by a rotation vector; rates, numbers of the potential and second
-    moments of mass are changed, each component by the standard deviation given. A percentage is relative to the scene's value,
-    for a vector to its length. The same seed gives the same initial states.
+    Deviations are normally distributed. --spread gives the standard deviation of each component: of a rotation vector that
+    turns the initial attitude, of the initial rate, of the second moments of mass, and of parameters of the potential. A
+    percentage is relative to the scene's value, or to the length of a vector. The same seed gives the same bodies.
     """
     require_extra("conservative sweep", "report")
     from conservative.files import text_file

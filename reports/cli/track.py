@@ -57,17 +57,21 @@ SHORT = {
     "--against",
     type=FilePath(),
     metavar="WHEEL|FOLDER",
-    help="Compare your own build with the last version; exit code 1 if an order, an invariant or a run is lost.",
+    help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence or an "
+    "invariant, or if a run fails that succeeded before.",
 )
 @click.option(
     "--scenes",
     multiple=True,
     metavar="A,B",
     shell_complete=completion.scenes,
-    help="Scenes to run.  [default: those of a report]",
+    help="Scenes to run.  [default: the paper's two]",
 )
 @click.option(
-    "--settings", multiple=True, metavar="A,B", help="Settings of the engine, such as RK4.  [default: those in tables]"
+    "--settings",
+    multiple=True,
+    metavar="A,B",
+    help="Settings of the engine, such as RK4.  [default: those that a report shows]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--junit", type=OutputFile('name="conservative track '), help="Write a JUnit report.")
@@ -78,7 +82,7 @@ SHORT = {
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
-    Versions that are not installed get an environment of their own.
+    Versions that have no environment are installed first, each in its own.
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
