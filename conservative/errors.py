@@ -69,7 +69,7 @@ class MissingEngine(_Error, ImportError):
 
     def __init__(self, engine: str, package: str) -> None:
         self.engine, self.package = engine, package
-        super().__init__(f"engine: got {engine!r}, which is not installed; allowed after: pip install {package}")
+        super().__init__(f"{engine} is not installed. Run: pip install {package}")
 
 
 class MissingExtra(_Error, ImportError):
@@ -80,8 +80,7 @@ class MissingExtra(_Error, ImportError):
 
     def __init__(self, what: str, packages: str, extra: str) -> None:
         self.what, self.packages, self.extra = what, packages, extra
-        allowed = f"allowed after: pip install 'conservative-rotation[{extra}]'"
-        super().__init__(f"{what}: got an environment without {packages}; {allowed}")
+        super().__init__(f"{what} needs {packages}. Run: pip install 'conservative-rotation[{extra}]'")
 
 
 class IntegrationFailed(_Error, ArithmeticError):

@@ -64,7 +64,7 @@ def test_what_a_lean_environment_lacks_is_refused():
 def test_a_table_names_its_extra():
     code, _, error = run_python(REFUSE + LOOK + SHOWN, others())
     assert code == 1
-    assert "Trajectory.to_pandas: got an environment without pandas" in error.splitlines()[-1]
+    assert "Trajectory.to_pandas needs pandas" in error.splitlines()[-1]
     assert "pip install 'conservative-rotation[report]'" in error.splitlines()[-1]
 
 
@@ -84,7 +84,7 @@ def test_a_command_without_its_extra_names_it_in_one_line(arguments, without, ex
     assert (code, out) == (2, "")
     assert len(error.splitlines()) == 1
     what = " ".join(["conservative", *arguments.split()[:1]])
-    assert f"{what}: got an environment without {without}" in error
+    assert f"{what} needs {without}" in error
     assert f"pip install 'conservative-rotation[{extra}]'" in error
 
 

@@ -63,11 +63,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.args = [_linked(text, config.invocation_params.dir) for text in config.args]
     if not benchmarks_requested(config):
         if config.getoption("conservative_gate"):
-            raise pytest.UsageError("--gate: got no benchmarks to compare; allowed together with --benchmark")
+            raise pytest.UsageError("--gate can only be used together with --benchmark")
         return
     if not config.pluginmanager.hasplugin(TIMER):
-        allowed = "allowed after: pip install 'conservative-rotation[gate]', and without -p no:benchmark"
-        raise pytest.UsageError(f"--benchmark: got an environment where pytest-benchmark is not loaded; {allowed}")
+        advice = "Run: pip install 'conservative-rotation[gate]', and do not use -p no:benchmark"
+        raise pytest.UsageError(f"--benchmark: pytest-benchmark is not loaded. {advice}")
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(SUITE)]
         if not any(text.startswith(MAX_TIME) for text in config.invocation_params.args):

@@ -32,10 +32,8 @@ class MissingEnvironment(MissingEngine):
     def __init__(self, engine: str, version: str = "", installed: tuple[str, ...] = ()) -> None:
         self.engine, self.package = engine, engine
         wanted = f"{engine}=={version}" if version else engine
-        has = f"; installed are {', '.join(installed)}" if installed else ""
-        ImportError.__init__(
-            self, f"engine: got {wanted!r}, which is not installed{has}; allowed after: conservative engines install {wanted}"
-        )
+        has = f" (installed: {', '.join(installed)})" if installed else ""
+        ImportError.__init__(self, f"{wanted} is not installed{has}. Run: conservative engines install {wanted}")
 
 
 def describe_exit(code: int, last_words: str) -> str:
