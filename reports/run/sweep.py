@@ -255,18 +255,18 @@ def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
     run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
     yield "run", run
     if error := summary["error"]:
-        reached = "" if error["reached"] else ", which is not what was asked for"
+        reached = "" if error["reached"] else ", so the target is not reached"
         estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
-        yield "error", f"{estimate}; asked: {error['asked']:g} rad{reached}"
+        yield "error", f"{estimate}; target: {error['asked']:g} rad{reached}"
     bodies, steps = (rate_text(summary[key]) for key in ("bodies_per_second", "body_steps_per_second"))
-    before = f", {summary['found_before']:,} bodies were there before" if summary["found_before"] else ""
-    yield "time", f"{summary['wall_time']:.3g} s: {bodies} bodies/s, {steps} body-steps/s{before}"
+    before = f"; {summary['found_before']:,} bodies were finished before" if summary["found_before"] else ""
+    yield "time", f"{summary['wall_time']:.3g} s in all; while integrating {bodies} bodies/s, {steps} body-steps/s{before}"
     for name, drift in summary["drift"].items():
-        text = "none: no body has it, or all failed"
+        text = "none: no body has this invariant, or all bodies failed"
         if drift is not None:
             text = f"{drift['largest']:.2e} at most (body {drift['body']}), median {drift['median']:.1e} (relative)"
         yield f"drift of {name}", text
-    yield "angle from the mean", "median, and 5 to 95 % of the bodies"
+    yield "angle from the mean attitude", "median, and 5th to 95th percentile of the bodies"
     for row in summary["angle_from_mean"]:
         low, middle, high = ("-" if value is None else f"{math.degrees(value):.3g}°" for value in list(row.values())[1:])
         yield f"  at t = {row['t']:.4g} s", f"{middle}, {low} to {high}"

@@ -14,6 +14,7 @@ from conservative.method import Method, Role
 from ..terminal.tables import TerminalTable
 
 SCENE_HEADER = ("name", "t_end, s", "dt, s", "conserved by the motion", "source")
+TITLES = {Role.OURS: "ours", Role.ENGINE: "engines", Role.TRUTH: "reference solutions", None: "not available"}
 METHOD_HEADER = ("name", "order", "conserves", "version, or why it cannot run")
 
 
@@ -87,7 +88,7 @@ def tables() -> Iterator[TerminalTable]:
     for group, members in groupby(scenes(), key=lambda entry: entry.group):
         yield TerminalTable(f"Scenes: {group}", SCENE_HEADER, [_scene_row(entry) for entry in members])
     for role, entries in groupby(methods(), key=lambda entry: entry.role):
-        yield TerminalTable(f"Methods: {role or 'not available'}", METHOD_HEADER, [_method_row(entry) for entry in entries])
+        yield TerminalTable(f"Methods: {TITLES[role]}", METHOD_HEADER, [_method_row(entry) for entry in entries])
 
 
 def _scene_row(entry: SceneEntry) -> tuple[str, ...]:

@@ -19,7 +19,8 @@ from .work_precision import cost
 HEADER = ("method", "energy", "momentum", "attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
 LEGEND = (
     "energy, momentum: largest relative drift; attitude: largest error, rad; all at the scene's own step, or at the default "
-    f"tolerance. µs at {tolerance(MIDDLE)}: computing time per simulated second at that attitude error, rad."
+    f"tolerance. order: measured order of convergence. µs at {tolerance(MIDDLE)}: wall time per simulated second at an "
+    f"attitude error of {tolerance(MIDDLE)} rad. {DASH}: not measurable, or not reached."
 )
 
 
@@ -73,13 +74,13 @@ def verdict(points: pd.DataFrame, scenes: Sequence[str]) -> str:
     `points` have classes (see `classes.with_classes`).
     """
     clauses = [_clause(points[points["scene"] == scene], scene) for scene in scenes]
-    return f"At {tolerance(MIDDLE)} rad: {'; '.join(clauses)}."
+    return f"At {tolerance(MIDDLE)} rad, without closed forms: {'; '.join(clauses)}."
 
 
 def _clause(points: pd.DataFrame, scene: str) -> str:
     ours, engine = cheapest(points, (MethodClass.GENERAL,), MIDDLE), cheapest(points, OF_ENGINES, MIDDLE)
     if ours is None or engine is None:
         there = ours or engine
-        return f"on {scene} only {there.name} gets there" if there else f"on {scene} nothing measured gets there"
+        return f"on {scene} only {there.name} reaches it" if there else f"on {scene} no method reaches it"
     fast, slow = (ours, engine) if ours.time <= engine.time else (engine, ours)
     return f"on {scene} {fast.name} is {factor(slow.time / fast.time)} times as fast as {slow.name}"

@@ -17,7 +17,7 @@ def lines() -> Iterator[str]:
     there = list_environments()
     for engine in registry.list_engines():
         mine = [environment for environment in there if environment.engine == engine]
-        yield from map(_line, mine) if mine else [f"{engine}: not installed"]
+        yield from map(_line, mine) if mine else [f"{engine}: no environment"]
 
 
 def _line(environment: Environment) -> str:

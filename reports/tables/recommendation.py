@@ -117,9 +117,9 @@ def tables(recommendation: Recommendation) -> Iterator[TerminalTable]:
         else:
             failing.append((*names, f"{probe.holds:.2g} s", _expected(probe), drift))
     if reaching:
-        yield TerminalTable("What reaches it, cheapest first", REACHING, reaching)
+        yield TerminalTable("Settings that reach the error, fastest first", REACHING, reaching)
     if failing:
-        limit = f"What does not, at up to {recommendation.conditions.cost_limit:g} s of computing per simulated second"
+        limit = f"Methods that do not, at up to {recommendation.conditions.cost_limit:g} s of wall time per simulated second"
         yield TerminalTable(limit, FAILING, failing)
     probes = [row for advice in recommendation.advice for row in _probe_rows(advice)]
     yield TerminalTable("The probe runs; <- marks the settings of the tables above", PROBES, probes)
@@ -134,11 +134,12 @@ def notes(recommendation: Recommendation) -> list[str]:
     solutions = [a for a in advice if a.best and class_of(a.role, a.best.method.name) is MethodClass.SOLUTION]
     return [
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
+        f"kept: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
         f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
         f"{amplified.final_size:.2g} rad within {amplified.end:.4g} s{after} ({amplified.label}): {growth}.",
-        "Cost: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
+        "Times: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
         *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in solutions),
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
         *(f"{name}: not installed." for name in recommendation.missing),

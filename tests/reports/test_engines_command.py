@@ -35,7 +35,7 @@ def test_the_list_shows_what_there_is_and_what_could_be(cache):
     lines = text.splitlines()
     place = lines.index("exudyn==1.9.0: Python 3.11.7, exudyn==1.9.0, numpy==2.4.6")
     assert lines[place + 1].startswith("exudyn==1.10.0: ")
-    assert "bsk: not installed" in lines
+    assert "bsk: no environment" in lines
 
 
 def test_the_list_as_json_has_every_version(cache):

@@ -167,6 +167,6 @@ def test_the_verdict_counts_engines_that_only_their_own_studies_measured():
     points = with_classes(all_points(found))
     assert set(points["name"]) == {"reduced", "a 1 RK4"}
     assert cheapest(points, OF_ENGINES, 1e-6).name == "a 1 RK4"
-    assert verdict(points, [SCENE]).startswith(f"At 1e-6 rad: on {SCENE} ")
+    assert verdict(points, [SCENE]).startswith(f"At 1e-6 rad, without closed forms: on {SCENE} ")
     assert "a 1 RK4" in verdict(points, [SCENE])
     assert len(all_points(table(ours))) == 2

@@ -55,7 +55,7 @@ def test_folder_has_the_answer_and_the_picture(answered):
 def test_what_cannot_reach_an_error_says_how_far_it_gets():
     done = conservative("brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01")
     assert done.exit_code == 0, done.output
-    assert "What does not, at up to 0.01 s of computing per simulated second" in done.stdout
+    assert "Methods that do not, at up to 0.01 s of wall time per simulated second" in done.stdout
     assert "anything finer costs more than 0.01 s" in " ".join(done.stdout.split())
 
 

@@ -127,7 +127,7 @@ def test_an_interrupted_sweep_says_what_is_kept_and_resume_does_the_rest(answere
 def test_text_has_the_same_figures_without_a_folder_and_bodies_that_fail_are_listed():
     done = conservative("brick_flip", "--starts", "2", "--spread", "rate=1%", "-m", "convected:1e-29", "--t-end", "0.05")
     assert done.exit_code == 1
-    for part in ("bodies", "2: 0 ok, 2 ", "rate=1%; seed 0", "none: no body has it, or all failed"):
+    for part in ("bodies", "2: 0 ok, 2 ", "rate=1%; seed 0", "none: no body has this invariant, or all bodies failed"):
         assert part in done.stdout
     assert "body 1 " in done.stdout
     assert done.stderr.count("\n") == 1
