@@ -124,7 +124,7 @@ def report(
         click.echo((out / MANIFEST).read_text(encoding="utf-8"))
     else:
         _show(view)
-        click.echo(out / "report.md")
+        click.echo(out / "index.html")
     if view.failed:
         raise click.ClickException("; ".join(view.failed))
 

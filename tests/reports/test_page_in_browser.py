@@ -108,8 +108,8 @@ def test_every_chart_has_marks(opened):
     marks = "svg .mark-symbol path, svg .mark-line path"
     script = "return [...document.querySelectorAll('.chart')].map(e => e.querySelectorAll(arguments[0]).length)"
     counts = opened.execute_script(script, marks)
-    assert len(counts) > 15  # measured 20 and more
-    assert min(counts) >= 2  # the errors of two maps, in a figure of the paper
+    assert len(counts) > 10  # measured 12 in a default report
+    assert min(counts) >= 2
 
 
 def drawn_symbols(browser, colour):

@@ -43,7 +43,7 @@ def test_report_has_its_files_and_lists_them(made):
     assert names == pictures | {"report.md", "index.html", "measurements.csv", "measurements.json"}
     assert set(json.loads((folder / "measurements.json").read_text())["files"]) == names
     assert set(re.findall(r"\]\((\w+\.svg)\)", (folder / "report.md").read_text())) == pictures
-    assert done.stdout.strip().endswith("report.md")
+    assert done.stdout.strip().endswith("index.html")
 
 
 def test_a_line_per_study_tells_the_progress_where_there_is_no_terminal(made):
@@ -56,7 +56,7 @@ def test_the_command_ends_with_a_table_per_scene_the_verdict_and_the_path(made):
     lines = done.stdout.strip().splitlines()
     table = pd.read_csv(folder / "measurements.csv")
     assert max(map(len, lines[:-1])) <= 80
-    assert lines[-1] == str(folder / "report.md")
+    assert lines[-1] == str(folder / "index.html")
     cells = [re.split(r"\s{2,}", line.strip()) for line in lines]
     ours, engine = (next(row for row in cells if row[0] == name) for name in ("reduced", "mujoco RK4"))
     paper = table[(table["study"] == "paper") & (table["method"] == "reduced")]

@@ -9,7 +9,7 @@ from conservative import registry
 from conservative.benchmarks.measures import measurement
 from conservative.reports.labels import with_names
 from conservative.reports.tables import families, random_contests, random_summary, summary
-from conservative.reports.tables.classes import MethodClass, class_of
+from conservative.reports.tables.classes import MethodClass, class_of, with_classes
 from conservative.reports.tables.headline import first_lost, of_points, of_random_bodies
 from conservative.reports.tables.work_precision import points
 
@@ -98,6 +98,17 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 lame"
     assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
+
+
+def test_the_cheapest_line_stands_for_its_class_whatever_the_order():
+    faster = point("taylor", "ours", 1e-8, 1e-6)
+    for lines in ((OURS, faster, SOLVER), (faster, OURS, SOLVER)):
+        assert (
+            summary.cheapest(
+                with_classes(points(frame([each for line in lines for each in line]))), (MethodClass.GENERAL,), 1e-6
+            ).name
+            == "taylor"
+        )
 
 
 def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_for_other_scenes():
