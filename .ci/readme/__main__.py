@@ -2,9 +2,10 @@
 
     python .ci/readme                    # write README.md
     python .ci/readme --check            # exit with 1 if README.md is not current
-    python .ci/readme --measured REPORT RANDOM
+    python .ci/readme --measured REPORT [RANDOM]
 
-The last form first replaces measured.csv and the picture, from the folders of a report and of a study of random bodies.
+The last form first replaces measured.csv and the picture, from the folders of a report and of a study of random bodies. Without
+RANDOM the rows of random bodies stay.
 CONTRIBUTING.md has the commands that make them.
 """
 
@@ -56,17 +57,22 @@ def main() -> None:
         prog="python .ci/readme", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if README.md is not current")
-    parser.add_argument("--measured", nargs=2, type=Path, metavar=("REPORT", "RANDOM"), help="folders of new measurements")
+    parser.add_argument(
+        "--measured", nargs="+", type=Path, metavar="FOLDER", help="REPORT [RANDOM]: folders of new measurements"
+    )
     options = parser.parse_args()
     if options.measured:
         import measure  # beside this file; it needs the package
 
-        new = list(measure.rows(*options.measured))
+        report, *random = options.measured
+        with ROWS.open(encoding="utf-8", newline="") as file:
+            bodies = [row for row in csv.DictReader(file) if row["command"] == measure.RANDOM]
+        new = [*measure.scene_rows(report), *(measure.random_rows(*random) if random else bodies)]
         with ROWS.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, measure.COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(new)
-        measure.draw(options.measured[0], PICTURE)
+        measure.draw(report, PICTURE)
     text = render()
     if options.check and text != README.read_text(encoding="utf-8"):
         sys.exit("README.md differs from its template and measured.csv. Run: python .ci/readme")

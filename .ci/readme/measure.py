@@ -24,11 +24,15 @@ RANDOM = "conservative study random --bodies 40 --seed 1001 --methods gauss,proj
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy")
 
 
-def rows(report: Path, random: Path) -> Iterator[dict[str, Any]]:
-    """Yield the rows of measured.csv, as dictionaries with the keys `COLUMNS`."""
+def scene_rows(report: Path) -> Iterator[dict[str, Any]]:
+    """Yield the rows of the paper's two scenes, as dictionaries with the keys `COLUMNS`."""
     table = _read(report / "measurements.csv")
     common = {"command": "conservative report", "date": _date(report / "measurements.csv")}
     yield from (common | row for scene in CLOSED_FORMS for row in _scene(table[table["scene"] == scene], scene))
+
+
+def random_rows(random: Path) -> Iterator[dict[str, Any]]:
+    """Yield the rows of random bodies, as dictionaries with the keys `COLUMNS`."""
     bodies = _read(random / "study.csv")
     common = {"command": RANDOM, "date": _date(random / "study.csv")}
     yield from (common | row for row in _random(bodies))
