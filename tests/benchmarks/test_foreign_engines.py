@@ -40,11 +40,11 @@ def test_a_recommendation_survives_engines_that_hang_or_end_their_process():
     assert by_line["foreign_fast"].reached
     assert by_line["foreign_slow"].probes[0].outcome.ok
     for how, kind in (("hang", OutcomeKind.TIMEOUT), ("abort", OutcomeKind.CRASHED)):
-        advice = by_line[f"foreign_harm:how={how}"]
+        advice = by_line[Harmful(how).name]
         assert not advice.reached
         assert {probe.outcome.kind for probe in advice.probes} == {kind}
         assert advice.reason.startswith(str(kind))
-    assert len(by_line["foreign_harm:how=hang"].probes) == 1
+    assert len(by_line[Harmful("hang").name].probes) == 1
 
 
 @pytest.fixture

@@ -20,10 +20,10 @@ ON_AXIS = cv.UniformGravity(4.0, 0.5 * TURN[:, 2])
 
 
 def generic(n: int, potential: cv.UniformGravity | None = None) -> Bodies:
-    """Bodies with moments, axes, attitudes and speeds (0.05 to 5 rad/s) of their own; each third is 1e30 times as heavy."""
+    """Bodies with moments, axes, attitudes and speeds (0.05 to 5 rad/s) of their own; each third is 1e28 times as heavy."""
     random = np.random.default_rng(14)
     turned = np.array([rotation_about(random.normal(size=3), 2.0) for _ in range(n)])
-    moments = random.uniform(0.9, 1.1, (n, 3)) * (1, 1.4, 2) * np.where(np.arange(n) % 3, 1.0, 1e30)[:, None]
+    moments = random.uniform(0.9, 1.1, (n, 3)) * (1, 1.4, 2) * np.where(np.arange(n) % 3, 1.0, 1e28)[:, None]
     inertia = turned @ (moments[:, :, None] * turned.transpose(0, 2, 1))
     w = random.normal(size=(n, 3)) * 10 ** random.uniform(-1.5, 0.5, (n, 1))
     scene = cv.Scene("generic", cv.RigidBody((1, 1.4, 2)), np.eye(3), (0, 0, 1), 1.0, potential)

@@ -89,5 +89,5 @@ def test_bad_settings_of_batches(settings):
 
 def test_what_cannot_run_at_once_says_so():
     assert registry.method("heyoka:frame=lean").prepare_many(FREE, GRID) is None
-    small = Bodies(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-30, TOPS.parameters)
+    small = Bodies(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-29, TOPS.parameters)
     assert registry.method("mujoco:RK4").prepare_many(small, GRID) is None
