@@ -82,8 +82,8 @@ class Study:
 
     @property
     def timing_budget(self) -> float:
-        """Time, s, for all rounds of one run; slow ones get fewer rounds."""
-        return 0.06 if self.quick else 0.6
+        """Time, s, for all rounds of one run, at most that of the longest run; slow ones get fewer rounds."""
+        return min(0.06 if self.quick else 0.6, self.longest_run)
 
     @property
     def longest_run(self) -> float:

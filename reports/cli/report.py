@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     type=float,
     metavar="S",
     help="Time budget per run, s. Slower methods get fewer points. A run beyond ten times the budget (at least 60 s) is "
-    "stopped.  [default: 0.6, with --quick 0.15]",
+    "stopped.  [default: 0.15, with --full 0.6]",
 )
 @click.option("--png", is_flag=True, help="Write pictures as PNG as well.")
 @click.option("--json", "as_json", is_flag=True, help="Print the content of measurements.json instead of tables.")

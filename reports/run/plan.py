@@ -13,6 +13,8 @@ from conservative.scene import Scene
 
 from .provenance import Lock, locks_of
 
+MAIN_TIME_LIMIT = 0.15
+"""Longest single run, s, that a default report plans for, so that all of it takes a minute. A full one has that of `Study`."""
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""
 
@@ -80,7 +82,7 @@ def plan_report(
     png
         Whether pictures are also written as PNG.
     time_limit
-        Longest single run to plan for, s; see `Study`.
+        Longest single run to plan for, s; see `Study`. Default: `MAIN_TIME_LIMIT` for the scenes, unless `full`.
     bodies
         Random bodies in each field. Default: none; if `full` and no scene is named `BODIES`, or `QUICK_BODIES` if `quick`.
     seed
@@ -111,7 +113,8 @@ def plan_report(
         made.append(studies.random_study(drawn, bodies, seed, quick, skip_missing))
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
-    made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, time_limit)
+    main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
+    made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit)
     if found:
         made += studies.cross_studies(studies.ENGINES, chosen, found, quick, skip_missing, time_limit)
     if full and not (names or quick):
