@@ -89,7 +89,7 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
 def test_resume_does_the_rest_and_tidies_up(resumed):
     folder, *_, (code, out, err) = resumed
     assert code == 0, err
-    assert out.endswith("report/report.md\n")
+    assert out.endswith("report/index.html\n")
     assert {path.name for path in folder.iterdir()} == {"report"}
     listed = json.loads((folder / "report" / "measurements.json").read_text())["files"]
     assert {path.name for path in (folder / "report").iterdir()} == {*listed, "mine.txt"}
