@@ -421,7 +421,7 @@ def _find_scene(record: Mapping[str, Any], scene: object) -> Scene:
         except Exception:  # whatever is wrong with it
             found = None
         if not isinstance(found, Scene):
-            raise BadInput("path", "a scene that cannot be read", "an ensemble that nobody has edited")
+            raise BadInput("path", "a scene that cannot be read", "an ensemble as `integrate_many` wrote it")
         return found
     if not isinstance(scene, Scene):
         raise BadInput("scene", describe(scene), "None, or the Scene of the run")

@@ -282,7 +282,7 @@ def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
 
 
 def write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
-    """Write bytes until a deadline, in s. Raises BrokenPipeError where nobody reads them, and TimeoutError."""
+    """Write bytes until a deadline, in s. Raise BrokenPipeError if the reader is gone, and TimeoutError."""
     descriptor, rest = pipe.fileno(), memoryview(data)
     while rest:
         _wait(descriptor, select.POLLOUT, deadline)
