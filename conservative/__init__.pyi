@@ -17,13 +17,13 @@ from .errors import NotWritten as NotWritten
 from .errors import PotentialFailed as PotentialFailed
 from .errors import Unsupported as Unsupported
 from .errors import WrongBranch as WrongBranch
+from .grid import Grid as Grid
 from .integration.ensemble import Ensemble as Ensemble
 from .integration.ensemble import open_ensemble as open_ensemble
 from .integration.many import integrate_many as integrate_many
 from .integration.one import integrate as integrate
 from .integration.spread import spread as spread
 from .invariants import Invariant as Invariant
-from .method import Grid as Grid
 from .method import Method as Method
 from .method import Role as Role
 from .methods.convected import Convected as Convected

@@ -8,9 +8,7 @@ more (array-likes, plain functions, None). `dataclasses.replace` works, as conve
 from __future__ import annotations
 
 import math
-import os
 from decimal import Decimal
-from functools import lru_cache
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -30,16 +28,6 @@ Products of three such numbers are doubles, and so are all that energies and mom
 RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
 LONGEST_SHOWN = 200
 """Characters of a value that a message shows at most."""
-
-MOST_STEPS = 2**53
-"""Steps of a run at most: floats, which times are made of, count no farther."""
-_COUNT = f"an integer of 1 to 2^53 = {MOST_STEPS}, up to which floats count"
-SAMPLE_BYTES = 1000
-"""Memory that a run takes for a sample, bytes, with all that is in between."""
-MEMORY_SHARE = 0.5
-"""Share of a machine's memory that the samples of a run may take."""
-USUAL_MEMORY = 4 * 2**30
-"""Memory, bytes, of a machine that does not say how much it has."""
 
 
 def describe(value: object) -> str:
@@ -176,51 +164,6 @@ def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
     """Raise `BadInput` unless `value` is one of `options`, which are texts, integers and None."""
     if isinstance(value, bool) or not isinstance(value, str | Integral | None) or value not in options:
         raise BadInput(argument, describe(value), "one of " + ", ".join(repr(o) for o in options))
-
-
-@lru_cache(maxsize=1)
-def most_samples() -> int:
-    """Return how many samples a run may keep: as many as fill `MEMORY_SHARE` of this machine's memory."""
-    try:
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):  # not on every system
-        memory = USUAL_MEMORY
-    return int((memory if memory > 0 else USUAL_MEMORY) * MEMORY_SHARE / SAMPLE_BYTES)
-
-
-def require_memory(argument: str, n_steps: int, every: int) -> None:
-    """Raise `BadInput` if a run of so many steps, every `every`-th of them a sample, has more than `most_samples`."""
-    most, samples = most_samples(), 1 + -(-n_steps // every)
-    if samples > most:
-        fits = f"up to {most:.3g} samples fit in memory, {SAMPLE_BYTES} bytes each"
-        fits = f"{-(-n_steps // (most - 1))} or more, or longer steps: {fits}"
-        raise BadInput(argument, f"{every}, for {samples} samples of {n_steps} steps", fits)
-
-
-def convert_steps(dt: object, n_steps: object, every: object) -> tuple[float, int, int]:
-    """Return a step, s, and counts, dimensionless, as a float and ints.
-
-    Raises
-    ------
-    BadInput
-        The step is not finite or not above 0, a count is beyond `MOST_STEPS`, or the samples do not fit in memory.
-    """
-    step = real_number(dt)  # no range: steps of scenes in other units are no longer in SI units
-    if step is None or not 0 < step < math.inf:
-        raise BadInput("dt", describe(dt), "a finite step above 0, s")
-    counts = _convert_count("n_steps", n_steps), _convert_count("every", every)
-    if not math.isfinite(step * counts[0]):
-        raise BadInput("dt", f"{step:g}, for {counts[0]} steps", "a step whose multiples are finite, s")
-    require_memory("every", *counts)
-    return step, *counts
-
-
-def _convert_count(argument: str, value: object) -> int:
-    """Return a number of steps as an int. Raise `BadInput` unless it is of 1 to `MOST_STEPS`."""
-    count = positive_integer(argument, value, _COUNT)
-    if count > MOST_STEPS:
-        raise BadInput(argument, describe(count), _COUNT)
-    return count
 
 
 def set_fields(value: object, **fields: Any) -> None:

@@ -1,94 +1,19 @@
-"""Methods, ours and the engines' alike: the protocol, and the grid of steps and samples."""
+"""The base class of all methods, ours and those of engines."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from .attitude import Array
-from .check import MOST_STEPS, SMALLEST, convert_steps, positive_integer, positive_number, require_memory, set_fields
 from .declarations import Candidacy, Cost, maker_of, refuse_time, settings_text
 from .declarations import Role as Role
-from .errors import BadInput
+from .grid import Grid, grid_for
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, accept
 
 Run = Callable[[], Trajectory]
-
-
-@dataclass(frozen=True, init=False)
-class Grid:
-    """Steps of length dt, s, and the stored samples: the initial state, every `every`-th step, and the last one.
-
-    The last step is the first one at or after the requested end, so `t[-1]` can be up to one step later.
-
-    Raises
-    ------
-    BadInput
-        dt is not a finite number above 0, n_steps or every is not an integer of 1 to 2^53, or samples do not fit in memory.
-    """
-
-    dt: float
-    n_steps: int
-    every: int = 1
-
-    def __init__(self, dt: float, n_steps: int, every: int = 1) -> None:
-        step, count, each = convert_steps(dt, n_steps, every)
-        set_fields(self, dt=step, n_steps=count, every=each)
-
-    @property
-    def steps(self) -> Array:
-        """Number of steps (n,) after which each sample is kept, from 0."""
-        steps = np.arange(0, self.n_samples * self.every, self.every, dtype=float)
-        steps[-1] = self.n_steps
-        return steps
-
-    @property
-    def t(self) -> Array:
-        """Times (n,) of the samples, s."""
-        return self.steps * self.dt
-
-    def count_samples(self, done: int) -> int:
-        """Return the number of samples in the first `done` steps."""
-        return self.n_samples if done == self.n_steps else 1 + done // self.every
-
-    @property
-    def n_samples(self) -> int:
-        """Number of samples."""
-        return 1 + -(-self.n_steps // self.every)
-
-
-def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: object = 1) -> Grid:
-    """Return the checked grid of a run of steps dt up to t_end, both in s; the duration is by default the scene's.
-
-    Raises
-    ------
-    BadInput
-        dt or t_end is not a finite number above 0, dt is larger than t_end, sample_every is not an integer of 1 or more, or
-        the samples would not fit in memory.
-    """
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    step = dt if type(dt) is float and SMALLEST <= dt <= end else _read_step(dt, end)
-    # One part in 10^9 of slack, so that 6 / 0.01 is 600 steps and not 601.
-    n_steps = max(1, math.ceil(end / step * (1 - 1e-9)))
-    if n_steps > MOST_STEPS:
-        raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
-    every = min(positive_integer("sample_every", sample_every), n_steps)
-    require_memory("sample_every", n_steps, every)
-    return Grid(step, n_steps, every)
-
-
-def _read_step(dt: object, end: float) -> float:
-    """Return a step, s; raise `BadInput` if it cannot be used, or is longer than the run to `end`, s."""
-    allowed = f"a finite step above 0 and at most t_end = {end:g}, s"
-    if (step := positive_number("dt", dt, allowed)) > end:
-        raise BadInput("dt", f"{step:g}", allowed)
-    return step
 
 
 class Method(ABC):

@@ -12,6 +12,7 @@ from . import invariants, presentation
 from .attitude import Array, orthonormality
 from .deferred_imports import kernels
 from .errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
+from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
 from .outcome import Choice as Choice
@@ -128,8 +129,6 @@ class Trajectory:
 
 START_TOLERANCE = 1e-6
 """How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
-Steps = Any
-"""A `conservative.method.Grid`: naming the type would close a circle, as that file imports this one."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ class Bounds:
     orthonormality: float
 
 
-def accept(found: Any, scene: Scene, steps: Steps, method: Any, bounds: Bounds) -> Trajectory:
+def accept(found: Any, scene: Scene, steps: Grid, method: Any, bounds: Bounds) -> Trajectory:
     """Return what a run gave if it may be called ok, else what is good of it, with the failure.
 
     Parameters
@@ -175,7 +174,7 @@ def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> T
         return _cut_at_drift(_cut_to_finite(found), kept, bounds)
 
 
-def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
+def _find_mistake(found: Any, scene: Scene, steps: Grid) -> str | None:
     """Return what is wrong with the form of a result, None if nothing is."""
     if not isinstance(found, Trajectory):
         return f"a {type(found).__name__}, no Trajectory"
@@ -184,7 +183,7 @@ def _find_mistake(found: Any, scene: Scene, steps: Steps) -> str | None:
     return _find_mistyped(found, steps)
 
 
-def _find_mistyped(found: Any, steps: Steps) -> str | None:
+def _find_mistyped(found: Any, steps: Grid) -> str | None:
     """Return which field of a `Trajectory` has another type or shape than it should, None if none has."""
     if not isinstance(found.counters, Counters) or not isinstance(found.failure, IntegrationFailed | None):
         return "counters or a failure of another type"
@@ -197,7 +196,7 @@ def _find_mistyped(found: Any, steps: Steps) -> str | None:
     return None
 
 
-def _find_misplaced(found: Trajectory, steps: Steps) -> str | None:
+def _find_misplaced(found: Trajectory, steps: Grid) -> str | None:
     """Return which samples are not those asked for, None if all are."""
     t = steps.t
     if len(found) > len(t) or not np.allclose(found.t, t[: len(found)], rtol=1e-12, atol=0):
@@ -207,7 +206,7 @@ def _find_misplaced(found: Trajectory, steps: Steps) -> str | None:
     return "a first sample that is not the start" if R_off.any() or w_off.any() else None
 
 
-def _is_kept(found: Trajectory, steps: Steps, kept: frozenset[str], bounds: Bounds) -> bool:
+def _is_kept(found: Trajectory, steps: Grid, kept: frozenset[str], bounds: Bounds) -> bool:
     """Return whether compiled code finds all samples within the bounds and all times right."""
     scene = found.scene
     V = invariants.conserved_part(scene.body, scene.potential, scene.in_field_axes(found.R_WB, found.t), found.w_WB_B)

@@ -21,8 +21,8 @@ import numpy as np
 from conservative.attitude import Array, axes_about, to_quaternion
 from conservative.body import RigidBody
 from conservative.errors import Diverged, MissingEngine
+from conservative.grid import Grid
 from conservative.invariants import axial_direction
-from conservative.method import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix

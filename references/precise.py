@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.potentials.turning import static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene

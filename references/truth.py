@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from conservative.attitude import angle_between
-from conservative.method import Grid, Method
+from conservative.grid import Grid
+from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

@@ -13,7 +13,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from conservative import registry
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.scene import Scene
 
 Answer = dict[str, Any]

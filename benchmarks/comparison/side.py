@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.errors import IntegrationFailed
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import Worker
 from conservative.references.environments.engine_method import WorkerRun

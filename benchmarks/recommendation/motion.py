@@ -11,8 +11,9 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import AccuracyNotReached
+from conservative.grid import Grid
 from conservative.integration.one import integrate
-from conservative.method import Grid, Method
+from conservative.method import Method
 from conservative.methods.units import bound_rate
 from conservative.references.exact.method import Exact
 from conservative.references.truth import Truth, reference

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conservative.attitude import Array, angle_between
-from conservative.method import Grid, Method
+from conservative.grid import Grid
+from conservative.method import Method
 from conservative.methods.search import SAFETY
 from conservative.methods.trials import ASYMPTOTIC
 from conservative.outcome import Outcome

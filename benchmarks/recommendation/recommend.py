@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 from conservative.check import positive_number
 from conservative.errors import BadInput, nearest
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.outcome import Outcome
 from conservative.references.truth import Truth
 from conservative.scene import Scene

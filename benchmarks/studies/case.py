@@ -9,7 +9,8 @@ from typing import Any
 
 from conservative.attitude import Array
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

@@ -18,7 +18,8 @@ from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 from conservative.attitude import angle_between
-from conservative.method import Grid, Method, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

@@ -8,7 +8,8 @@ from typing import Any, NoReturn
 
 from conservative import registry
 from conservative.errors import BadInput, MissingEngine, nearest
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.references.environments.environment import Environment, list_environments
 from conservative.references.environments.failures import MissingEnvironment
 from conservative.references.environments.lock import split_requirement

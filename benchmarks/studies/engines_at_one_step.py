@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from conservative.grid import Grid, grid_for
 from conservative.invariants import find_energy
-from conservative.method import Grid, grid_for
 from conservative.outcome import OK, Outcome
 from conservative.references.environments.client import time_limit
 from conservative.trajectory import Trajectory

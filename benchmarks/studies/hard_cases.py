@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from conservative import registry
-from conservative.method import Grid, Method, Role, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Method, Role
 from conservative.scene import Scene
 
 from ..measures.measurement import Measurement

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from conservative.attitude import Array, orthonormality
+from conservative.grid import grid_for
 from conservative.invariants import sizes
-from conservative.method import Method, grid_for
+from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 

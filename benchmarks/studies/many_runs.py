@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.methods.many import Block, Bodies, RunMany
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from conservative.method import Role, grid_for
+from conservative.grid import grid_for
+from conservative.method import Role
 from conservative.references.truth import Truth
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory

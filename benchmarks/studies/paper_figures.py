@@ -13,7 +13,8 @@ import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array
-from conservative.method import Method, grid_for
+from conservative.grid import grid_for
+from conservative.method import Method
 from conservative.methods.convected import Convected
 from conservative.methods.reduced import Reduced
 from conservative.potentials.uniform_gravity import UniformGravity

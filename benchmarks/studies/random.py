@@ -26,7 +26,8 @@ from dataclasses import dataclass, replace
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
 from conservative.errors import BadInput, IntegrationFailed
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 from conservative.references.precise import Precise

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, NoReturn
 
 from conservative import registry
 from conservative.errors import MissingEngine, NotLoadable
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")

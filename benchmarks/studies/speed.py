@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from conservative.method import Grid, Run, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Run
 from conservative.outcome import OK
 
 from ..measures.measure import Measure, Value, blanks

@@ -25,8 +25,9 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import Diverged
+from conservative.grid import Grid
 from conservative.invariants import find_energy
-from conservative.method import Grid, Method
+from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

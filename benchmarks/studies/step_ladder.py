@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from conservative.method import Grid, Method
+from conservative.grid import Grid
+from conservative.method import Method
 from conservative.scene import Scene
 
 SAMPLES = 12

@@ -8,7 +8,8 @@ from functools import lru_cache
 
 from conservative.check import positive_number
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 

@@ -23,7 +23,8 @@ import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import MissingEngine
-from conservative.method import Grid, Method
+from conservative.grid import Grid
+from conservative.method import Method
 from conservative.methods.many import Bodies
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engines.heyoka import SMALLEST_TOL, Heyoka

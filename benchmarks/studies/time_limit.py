@@ -8,8 +8,9 @@ from functools import partial
 from weakref import WeakKeyDictionary
 
 from conservative.errors import BadInput
+from conservative.grid import Grid
 from conservative.integration.pickling import NotTransferable
-from conservative.method import Grid, Method, Role
+from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 from conservative.references.environments.engine_method import EngineMethod

@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from conservative.attitude import rotation_about
-from conservative.method import Grid, Method, Role, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Method, Role
 from conservative.potentials.potential import depends_on_time, energy_at
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

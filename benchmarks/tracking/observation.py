@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from conservative.grid import Grid, grid_for
 from conservative.invariants import Invariant, sizes
-from conservative.method import Grid, Method, grid_for
+from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 from conservative import registry
 from conservative.errors import BadInput
-from conservative.method import Method, grid_for
+from conservative.grid import grid_for
+from conservative.method import Method
 from conservative.references.environments.engine_method import EngineMethod
 from conservative.references.environments.environment import Environment
 from conservative.scene import Scene

@@ -17,7 +17,8 @@ import numpy as np
 
 from ..attitude import Array
 from ..errors import BadInput, IntegrationFailed, NotRun
-from ..method import Grid, Method
+from ..grid import Grid
+from ..method import Method
 from ..methods.many import Block, Bodies, pause, watch
 from .drifts import find_drifts, list_drifts
 

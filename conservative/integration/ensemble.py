@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array
 from ..check import choice as require_choice
 from ..errors import IntegrationFailed, require_extra
-from ..method import Grid
+from ..grid import Grid
 from ..methods.many import Bodies
 from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, positive_number
+from ..check import describe, positive_integer, positive_number
 from ..errors import BadInput, IntegrationFailed
-from ..method import Grid, Method, grid_for
+from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
+from ..method import Method
 from ..methods.between import Samples
 from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany

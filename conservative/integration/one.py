@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from .. import registry
 from ..attitude import Array
-from ..check import MOST_STEPS, choice, describe, positive_integer, positive_number
+from ..check import choice, describe, positive_integer, positive_number
 from ..errors import BadInput, Unsupported
-from ..method import Method, grid_for
+from ..grid import MOST_STEPS, grid_for
+from ..method import Method
 from ..methods.automatic import integrate_to_error
 from ..methods.between import Samples, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced

@@ -22,7 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import AccuracyNotReached
-from ..method import Grid, Method
+from ..grid import Grid
+from ..method import Method
 from ..methods.automatic import grid_of
 from ..methods.between import Samples
 from ..methods.many import Bodies

@@ -17,8 +17,9 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ..attitude import Array, from_quaternion
-from ..check import SAMPLE_BYTES, describe, most_samples, positive_integer, real_number
+from ..check import describe, positive_integer, real_number
 from ..errors import BadInput, nearest
+from ..grid import SAMPLE_BYTES, most_samples
 from ..potentials.turning import static_part
 from ..scene import Scene
 from . import inputs

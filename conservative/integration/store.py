@@ -54,7 +54,7 @@ from ..errors import (
     WrongBranch,
     require_extra,
 )
-from ..method import Grid
+from ..grid import Grid
 from ..methods.many import Bodies
 from ..outcome import Outcome, OutcomeKind
 from ..scene import Scene

@@ -17,9 +17,8 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..check import require_memory
 from ..errors import AccuracyNotReached, BadInput
-from ..method import Grid
+from ..grid import Grid, require_memory
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory

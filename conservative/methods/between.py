@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, to_quaternion
-from ..check import SAMPLE_BYTES, describe, most_samples, real_array
+from ..check import describe, real_array
 from ..deferred_imports import kernels
 from ..errors import BadInput, Diverged
-from ..method import Grid, Method
+from ..grid import SAMPLE_BYTES, Grid, most_samples
+from ..method import Method
 from ..scene import Scene
 from ..trajectory import Trajectory, accept_samples
 from .coefficients.explicit import DORMAND_PRINCE_8

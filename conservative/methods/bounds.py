@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 
-from ..method import Grid
+from ..grid import Grid
 from ..scene import Scene
 from ..trajectory import Bounds
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..attitude import Array
 from ..deferred_imports import kernels
-from ..method import Grid
+from ..grid import Grid
 from ..potentials.uniform_gravity import UniformGravity
 from .many import Block, Bodies, pause
 

@@ -12,7 +12,8 @@ import numpy as np
 from ..attitude import Array
 from ..check import positive_number
 from ..errors import NotConverged
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds, Counters, Trajectory
 from .bounds import bounds_of

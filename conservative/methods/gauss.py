@@ -14,7 +14,8 @@ from ..check import choice, describe, positive_integer
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Bounds

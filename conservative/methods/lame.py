@@ -40,7 +40,8 @@ from ..attitude import Array, to_quaternion
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..trajectory import Bounds

@@ -13,7 +13,8 @@ from ..check import choice, set_fields
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of

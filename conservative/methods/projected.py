@@ -10,8 +10,9 @@ import numpy as np
 from ..attitude import Triple, triple
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
+from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL
-from ..method import Grid, Method, Role, Run
+from ..method import Method, Role, Run
 from ..potentials.turning import Turning
 from ..scene import Scene
 from ..trajectory import Bounds

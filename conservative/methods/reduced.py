@@ -11,7 +11,8 @@ import numpy as np
 from ..check import choice, positive_number
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of

@@ -12,7 +12,8 @@ import numpy as np
 from ..attitude import Array
 from ..deferred_imports import kernels
 from ..errors import Diverged, IntegrationFailed, NotConverged, WrongBranch
-from ..method import Grid, Run
+from ..grid import Grid
+from ..method import Run
 from ..scene import Scene
 from ..trajectory import Counters, Trajectory
 from .principal_axes import PrincipalStart

@@ -22,7 +22,8 @@ from itertools import chain
 from .. import registry
 from ..declarations import Candidacy
 from ..errors import MissingEngine
-from ..method import Grid, Method, Role
+from ..grid import Grid
+from ..method import Method, Role
 from ..scene import Scene
 from .trials import Trials
 from .units import bound_rate

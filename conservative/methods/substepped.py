@@ -8,7 +8,8 @@ from typing import ClassVar
 from .. import registry
 from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
-from ..method import Grid, Method, Role, Run
+from ..grid import Grid
+from ..method import Method, Role, Run
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 

@@ -13,8 +13,9 @@ from ..check import describe, positive_number, set_fields
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
+from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, momentum_W
-from ..method import Grid, Method, Role, Run
+from ..method import Method, Role, Run
 from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion
 from ..deferred_imports import kernels
-from ..method import Grid
+from ..grid import Grid
 from .columns import fill_columns, take_pieces
 from .fields_of_many import Fields, find_fields, into_axes
 from .many import Block, Bodies, RunMany

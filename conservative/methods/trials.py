@@ -24,7 +24,8 @@ import numpy as np
 from ..attitude import Array, angle_between
 from ..body import RigidBody
 from ..errors import IntegrationFailed, MissingEngine, Unsupported
-from ..method import Grid, Method
+from ..grid import Grid
+from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Trajectory

@@ -19,7 +19,8 @@ from typing import Any, TypeVar
 
 from ..body import RigidBody
 from ..check import build_unchecked, read_only
-from ..method import Grid, Method, Run
+from ..grid import Grid
+from ..method import Method, Run
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import static_part
 from ..scene import Scene

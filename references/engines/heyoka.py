@@ -11,7 +11,8 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.check import choice, describe, finite_number, positive_integer
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.methods.many import Bodies, RunMany
 from conservative.methods.units import SI, find_units, in_own_units
 from conservative.potentials.turning import static_part

@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 
 from conservative.check import choice, positive_integer
 from conservative.errors import Unsupported
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, Bodies, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene

@@ -10,7 +10,8 @@ import numpy as np
 
 from conservative.attitude import Array, from_quaternion
 from conservative.check import choice
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, Bodies, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene

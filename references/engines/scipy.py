@@ -11,7 +11,8 @@ import numpy as np
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice, describe, finite_number
 from conservative.errors import BadInput
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.methods.units import in_own_units
 from conservative.potentials.potential import AnyPotential, torque_W
 from conservative.potentials.turning import Turning, static_part

@@ -17,7 +17,8 @@ import numpy as np
 from conservative import registry
 from conservative.check import choice
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
-from conservative.method import Grid, Method, Role, Run
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
 from conservative.methods.many import Bodies, RunMany
 from conservative.scene import Scene
 

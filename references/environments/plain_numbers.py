@@ -9,7 +9,7 @@ import numpy as np
 
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.errors import IntegrationFailed
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.methods.many import Block, Bodies
 from conservative.methods.units import SI, find_units
 from conservative.scene import Scene

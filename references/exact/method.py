@@ -18,8 +18,9 @@ from conservative.attitude import Array
 from conservative.body import RigidBody
 from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
+from conservative.grid import Grid
 from conservative.invariants import axial_direction
-from conservative.method import Grid, Method, Role, Run
+from conservative.method import Method, Role, Run
 from conservative.methods.bounds import bounds_of
 from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity

@@ -16,9 +16,10 @@ from conservative import registry
 from conservative.attitude import angle_between, orthonormality
 from conservative.errors import BadInput
 from conservative.files import text_file
+from conservative.grid import Grid, grid_for
 from conservative.integration.one import default_method, integrate, require_support
 from conservative.invariants import Invariant, sizes
-from conservative.method import Grid, Method, grid_for
+from conservative.method import Method
 from conservative.presentation import COLUMNS
 from conservative.presentation import samples as samples_of
 from conservative.references.exact.method import Exact

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from conservative import registry
-from conservative.check import MOST_STEPS, describe, positive_number
+from conservative.check import describe, positive_number
 from conservative.errors import AccuracyNotReached, BadInput, NotWritten, nearest
+from conservative.grid import MOST_STEPS, Grid, grid_for
 from conservative.integration.blocks import SAMPLE_BYTES
 from conservative.integration.distributions import QUANTILES, angle_quantiles, mean_attitudes
 from conservative.integration.ensemble import Ensemble
 from conservative.integration.many import integrate_many
 from conservative.integration.spread import spread
 from conservative.integration.store import find_ensemble
-from conservative.method import Grid, grid_for
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
 

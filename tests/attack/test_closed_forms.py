@@ -15,7 +15,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise
 

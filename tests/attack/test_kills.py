@@ -20,7 +20,7 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.studies.case import Case, Failure, attempt
-from conservative.method import grid_for
+from conservative.grid import grid_for
 from conservative.references.environments import worker
 from conservative.references.environments.client import worker_of
 

@@ -19,8 +19,8 @@ import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality
 from conservative.check import LARGEST
 from conservative.errors import NotConserved
+from conservative.grid import Grid
 from conservative.invariants import kept_sizes, sizes
-from conservative.method import Grid
 from conservative.methods.bounds import LOOSEST, condition
 from conservative.methods.units import bound_rate
 from conservative.references.engines.heyoka import Heyoka

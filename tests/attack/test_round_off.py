@@ -13,7 +13,7 @@ from scipy import stats
 
 import conservative as cv
 from conservative.attitude import rotation_about
-from conservative.method import Grid
+from conservative.grid import Grid
 
 from .effort import count
 

@@ -11,7 +11,8 @@ import numpy as np
 
 import conservative as cv
 from conservative.attitude import hat
-from conservative.method import Grid, Run
+from conservative.grid import Grid
+from conservative.method import Run
 from conservative.references.exact.method import Exact
 from conservative.trajectory import Counters
 

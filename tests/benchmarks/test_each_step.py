@@ -10,7 +10,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.each_step import ERROR, KEPT, STEPS, keep_each
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Grid, grid_for
+from conservative.grid import Grid, grid_for
 from conservative.registry import method
 
 from .generic_study import SCENE, truth

@@ -14,7 +14,7 @@ from conservative.benchmarks.studies import engines_over_steps, studies
 from conservative.benchmarks.studies.engine_selection import select_engines
 from conservative.benchmarks.studies.engines_at_one_step import keep_few
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.outcome import OutcomeKind
 
 from .generic_study import Broken, truth

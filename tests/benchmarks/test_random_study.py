@@ -12,7 +12,8 @@ from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, Point
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Grid, Role
+from conservative.grid import Grid
+from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.registry import method
 from conservative.scenes.random_body import FIELDS, random_body

@@ -12,7 +12,7 @@ from conservative.attitude import angle_between, from_quaternion
 from conservative.benchmarks.recommendation import extrapolation
 from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, Scaling, fit_law
 from conservative.benchmarks.recommendation.recommend import ask, list_engines, recommend
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.exact.method import Exact
 

@@ -15,7 +15,7 @@ from conservative.benchmarks.recommendation import recommend
 from conservative.benchmarks.studies import long_runs, paper_figures, speed, sphere_curves, stability, studies
 from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.outcome import OK, OutcomeKind
 from conservative.trajectory import Trajectory
 

@@ -12,7 +12,8 @@ from conservative.benchmarks.studies.case import Case, attempt
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
 from conservative.benchmarks.studies.method_names import drop_tolerance, names_of
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
-from conservative.method import Grid, Method, Role, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Method, Role
 from conservative.outcome import OutcomeKind
 from conservative.references.environments.environment import Environment
 from conservative.references.environments.failures import MissingEnvironment

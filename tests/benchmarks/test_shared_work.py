@@ -10,7 +10,8 @@ import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.studies import step_ladder, studies
 from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
-from conservative.method import Grid, Role
+from conservative.grid import Grid
+from conservative.method import Role
 from conservative.references.exact.method import Exact
 from conservative.registry import method
 

@@ -12,7 +12,8 @@ from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study
-from conservative.method import Grid, Role, grid_for
+from conservative.grid import Grid, grid_for
+from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.truth import Truth
 from conservative.registry import method

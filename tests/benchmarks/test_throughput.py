@@ -12,7 +12,8 @@ from conservative.benchmarks.studies import many_runs, studies, throughput
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.benchmarks.studies.many_runs import Way
 from conservative.benchmarks.studies.selection import Missing
-from conservative.method import Grid, Role
+from conservative.grid import Grid
+from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.engines.mujoco import MuJoCo
 

@@ -17,7 +17,7 @@ from conservative.benchmarks.studies.convergence import FEWEST_POINTS, fits
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
 from conservative.benchmarks.studies.work_precision import points
-from conservative.method import Grid, grid_for
+from conservative.grid import Grid, grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references import worker
 from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason

@@ -18,8 +18,9 @@ import numpy as np
 import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
+from conservative.grid import Grid
 from conservative.integration.drifts import find_drifts
-from conservative.method import Grid, Method
+from conservative.method import Method
 from conservative.methods.many import Block, Bodies
 
 HOOK = np.array([0.0, 0.1, 0.4])

@@ -14,9 +14,10 @@ import pytest
 import conservative as cv
 from conservative.attitude import axes_about, rotation_about
 from conservative.errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
+from conservative.grid import Grid
 from conservative.invariants import kept_sizes
 from conservative.kernels import drifts
-from conservative.method import Grid, Method, Role
+from conservative.method import Method, Role
 from conservative.methods.bounds import bounds_of
 from conservative.outcome import OutcomeKind
 from conservative.trajectory import Bounds, Trajectory

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import check, registry
-from conservative.check import most_samples, require_memory
-from conservative.method import Grid, grid_for
+from conservative import grid as grids
+from conservative import registry
+from conservative.grid import Grid, grid_for, most_samples, require_memory
 
 BRICK = cv.scenes.brick_flip()
 
@@ -106,7 +106,7 @@ def test_samples_farther_apart_than_the_run_are_its_ends():
 
 
 def test_what_fits_in_memory_is_told_before_any_work(monkeypatch):
-    monkeypatch.setattr(check, "most_samples", lambda: 101)
+    monkeypatch.setattr(grids, "most_samples", lambda: 101)
     with pytest.raises(cv.BadInput) as caught:
         cv.integrate(BRICK, 0.01)
     assert caught.value.argument == "sample_every"

@@ -14,10 +14,10 @@ import conservative as cv
 from conservative import presentation
 from conservative.attitude import angle_between, rotation_about
 from conservative.errors import Diverged
+from conservative.grid import Grid
 from conservative.integration import distributions, pictures
 from conservative.integration.distributions import QUANTILES, angle_quantiles, blocks, mean_attitudes, project
 from conservative.integration.spread import spread
-from conservative.method import Grid
 from conservative.methods.many import Bodies
 from conservative.scenes import brick_flip
 

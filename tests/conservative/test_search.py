@@ -12,11 +12,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative import check
+from conservative import grid
 from conservative.attitude import rotation_about
 from conservative.declarations import Candidacy, Cost
 from conservative.errors import AccuracyNotReached, MissingEngine
-from conservative.method import Grid, Method, Role
+from conservative.grid import Grid
+from conservative.method import Method, Role
 from conservative.methods import automatic, search, trials
 from conservative.methods.between import Samples
 from conservative.outcome import Progress
@@ -544,12 +545,12 @@ def test_a_motion_that_rounding_decides_is_given_up_at_once():
 
 def test_where_no_more_samples_fit_in_memory_the_best_run_so_far_is_returned(monkeypatch):
     monkeypatch.setattr(automatic, "find_cheapest", lambda trials, error, t_end: (Slow(), 0.1))
-    monkeypatch.setattr(check, "most_samples", lambda: 10_000)
+    monkeypatch.setattr(grid, "most_samples", lambda: 10_000)
     with pytest.warns(cv.AccuracyNotReached):
         found = cv.integrate(SPUN, error=1e-7)
     assert found.choice.estimate == min(estimate for _, estimate in found.choice.attempts)
     assert 1000 < len(found) <= 10_000
-    monkeypatch.setattr(check, "most_samples", lambda: 2)
+    monkeypatch.setattr(grid, "most_samples", lambda: 2)
     with pytest.raises(cv.BadInput) as raised:
         cv.integrate(SPUN, error=1e-7)
     assert raised.value.argument == "sample_every"

@@ -16,7 +16,8 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.deferred_imports import kernels
-from conservative.method import Grid, Run
+from conservative.grid import Grid
+from conservative.method import Run
 from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
 

@@ -11,8 +11,9 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
 from conservative.errors import NotConverged
+from conservative.grid import Grid
 from conservative.invariants import sizes
-from conservative.method import Grid, Method
+from conservative.method import Method
 from conservative.methods import gauss, principal_axes
 from conservative.methods.units import SI, Units, bound_rate, find_units
 from conservative.registry import list_scenes, method

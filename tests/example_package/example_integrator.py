@@ -9,7 +9,8 @@ import numpy as np
 
 import conservative as cv
 from conservative.attitude import cayley, hat
-from conservative.method import Grid, Run
+from conservative.grid import Grid
+from conservative.method import Run
 from conservative.trajectory import Counters
 
 

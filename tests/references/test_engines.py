@@ -15,7 +15,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, orthonormality, rotation_about
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.references import engine
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka

@@ -14,8 +14,8 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
 from conservative.errors import BadInput
+from conservative.grid import Grid
 from conservative.invariants import energy, momentum_W
-from conservative.method import Grid
 from conservative.references.exact.clock import Clock, rotation_clock
 from conservative.references.exact.digits import mp
 from conservative.references.exact.method import Exact, free_body, lagrange_top

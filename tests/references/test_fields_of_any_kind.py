@@ -11,7 +11,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.potentials.potential import torque_W
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.scipy import SciPy

@@ -7,7 +7,7 @@ import pytest
 
 from conservative import BadInput, registry
 from conservative.benchmarks.studies.ensembles import draw
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.methods.many import Bodies
 from conservative.references.engine import principal_axes
 from conservative.references.engines.inside import mujoco as inside

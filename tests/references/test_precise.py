@@ -9,7 +9,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.references import precise
 from conservative.references.engines.scipy import SciPy
 from conservative.references.precise import Precise

@@ -17,7 +17,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, rotation_about, to_quaternion
-from conservative.method import Grid, grid_for
+from conservative.grid import Grid, grid_for
 from conservative.references.truth import reference
 
 from ..environments import ROOT

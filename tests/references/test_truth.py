@@ -5,7 +5,7 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, rotation_about
-from conservative.method import Grid
+from conservative.grid import Grid
 from conservative.references import truth
 
 R0 = rotation_about((0.3, -1, 0.4), 2.1)

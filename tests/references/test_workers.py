@@ -20,7 +20,7 @@ from conservative.benchmarks.studies.case import Case, Failure
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
 from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
-from conservative.method import grid_for
+from conservative.grid import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.environments import client, environment, worker
 from conservative.references.environments.client import Worker, time_limit
