@@ -117,7 +117,7 @@ def picture(trajectory: Sampled) -> altair.VConcatChart:
     import altair as alt
 
     if not len(trajectory):
-        raise BadInput("trajectory", repr(trajectory), "one with a sample or more")
+        raise BadInput("trajectory", repr(trajectory), "a trajectory with at least one sample")
     rates = {f"about axis {number}": rate for number, rate in enumerate(trajectory.w_WB_B.T, start=1)}
     drifts = {
         invariant.name: np.maximum(sizes(trajectory.drift(invariant)), LEAST_DRAWN) for invariant in trajectory.scene.invariants

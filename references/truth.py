@@ -39,8 +39,8 @@ class Disagreement(ArithmeticError):
     def __init__(self, scene: str, names: tuple[str, str], agreement_rad: float, allowed_rad: float) -> None:
         self.scene, self.names, self.agreement_rad, self.allowed_rad = scene, names, agreement_rad, allowed_rad
         super().__init__(
-            f"scene: got {scene!r}, on which {names[0]} and {names[1]} differ by {agreement_rad:.3g} rad; "
-            f"allowed: {allowed_rad:.3g} rad, or no truth is known"
+            f"scene: got {scene!r}, for which {names[0]} and {names[1]} differ by {agreement_rad:.3g} rad; "
+            f"expected at most {allowed_rad:.3g} rad"
         )
 
 

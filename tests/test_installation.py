@@ -87,7 +87,7 @@ def test_the_commands_in_the_readme_name_extras_that_exist():
 def test_a_room_has_one_name(room):
     code, _, error = run_python(f"import {room}")
     assert code == 1
-    assert error.splitlines()[-1] == f"ImportError: {room}: got another name than its own; allowed: import conservative.{room}"
+    assert error.splitlines()[-1] == f"ImportError: {room} is part of another package. Use: import conservative.{room}"
     code, out, error = run_python(f"import conservative.{room}; print(conservative.{room}.__name__)")
     assert (code, out.strip()) == (0, f"conservative.{room}"), error
 

@@ -31,7 +31,7 @@ class FailedThere(IntegrationFailed):
 
     def __init__(self, outcome: Outcome) -> None:
         self.outcome = outcome
-        super().__init__(f"dt: got a run that {outcome}; allowed: one that this version takes to its end")
+        super().__init__(f"The run of this version ended: {outcome}. Use a run that the version completes")
 
 
 @dataclass(frozen=True)

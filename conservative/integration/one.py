@@ -29,7 +29,7 @@ def require_support(method: Method, scene: Scene) -> None:
     """Raise `Unsupported` if the method cannot do the scene."""
     reason = method.unsupported(scene)
     if reason:
-        raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene it can do ({reason})")
+        raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
 def default_method(scene: Scene) -> Method:

@@ -194,7 +194,7 @@ def write_store(path: str | Path, label: str, bodies: Bodies, grid: Grid, resume
             raise NotWritten("path", place, error, NEW_FOLDER) from None
     elif differing := _list_differences(there, record):
         got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differing)}"
-        raise BadInput("path", got, "one of the same run")
+        raise BadInput("path", got, "an ensemble of the same run")
     handle = os.open(place, os.O_RDONLY)
     try:
         if not files.try_lock(handle):

@@ -88,7 +88,7 @@ def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
         They are more than `MOST_STEPS`, or their samples do not fit in memory.
     """
     if t_end / dt > MOST_STEPS:
-        raise BadInput("error", f"what takes {t_end / dt:.3g} steps", f"what {MOST_STEPS:g} steps reach: a larger one")
+        raise BadInput("error", f"one that takes {t_end / dt:.3g} steps", f"one that takes at most {MOST_STEPS:g} steps")
     if samples.at is not None:
         return even_grid(t_end, dt, spread(int(t_end / dt)))
     if samples.spacing is None:

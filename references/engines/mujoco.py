@@ -87,7 +87,7 @@ class MuJoCo(Method):
         try:
             march = prepare_with(mj, SimpleNamespace(integrator=self.integrator, **describe(axes, grid)))
         except NotImplementedError as error:  # an integrator that another version has
-            raise Unsupported("method", self.name, f"what {self.label} has: {error}") from None
+            raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
 
         def run() -> Trajectory:
             with _quiet(mj):

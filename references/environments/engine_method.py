@@ -163,7 +163,7 @@ class EngineMethod(Method):
         try:
             run.prepare()
         except NotImplementedError as error:
-            raise Unsupported("method", self.name, f"what {self.label} has: {error}") from None
+            raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
         except IntegrationFailed as failure:
             return partial(samples.failure, failure)
         return run

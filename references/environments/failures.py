@@ -14,7 +14,7 @@ class EngineCrashed(IntegrationFailed):
     def __init__(self, reason: str) -> None:
         self.reason = reason
         self.outcome = Outcome(OutcomeKind.CRASHED, reason)
-        super().__init__(f"method: got an engine that {self.outcome}; allowed: a scene and a setting that it survives")
+        super().__init__(f"The engine {self.outcome}. Use another scene or setting")
 
 
 class EngineTimeout(IntegrationFailed):
@@ -23,7 +23,7 @@ class EngineTimeout(IntegrationFailed):
     def __init__(self, limit: float) -> None:
         self.limit = limit
         self.outcome = Outcome(OutcomeKind.TIMEOUT, f"after {limit:g} s")
-        super().__init__(f"method: got an engine without an answer after {limit:g} s; allowed: a shorter run, or more time")
+        super().__init__(f"The engine did not answer within {limit:g} s. Use a shorter run or a longer time limit")
 
 
 class MissingEnvironment(MissingEngine):

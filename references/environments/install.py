@@ -102,7 +102,7 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
             Environment(engine, lock.version, scratch, _python_of(scratch), packages).write()
             _replace(folder, scratch)
     except UvFailed as failure:
-        raise BadInput("engine", f"{engine}=={lock.version}", f"what uv can install ({failure.summary})") from None
+        raise BadInput("engine", f"{engine}=={lock.version}", f"a package that uv can install ({failure.summary})") from None
     except OSError as error:
         raise BadInput("engines", f"{folder}: {error.strerror}", "a cache folder that can be written, with room") from None
     found = read_environment(folder)
@@ -162,7 +162,7 @@ def remove(requirement: str) -> tuple[Environment, ...]:
         raise BadInput(
             "engine",
             repr(requirement),
-            f"what is installed: {nearest(requirement, there)}" if there else "a name after something is installed",
+            f"an installed engine: {nearest(requirement, there)}" if there else "an installed engine (none is installed)",
         )
     for environment in found:
         close_workers(environment.folder)

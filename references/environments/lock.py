@@ -177,7 +177,7 @@ def _as_bad_input(package: str, version: str, failure: UvFailed, source: Source)
     if failure.says("was not found in"):
         place = "the package index" if source.find_links is None else str(source.find_links)
         return BadInput("engine", repr(wanted), f"a package that {place} has")
-    return BadInput("engine", repr(wanted), f"what uv can install ({failure.summary})")
+    return BadInput("engine", repr(wanted), f"a package that uv can install ({failure.summary})")
 
 
 def _no_wheel(package: str, version: str, wanted: str, tried: list[str], source: Source) -> BadInput:

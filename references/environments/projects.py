@@ -90,7 +90,7 @@ def keep_wheel(key: str, make_wheel: Callable[[Path], Path]) -> Path:
     with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         wheel = make_wheel(Path(folder))
         if not _WHEEL.fullmatch(wheel.name):
-            raise BadInput("against", repr(wheel.name), "the name that a wheel has")
+            raise BadInput("against", repr(wheel.name), "a wheel with its original file name")
         content = wheel.read_bytes()
     place = kept / (key or hashlib.sha256(content).hexdigest()[:16])
     return _keep(place / wheel.name, content)

@@ -114,7 +114,7 @@ def lagrange_top(
         raise BadInput("potential", describe(potential), "a UniformGravity")
     reason = _reason(body, potential)
     if reason:
-        raise Unsupported("potential", f"{potential!r} with {body!r}", f"what has a closed form ({reason})")
+        raise Unsupported("potential", f"{potential!r} with {body!r}", f"a motion in closed form ({reason})")
     with MP_LOCK:
         return _evaluate(_motion(start, potential), times)
 

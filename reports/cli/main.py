@@ -67,7 +67,7 @@ def _as_click(error: Exception) -> Exception:
         return _UserError(text)
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         sys.stdout = io.StringIO()  # or Python tries again to write the rest at its end
-        return _UserError(f"stdout: got {error.strerror!r}; allowed: a file, a pipe or a terminal that takes all of the output")
+        return _UserError(f"stdout: got {error.strerror!r}; expected a file, pipe or terminal that accepts all output")
     return click.ClickException(text) if isinstance(error, IntegrationFailed) else error
 
 

@@ -24,7 +24,7 @@ class FilePath(click.Path):
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if "\0" in str(value):
-            self.fail(f"got {value!r}; allowed: a path without NUL", param, ctx)
+            self.fail(f"got {value!r}; expected a path without NUL", param, ctx)
         return Path(str(value))
 
 
@@ -43,7 +43,7 @@ class OutputFile(FilePath):
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if str(value) == "-":
-            self.fail("got '-'; allowed: the name of a file (--json writes to stdout, ./- is a file of that name)", param, ctx)
+            self.fail("got '-'; expected the name of a file (--json writes to stdout, ./- is a file of that name)", param, ctx)
         return super().convert(value, param, ctx)
 
     def marks(self, path: Path) -> Mapping[Path, str]:
@@ -154,7 +154,7 @@ class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the 
                 return int(number)
         except (ValueError, OverflowError):  # the latter: infinite
             pass
-        self.fail(f"got {value!r}; allowed: an integer of 1 or more, such as 1000 or 1e6", param, ctx)
+        self.fail(f"got {value!r}; expected an integer of 1 or more, such as 1000 or 1e6", param, ctx)
 
 
 find_links_option = click.option(

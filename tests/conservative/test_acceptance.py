@@ -105,7 +105,7 @@ def test_a_motion_that_starts_elsewhere_is_that_of_another_scene() -> None:
 
 def test_integrate_raises_and_run_returns_what_the_check_finds() -> None:
     nothing = Foreign(INVALID["nothing"])
-    with pytest.raises(InvalidResult, match=r"method: got a NoneType, no Trajectory from .*foreign.*; allowed: a Trajectory"):
+    with pytest.raises(InvalidResult, match=r"method: got a NoneType, no Trajectory from .*foreign.*; expected a Trajectory"):
         cv.integrate(BRICK, method=nothing)
     assert nothing.run(BRICK, 0.1).outcome.kind is OutcomeKind.INVALID
     assert cv.integrate(BRICK, method=nothing, on_failure="return").outcome.kind is OutcomeKind.INVALID

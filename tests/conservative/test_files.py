@@ -51,7 +51,7 @@ def test_a_full_disk_leaves_what_was_there(kind, tmp_path):
     code, out, err = run_python(FULL.format(WRITERS[kind]), str(target))
     assert (code, err) == (0, "")
     assert out.startswith(
-        f"csv: got {str(target)!r} (File too large); allowed: a file in a folder that exists and can be written"
+        f"csv: got {str(target)!r} (File too large); expected a file in a folder that exists and can be written"
     )
     assert target.read_text() == "before"
     assert names(tmp_path) == ["run.csv"]
@@ -75,7 +75,7 @@ def test_an_exception_leaves_what_was_there(error, tmp_path):
 
 @pytest.mark.parametrize("place", [".", "missing/run.csv", "a\0b"])
 def test_a_place_that_cannot_be_written_is_named_before_any_work(place, tmp_path):
-    with pytest.raises(BadInput, match=r"csv: got .*; allowed: a file"), files.text_file(tmp_path / place, "csv"):
+    with pytest.raises(BadInput, match=r"csv: got .*; expected a file"), files.text_file(tmp_path / place, "csv"):
         pytest.fail("work was begun")
     assert names(tmp_path) == []
 

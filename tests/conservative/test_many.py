@@ -478,17 +478,17 @@ R, W, J = *starts(THOUSAND), tensors(THOUSAND)
 SHAPES = {
     "n differs": (
         {"R_WB0": R, "w_WB_B0": W[:7]},
-        r"^w_WB_B0: got shape \(7, 3\); allowed: .* \(1000, 3\): 1000 bodies, as R_WB0 has",
+        r"^w_WB_B0: got shape \(7, 3\); expected .* \(1000, 3\): 1000 bodies, as R_WB0 has",
     ),
     "n of a number": (
         {"w_WB_B0": W, "parameters": {"weight": [1.0, 2.0]}},
-        r"^parameters\['weight'\]: got shape \(2,\); allowed: numbers of shape \(1000,\): 1000 bodies",
+        r"^parameters\['weight'\]: got shape \(2,\); expected numbers of shape \(1000,\): 1000 bodies",
     ),
-    "one start": ({"w_WB_B0": W[0]}, r"^w_WB_B0: got shape \(3,\); allowed: numbers of shape \(n, 3\)"),
+    "one start": ({"w_WB_B0": W[0]}, r"^w_WB_B0: got shape \(3,\); expected numbers of shape \(n, 3\)"),
     "no body": ({"w_WB_B0": np.empty((0, 3))}, r"^w_WB_B0: got shape \(0, 3\)"),
     "a text": ({"w_WB_B0": "fast"}, r"^w_WB_B0: got 'fast'"),
-    "unknown number": ({"parameters": {"wieght": [1.0]}}, r"^parameters: got 'wieght'; allowed: 'weight' \(nearest\)"),
-    "no mapping": ({"parameters": [1.0]}, r"^parameters: got \[1.0\]; allowed: a mapping"),
+    "unknown number": ({"parameters": {"wieght": [1.0]}}, r"^parameters: got 'wieght'; expected 'weight' \(nearest\)"),
+    "no mapping": ({"parameters": [1.0]}, r"^parameters: got \[1.0\]; expected a mapping"),
 }
 
 
@@ -560,12 +560,12 @@ OTHERS = {
     "error": ({"error": 0.0}, r"^error: got 0"),
     "no numbers": (
         {"scene": scene(), "parameters": {"weight": [1.0]}},
-        r"^parameters: got 'weight'; allowed: none: .* no potential",
+        r"^parameters: got 'weight'; expected none: .* no potential",
     ),
     "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 1, for 2000001000 samples of 1000 bodies"),
     "two inertias": (
         {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
-        r"^parameters: got None; allowed: .* an inertia of its own",
+        r"^parameters: got None; expected .* an inertia of its own",
     ),
     "cannot do": ({"method": cv.Projected(), "scene": scene(), "w_WB_B0": W}, r"^method: got projected"),
 }

@@ -101,7 +101,7 @@ def test_nothing_to_show(trajectory):
         empty.plot()
     assert caught.value.argument == "trajectory"
     assert "0 samples" in caught.value.got
-    assert "a sample or more" in caught.value.allowed
+    assert "at least one sample" in caught.value.allowed
 
 
 @pytest.mark.parametrize(("package", "method"), [("pandas", "to_pandas"), ("altair", "plot"), ("pandas", "plot")])
@@ -195,7 +195,7 @@ def test_the_axis_is_that_of_symmetry_where_there_is_one():
 
 @pytest.mark.parametrize("axis", [(0, 0, 0), (1, 2, math.nan)])
 def test_an_axis_that_is_no_direction_is_refused(axis):
-    with pytest.raises(cv.BadInput, match=r"axis_B: got .*allowed: a direction"):
+    with pytest.raises(cv.BadInput, match=r"axis_B: got .*expected a direction"):
         ensemble(3, Grid(0.1, 1)).plot(axis_B=axis)
 
 

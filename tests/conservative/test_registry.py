@@ -29,7 +29,7 @@ def test_an_unknown_scene_is_answered_with_the_nearest(text, hint):
 
 
 def test_an_unknown_setting_is_answered_with_the_nearest():
-    with pytest.raises(cv.BadInput, match=r"allowed: settings 'tol' \(nearest\)"):
+    with pytest.raises(cv.BadInput, match=r"expected settings 'tol' \(nearest\)"):
         registry.method("reduced:toll=1")
 
 
@@ -50,7 +50,7 @@ def test_an_entry_point_without_anything_behind_it_says_so(monkeypatch, value):
 
 def test_a_method_is_registered_under_its_own_name(monkeypatch):
     with_entry(monkeypatch, "shorter", "conservative.methods.reduced:Reduced")
-    with pytest.raises(BadInput, match="class Reduced has family = 'reduced'; allowed: family = 'shorter'"):
+    with pytest.raises(BadInput, match="class Reduced has family = 'reduced'; expected family = 'shorter'"):
         registry.method("shorter")
 
 

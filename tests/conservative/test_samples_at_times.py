@@ -56,7 +56,7 @@ def test_few_samples_anywhere(times):
     ],
 )
 def test_times_that_cannot_be_used_are_refused(times, got):
-    with pytest.raises(cv.BadInput, match=f"t_eval: got {got}.*; allowed: times .* from 0 to t_end = 2") as caught:
+    with pytest.raises(cv.BadInput, match=f"t_eval: got {got}.*; expected times .* from 0 to t_end = 2") as caught:
         cv.integrate(TOP, 0.01, t_eval=times)
     assert caught.value.argument == "t_eval"
 

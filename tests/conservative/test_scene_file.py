@@ -262,7 +262,7 @@ def test_a_mistake_is_answered_with_file_line_key_what_was_got_and_what_is_allow
     assert error.argument == f"{path}, line {error.line}" + (f": {key}" if key else "")
     assert got in str(error.got)
     assert allowed in error.allowed
-    assert str(error) == f"{error.argument}: got {error.got}; allowed: {error.allowed}"
+    assert str(error) == f"{error.argument}: got {error.got}; expected {error.allowed}"
 
 
 @pytest.mark.parametrize("make", [lambda path: path / "no.toml", lambda path: path])

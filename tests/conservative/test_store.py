@@ -262,9 +262,9 @@ def test_scenes_with_functions_are_known_by_their_code(tmp_path):
 
     place, given = tmp_path / "a.zarr", {"w_WB_B0": np.eye(3), "dt": 0.05, "t_end": 0.1, "method": "convected"}
     made = cv.integrate_many(scene(0.5), **given, path=place)
-    with pytest.raises(cv.BadInput, match="scene: got None; allowed: the scene of the run"):
+    with pytest.raises(cv.BadInput, match="scene: got None; expected the scene of the run"):
         cv.open_ensemble(place)
-    with pytest.raises(cv.BadInput, match="allowed: the scene of the run, 'pulled'"):
+    with pytest.raises(cv.BadInput, match="expected the scene of the run, 'pulled'"):
         cv.open_ensemble(place, scene(0.25))
     with pytest.raises(cv.BadInput, match="another run: another scene"):
         cv.integrate_many(scene(0.25), **given, path=place, resume=True)
@@ -296,7 +296,7 @@ def test_another_run_does_not_go_on(whole, change):
 
 def test_a_folder_that_is_there_is_left_alone(whole, tmp_path):
     before = digest(whole)
-    with pytest.raises(cv.BadInput, match="where an ensemble is; allowed: a new folder, or resume=True"):
+    with pytest.raises(cv.BadInput, match="where an ensemble is; expected a new folder, or resume=True"):
         run(whole)
     assert digest(whole) == before
     (tmp_path / "file").write_text("mine")
@@ -332,5 +332,5 @@ def test_what_is_no_ensemble_is_not_opened(tmp_path):
         with pytest.raises(cv.BadInput, match="not an ensemble"):
             cv.open_ensemble(place)
     zarr.create_group(tmp_path / "a.zarr", attributes={"format": "conservative ensemble", "format_version": 99})
-    with pytest.raises(cv.BadInput, match="version 99 of its format; allowed: version 1"):
+    with pytest.raises(cv.BadInput, match="version 99 of its format; expected version 1"):
         cv.open_ensemble(tmp_path / "a.zarr")

@@ -102,12 +102,12 @@ def test_a_name_with_anything_odd_in_it_is_refused(text):
 
 
 def test_an_unknown_engine_names_the_nearest(cache):
-    with pytest.raises(cv.BadInput, match=r"'trail'; allowed: 'trial' \(nearest\)"):
+    with pytest.raises(cv.BadInput, match=r"'trail'; expected 'trial' \(nearest\)"):
         install.install("trail")
 
 
 def test_an_unknown_version_names_those_that_exist(cache, wheels):
-    with pytest.raises(cv.BadInput, match=r"'trial==1.9.5'; allowed: 1.9 \(nearest\), or one of 1.10, 1.9, 1.0"):
+    with pytest.raises(cv.BadInput, match=r"'trial==1.9.5'; expected 1.9 \(nearest\), or one of 1.10, 1.9, 1.0"):
         installed(wheels, "trial==1.9.5")
     assert environment.describe_versions("0.1", ["1.0", "2.0"]).startswith("1.0 (nearest)")
 
@@ -132,7 +132,7 @@ def test_no_network_is_said(cache, monkeypatch):
     monkeypatch.setenv("UV_DEFAULT_INDEX", "https://127.0.0.1:9/simple")
     monkeypatch.setenv("UV_HTTP_RETRIES", "0")
     with pytest.raises(
-        cv.BadInput, match="no answer for 'trial' from where packages come from; allowed: a network, or --find-links FOLDER"
+        cv.BadInput, match="no answer for 'trial' from where packages come from; expected a network, or --find-links FOLDER"
     ):
         install.install("trial")
 
@@ -280,13 +280,13 @@ def test_no_build_is_taken_for_the_newest_release(wheels, tmp_path):
 def test_a_file_that_is_no_wheel_of_the_engine_is_refused(name, tmp_path):
     with zipfile.ZipFile(tmp_path / name, "w"):
         pass
-    with pytest.raises(cv.BadInput, match=r"against: got .*allowed: a wheel of trial"):
+    with pytest.raises(cv.BadInput, match=r"against: got .*expected a wheel of trial"):
         install_build("trial", tmp_path / name, Source())
 
 
 def test_what_is_neither_wheel_nor_sources_is_refused(tmp_path):
     for path in (tmp_path, tmp_path / "nothing.whl"):
-        with pytest.raises(cv.BadInput, match="allowed: a wheel, or a folder with"):
+        with pytest.raises(cv.BadInput, match="expected a wheel, or a folder with"):
             install_build("trial", path, Source())
 
 
@@ -301,7 +301,7 @@ def test_a_wheel_for_another_python_is_refused(cache, tmp_path):
 def test_sources_are_built_only_where_that_is_allowed(tmp_path):
     marker = tmp_path / "it_ran"
     (tmp_path / "setup.py").write_text(f"open({str(marker)!r}, 'w')\n")
-    with pytest.raises(cv.BadInput, match="has to be built; allowed: a wheel, or --allow-build"):
+    with pytest.raises(cv.BadInput, match="has to be built; expected a wheel, or --allow-build"):
         install_build("trial", tmp_path, Source())
     assert not marker.exists()
 
@@ -346,7 +346,7 @@ def test_the_newest_releases_are_those_of_the_index_oldest_first(wheels):
 
 
 def test_releases_that_nobody_can_list_are_said(tmp_path):
-    with pytest.raises(cv.BadInput, match=r"no list of versions of trial .*allowed: a network, --find-links FOLDER"):
+    with pytest.raises(cv.BadInput, match=r"no list of versions of trial .*expected a network, --find-links FOLDER"):
         newest_releases("trial", 2, Source(tmp_path))
 
 

@@ -85,5 +85,5 @@ def test_a_potential_without_expressions_is_unsupported_and_named(heavy):
 
 @pytest.mark.parametrize("bits", [0, 52, 4097, 128.0, "many", True, float("nan")])
 def test_bad_bits(bits):
-    with pytest.raises(cv.BadInput, match=r"bits: got .*; allowed: an integer from 53"):
+    with pytest.raises(cv.BadInput, match=r"bits: got .*; expected an integer from 53"):
         Precise(bits)

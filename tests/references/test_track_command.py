@@ -101,11 +101,11 @@ def test_a_build_that_is_as_good_or_better_exits_with_0(track, tmp_path):
 
 
 BAD = [
-    (("1.0",), "versions: got 1.0, nothing to compare; allowed: two or more"),
+    (("1.0",), "versions: got 1.0, nothing to compare; expected two or more"),
     ((), "versions: got none"),
-    (("1.0", "1.1", "1.0"), "versions: got '1.0' twice; allowed: different versions"),
-    (("1.0", "1.5"), "version: got 'trial==1.5'; allowed: 1.2 (nearest), or one of 1.2, 1.1, 1.0"),
-    (("1.0", "--against", "nowhere.whl"), "against: got 'nowhere.whl'; allowed: a wheel, or a folder with"),
+    (("1.0", "1.1", "1.0"), "versions: got '1.0' twice; expected different versions"),
+    (("1.0", "1.5"), "version: got 'trial==1.5'; expected 1.2 (nearest), or one of 1.2, 1.1, 1.0"),
+    (("1.0", "--against", "nowhere.whl"), "against: got 'nowhere.whl'; expected a wheel, or a folder with"),
     (("1.0", "1.1", "--junit", "/nowhere/at/all.xml"), "junit: got "),
     (("1.0", "1.1", "--last", "0"), "0 is not in the range"),
 ]

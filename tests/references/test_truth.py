@@ -54,7 +54,7 @@ def test_truths_that_differ_are_refused(monkeypatch):
     # the paper's own map is second order: no truth
     monkeypatch.setattr(truth, "Precise", cv.Reduced)
     scene = cv.scenes.brick_flip()
-    with pytest.raises(truth.Disagreement, match=r"scene: got 'brick_flip', on which .*exact and .*reduced differ by .* rad"):
+    with pytest.raises(truth.Disagreement, match=r"scene: got 'brick_flip', for which .*exact and .*reduced differ by .* rad"):
         truth.reference(scene, Grid(0.1, 60))
 
 

@@ -128,7 +128,7 @@ def test_failed_run_says_so_and_keeps_what_it_reached(tmp_path):
     [
         (["brik_flip"], ["scene: got 'brik_flip'", "'brick_flip' (nearest)"]),
         (["brick_flip", "-m", "redused"], ["method: got 'redused'", "'reduced' (nearest)"]),
-        (["brick_flip", "-m", "runge"], ["method: got 'runge'; allowed: one of "]),
+        (["brick_flip", "-m", "runge"], ["method: got 'runge'; expected one of "]),
         (["brick_flip", "-m", "reduced:tool=1"], ["method reduced: got 'tool=1'", "'tol' (nearest)"]),
         (["brick_flip", "-m", "reduced:tol=-1"], ["tol: got -1", "above 0"]),
         (["brick_flip", "--dt", "0"], ["dt: got 0.0", "above 0"]),
@@ -158,7 +158,7 @@ def test_a_limit_on_time_is_an_option_of_what_runs_engines(command, tmp_path, mo
     done = conservative(*command, "--time-limit", "0")
     assert done.exit_code == 2
     assert one_line(done.stderr)
-    assert "time_limit: got 0.0; allowed: a finite duration above 0, s" in done.stderr
+    assert "time_limit: got 0.0; expected a finite duration above 0, s" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 

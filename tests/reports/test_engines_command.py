@@ -48,11 +48,11 @@ def test_the_list_as_json_has_every_version(cache):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("install", "exudin"), "engine: got 'exudin'; allowed: 'exudyn' (nearest)"),
-        (("install", "exudyn; true"), "allowed: NAME or NAME==VERSION"),
-        (("install", "exudyn", "drake==1.0 2.0"), "allowed: NAME or NAME==VERSION"),
-        (("remove", "exudyn==1.9.0"), "allowed: a name after something is installed"),
-        (("remove", "../exudyn"), "allowed: NAME or NAME==VERSION"),
+        (("install", "exudin"), "engine: got 'exudin'; expected 'exudyn' (nearest)"),
+        (("install", "exudyn; true"), "expected NAME or NAME==VERSION"),
+        (("install", "exudyn", "drake==1.0 2.0"), "expected NAME or NAME==VERSION"),
+        (("remove", "exudyn==1.9.0"), "expected an installed engine (none is installed)"),
+        (("remove", "../exudyn"), "expected NAME or NAME==VERSION"),
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_exit_code_2(arguments, message):

@@ -68,7 +68,7 @@ def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder, t
     assert all("heyoka" in line or line.startswith("study ") for line in logged)  # it cannot write its cache; progress
     assert error.startswith(f"Error: {words}")
     assert "File too large" in error
-    assert re.search("; allowed: a (file|folder)", error)
+    assert re.search("; expected a (file|folder)", error)
     assert contents(folder) == before
 
 

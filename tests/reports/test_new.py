@@ -23,4 +23,4 @@ def test_a_mistake_in_a_file_is_one_line_with_its_line_and_exit_code_2(tmp_path)
     assert done.exit_code == 2
     assert done.stdout == ""
     allowed = "'body' (nearest), or one of body, dt, name, orbit, potential, start, t_end"
-    assert done.stderr == f"Error: {path}, line 3: bdy: got the unknown key 'bdy'; allowed: {allowed}\n"
+    assert done.stderr == f"Error: {path}, line 3: bdy: got the unknown key 'bdy'; expected {allowed}\n"

@@ -105,7 +105,7 @@ def test_no_place_for_a_report(tmp_path, kind):
         (target / ("mine.txt" if kind == "folder with other things" else MANIFEST)).write_text("mine")
     before = tree(tmp_path)
     place = target / "report" if kind == "below a file" else target
-    with pytest.raises(BadInput, match=r"out: got .*; allowed: a folder"), report_folder(place):
+    with pytest.raises(BadInput, match=r"out: got .*; expected a folder"), report_folder(place):
         pytest.fail("work was begun")
     assert tree(tmp_path) == before
 
@@ -182,7 +182,7 @@ def test_a_full_disk_is_said_of_the_folder_and_not_of_its_temporary(tmp_path):
         with report_folder(tmp_path / "report") as fresh:
             raise NotWritten("out", fresh / "a.svg", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
 
-    with pytest.raises(BadInput, match=r"report' \(No space left on device\); allowed: a folder"):
+    with pytest.raises(BadInput, match=r"report' \(No space left on device\); expected a folder"):
         fill()
     assert tree(tmp_path) == []
 

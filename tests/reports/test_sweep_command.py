@@ -180,6 +180,6 @@ def test_samples_that_do_not_fit_in_memory(monkeypatch):
     done = conservative("brick_flip", *SPREAD, "--starts", "3")
     assert done.exit_code == 2
     assert (
-        "Error: samples: got 18 samples of 3 bodies; allowed: fewer samples or starts, or a folder for them, --out:"
+        "Error: samples: got 18 samples of 3 bodies; expected fewer samples or starts, or a folder for them, --out:"
         in done.stderr
     )

@@ -88,7 +88,7 @@ def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, [*SMALL, "--resume"])
     assert done.exit_code == 2
-    assert done.stderr.startswith("Error: resume: got no 'report.partial.json'; allowed: ")
+    assert done.stderr.startswith("Error: resume: got no 'report.partial.json'; expected ")
     assert list(tmp_path.iterdir()) == []
 
 
