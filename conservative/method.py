@@ -104,7 +104,7 @@ class Method(ABC):
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:
-        """Return the run of `Bodies` (`conservative.methods.many`), which gives a `Block`; None where each has to run alone.
+        """Return the run of a `Batch`, which gives a `Block`; None where each has to run alone.
 
         Runs that were prepared apart overlap in threads, and give the same numbers whatever else runs and whoever the
         neighbours are.

@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
+from conservative.batch import Batch
 from conservative.body import RigidBody
 from conservative.check import choice
-from conservative.methods.many import Bodies
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
@@ -29,7 +29,7 @@ RATE = 2.0
 MOMENT = (1.8, 12.0)
 
 
-def draw(kind: str, n: int, seed: int = 0) -> Bodies:
+def draw(kind: str, n: int, seed: int = 0) -> Batch:
     """Return the first n bodies of a kind that a seed gives.
 
     Raises
@@ -49,7 +49,7 @@ def draw(kind: str, n: int, seed: int = 0) -> Bodies:
     parameters = {"com_B": _points(tables[4].standard_normal((n, 3)), tables[5].random(n))} if kind == KINDS[0] else {}
     potential = UniformGravity(1.0, parameters["com_B"][0]) if parameters else None
     first = Scene(kind, RigidBody(inertia[0]), R_WB0[0], w_WB_B0[0], DURATION, potential, group="random", source="ours")
-    return Bodies(first, R_WB0, w_WB_B0, inertia, parameters)
+    return Batch(first, R_WB0, w_WB_B0, inertia, parameters)
 
 
 def _rotations(normal: Array) -> Array:

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from conservative.batch import Batch
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method, Role
-from conservative.methods.many import Block, Bodies, RunMany
+from conservative.methods.many import Block, RunMany
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.client import time_limit
 
@@ -88,13 +89,13 @@ def _call(run: RunMany) -> Block:
     return run()
 
 
-def prepare_blocks(way: Way, bodies: Bodies, grid: Grid) -> RunBlocks:
+def prepare_blocks(way: Way, bodies: Batch, grid: Grid) -> RunBlocks:
     """Return the run of bodies, which is prepared block by block."""
     blocks = (bodies[first : first + BLOCK] for first in range(0, len(bodies), BLOCK))
     return RunBlocks(way, [_prepare_block(way, block, grid) for block in blocks])
 
 
-def _prepare_block(way: Way, bodies: Bodies, grid: Grid) -> RunMany:
+def _prepare_block(way: Way, bodies: Batch, grid: Grid) -> RunMany:
     found: RunMany | None = way.method.prepare_many(bodies, grid) if way.together else None
     return _Loop([way.method.prepare(bodies.take(i), grid) for i in range(len(bodies))], grid) if found is None else found
 
@@ -133,7 +134,7 @@ class ManyDone:
     spent: float
 
 
-def attempt_many(way: Way, bodies: Bodies, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
+def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
     """Return the run of bodies after a first call and a second, which is timed; or how that ends.
 
     Exceptions out of our own methods are bugs and are not caught.

@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from conservative.attitude import Array, angle_between
+from conservative.batch import Batch
 from conservative.errors import MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
-from conservative.methods.many import Bodies
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engines.heyoka import SMALLEST_TOL, Heyoka
 
@@ -61,11 +61,11 @@ class Kind:
     """Bodies of one kind: as many as are timed, and the exact attitudes (n, samples, 3, 3) of those whose errors are read."""
 
     study: ThroughputStudy
-    bodies: Bodies
+    bodies: Batch
     truth: Array
 
     @property
-    def few(self) -> Bodies:
+    def few(self) -> Batch:
         """The bodies whose errors are read."""
         return self.bodies[: len(self.truth)]
 

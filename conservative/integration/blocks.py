@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array
+from ..batch import Batch
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..grid import Grid
 from ..method import Method
-from ..methods.many import Block, Bodies, pause, watch
+from ..methods.many import Block, pause, watch
 from .drifts import find_drifts, list_drifts
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
@@ -63,7 +64,7 @@ def list_blocks(n: int, grid: Grid) -> range:
     return range(0, n, count_bodies(grid))
 
 
-def run_block(method: Method, bodies: Bodies, grid: Grid) -> BlockResult:
+def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     """Return the samples of bodies, whose outcomes are those of `Method.solve` for each of them alone."""
     run = method.prepare_many(bodies, grid)
     n, m = len(bodies), grid.n_samples
@@ -81,7 +82,7 @@ def run_block(method: Method, bodies: Bodies, grid: Grid) -> BlockResult:
     return BlockResult(block.R_WB, block.w_WB_B, found.values, failures)
 
 
-def are_conserved(method: Method, bodies: Bodies, grid: Grid, bounded: Array) -> Any:
+def are_conserved(method: Method, bodies: Batch, grid: Grid, bounded: Array) -> Any:
     """Return which of n bodies (n,) are within the bounds of a method, by their drifts (n, k), dimensionless.
 
     Bounds grow with the ratio of a body's moments. So those of the body with the smallest ratio hold for all, and only bodies
@@ -105,7 +106,7 @@ def are_conserved(method: Method, bodies: Bodies, grid: Grid, bounded: Array) ->
     return good
 
 
-def run_alone(method: Method, bodies: Bodies, grid: Grid, i: int, block: Block) -> IntegrationFailed | None:
+def run_alone(method: Method, bodies: Batch, grid: Grid, i: int, block: Block) -> IntegrationFailed | None:
     """Integrate body i alone, put its samples into the block, and return its failure, if there is one."""
     block.R_WB[i], block.w_WB_B[i] = np.nan, np.nan
     scene = bodies.take(i)
@@ -146,7 +147,7 @@ class Inline(Executor):
 
 
 def run_blocks(
-    method: Method, bodies: Bodies, grid: Grid, executor: Executor, in_flight: int, firsts: Iterable[int]
+    method: Method, bodies: Batch, grid: Grid, executor: Executor, in_flight: int, firsts: Iterable[int]
 ) -> Generator[tuple[int, BlockResult], None, None]:
     """Run blocks, and yield the first index of each with its result, in the order in which they end.
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array
+from ..batch import Batch
 from ..deferred_imports import kernels
 from ..invariants import MOMENTUM_UNIT, sizes
-from ..methods.many import Bodies
 from ..potentials.potential import depends_on_time
 from ..potentials.turning import Turning, static_part
 
@@ -40,12 +40,12 @@ class Drifts:
     bounded: Array
 
 
-def list_drifts(bodies: Bodies) -> tuple[str, ...]:
+def list_drifts(bodies: Batch) -> tuple[str, ...]:
     """Return the names of the columns of `Drifts`: orthonormality, and the invariants of the scene."""
     return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
 
 
-def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
+def find_drifts(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
     """Return the largest drifts of the invariants of each body.
 
     Parameters
@@ -78,19 +78,19 @@ def find_drifts(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Drifts:
     return Drifts(np.stack(values, axis=1), np.stack(bounded, axis=1))
 
 
-def inertia_of(bodies: Bodies) -> Array:
+def inertia_of(bodies: Batch) -> Array:
     """Return the inertia (n, 3, 3), kg m^2, body axes; (1, 3, 3) where all have the scene's."""
     return bodies.scene.body.inertia[None].copy() if bodies.inertia is None else bodies.inertia
 
 
-def momenta_of(bodies: Bodies) -> Array:
+def momenta_of(bodies: Batch) -> Array:
     """Return the momenta (n, 3) at the start, kg m^2/s, body axes."""
     if bodies.inertia is None:
         return np.asarray(bodies.w_WB_B0 @ bodies.scene.body.inertia)
     return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
 
 
-def find_start(bodies: Bodies, inertia: Array, axes: Array, axial: Array) -> tuple[Array, Array]:
+def find_start(bodies: Batch, inertia: Array, axes: Array, axial: Array) -> tuple[Array, Array]:
     """Return the initial values of the invariants and their reference scales.
 
     The rules are those of `Scene.energy_scale`, `invariants_of` and `kept_sizes`. `conservative.kernels.drifts_of_many` defines
@@ -113,7 +113,7 @@ def find_start(bodies: Bodies, inertia: Array, axes: Array, axial: Array) -> tup
     return expected, scales
 
 
-def find_axial(bodies: Bodies) -> Array:
+def find_axial(bodies: Batch) -> Array:
     """Return unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan where not."""
     none = np.full((1, 3), np.nan)
     if bodies.scene.symmetry_axis_B is None:
@@ -129,7 +129,7 @@ def find_axial(bodies: Bodies) -> Array:
     return found
 
 
-def find_axes(bodies: Bodies) -> Array:
+def find_axes(bodies: Batch) -> Array:
     """Return unit vectors (n, 3, 3), or (1, 3, 3) for all, row by row, along which momentum is conserved; else 0."""
     if bodies.scene.potential is None:
         return np.eye(3)[None]
@@ -141,14 +141,14 @@ def find_axes(bodies: Bodies) -> Array:
     return found
 
 
-def field_scales(bodies: Bodies) -> Any:
+def field_scales(bodies: Batch) -> Any:
     """Return the size of the field, J: of each body (n,), or one for all."""
     if bodies.scene.potential is None:
         return 0.0
     return bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale()
 
 
-def field_energies(bodies: Bodies, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
     """Return the energies (n, m), J, that make conserved energies of the kinetic ones; (0, 0) if there is no such energy.
 
     Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
+from ..batch import Batch
 from ..check import choice as require_choice
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
-from ..methods.many import Bodies
 from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..presentation import COLUMNS
@@ -63,7 +63,7 @@ class Ensemble:
         Method, step size and estimated error, if `integrate_many` had a target error, otherwise None.
     """
 
-    bodies: Bodies
+    bodies: Batch
     grid: Grid
     R_WB: Array
     w_WB_B: Array
@@ -247,7 +247,7 @@ def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
 class DriftsOnDemand(Mapping[str, Array]):
     """The drifts of an ensemble of one body, whose `Method.solve` has a check of its own: they are found when asked for."""
 
-    bodies: Bodies
+    bodies: Batch
     grid: Grid
     R_WB: Array
     w_WB_B: Array
@@ -267,7 +267,7 @@ class DriftsOnDemand(Mapping[str, Array]):
         return len(self._values)
 
 
-def ensemble_of_one(bodies: Bodies, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
+def ensemble_of_one(bodies: Batch, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
     """Return the ensemble of one body whose trajectory is known."""
     R_WB, w_WB_B, failures = found.R_WB[None], found.w_WB_B[None], {}
     if found.failure is not None:

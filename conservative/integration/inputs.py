@@ -15,25 +15,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array
+from ..batch import Batch
 from ..body import RigidBody
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
 from ..deferred_imports import kernels
 from ..errors import BadInput, nearest
-from ..methods.many import Bodies
 from ..potentials.turning import static_part
 from ..scene import Scene
 
 RATES = "three finite rates (3,), rad/s"
 
 
-def only_body(scene: Scene) -> Bodies:
-    """Return the body of a scene as a batch of one."""
-    return Bodies(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
-
-
 def read_bodies(
     scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
-) -> Bodies:
+) -> Batch:
     """Return n bodies, with the values of the scene for everything that is None.
 
     Attitudes are (n, 3, 3), rates (n, 3), rad/s, inertia (n, 3) or (n, 3, 3), kg m^2, and parameters those of the potential.
@@ -68,7 +63,7 @@ def read_bodies(
         raise BadInput("parameters", describe(parameters), allowed)
     if (J is not None or values) and scene.extra_invariants:
         scene = scene.rename(scene.name, extra_invariants=())  # which are of the scene's own body and field
-    return Bodies(scene, R, w, J, values)
+    return Batch(scene, R, w, J, values)
 
 
 def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Mapping[str, Array]) -> Array:
@@ -143,7 +138,7 @@ def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
 def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
     """Return parameters (n, ...) as potentials have them. Raise `BadInput` for the first that none can be made of."""
     n = len(next(iter(parameters.values())))
-    bodies = Bodies(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
+    bodies = Batch(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
     suspects = getattr(static_part(scene.potential), "suspects", None)
     bad = np.ones(n, dtype=bool) if suspects is None else np.zeros(n, dtype=bool) | suspects(parameters)
     for values in parameters.values():

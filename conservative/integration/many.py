@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..batch import Batch
 from ..check import describe, positive_integer, positive_number
 from ..errors import BadInput, IntegrationFailed
 from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
 from ..method import Method
 from ..methods.between import Samples
-from ..methods.many import Bodies
 from ..outcome import ChoiceForMany, ProgressOfMany
 from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
@@ -27,7 +27,7 @@ from .blocks import BlockResult, list_blocks, run_blocks, start_threads
 from .cluster import start_executor
 from .drifts import list_drifts
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
-from .inputs import only_body, read_bodies
+from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
 from .shared_choice import Goal, choose_for_all, pick_hardest
 from .store import Store, write_store
@@ -130,7 +130,7 @@ def integrate_many(
     if threads is not None:
         positive_integer("threads", threads, "a number of threads, 1 or more, or None for one a processor")
     alone = R_WB0 is None and w_WB_B0 is None and inertia is None and parameters is None
-    bodies = scene.derive(only_body) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
+    bodies = scene.derive(Batch.of) if alone else read_bodies(scene, R_WB0, w_WB_B0, inertia, parameters)
     choice: ChoiceForMany | None = None
     try:
         if error is not None:
@@ -161,7 +161,7 @@ def integrate_many(
         raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
 
 
-def _choose(bodies: Bodies, error: object, method: object, dt: Any, t_end: Any, sample_every: int) -> ChoiceForMany:
+def _choose(bodies: Batch, error: object, method: object, dt: Any, t_end: Any, sample_every: int) -> ChoiceForMany:
     wanted = positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:
         raise BadInput("method", describe(method), "None together with error, which chooses the method")
@@ -170,7 +170,7 @@ def _choose(bodies: Bodies, error: object, method: object, dt: Any, t_end: Any, 
     return choose_for_all(bodies, Goal(wanted, end, Samples(spacing, positive_integer("sample_every", sample_every))))
 
 
-def _require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
+def _require_steps(method: Method, bodies: Batch, grid: Grid) -> None:
     """Raise `BadInput` if the method has no step of that length for one of the bodies that turn fastest.
 
     Other bodies for which the step is too long become `NotRun` when they are integrated.
@@ -187,7 +187,7 @@ def _require_steps(method: Method, bodies: Bodies, grid: Grid) -> None:
 class Memory:
     """Keeps the results of blocks in memory."""
 
-    def __init__(self, bodies: Bodies, grid: Grid) -> None:
+    def __init__(self, bodies: Batch, grid: Grid) -> None:
         n, m = len(bodies), grid.n_samples
         most = most_samples() * SAMPLE_BYTES // KEPT_BYTES
         if n * m > most:
@@ -202,7 +202,7 @@ class Memory:
         """Return False, as a run in memory begins with no block."""
         return False
 
-    def write(self, first: int, bodies: Bodies, result: BlockResult) -> None:
+    def write(self, first: int, bodies: Batch, result: BlockResult) -> None:
         """Keep the result for `bodies`, the block that begins with body number `first`."""
         part = slice(first, first + len(bodies))
         self.R_WB[part], self.w_WB_B[part], self.drifts[part] = result.R_WB, result.w_WB_B, result.drifts
@@ -225,7 +225,7 @@ def _start(client: Client | None, threads: int | None, blocks: int) -> Iterator[
 
 def _run_all(
     method: Method,
-    bodies: Bodies,
+    bodies: Batch,
     grid: Grid,
     executor: Executor,
     in_flight: int,

@@ -21,12 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..batch import Batch
 from ..errors import AccuracyNotReached
 from ..grid import Grid
 from ..method import Method
 from ..methods.automatic import grid_of
 from ..methods.between import Samples
-from ..methods.many import Bodies
 from ..methods.search import Attempts, find_cheapest, stalls, step_factor
 from ..methods.trials import trials_of
 from ..outcome import ChoiceForMany
@@ -51,7 +51,7 @@ class Goal:
     samples: Samples
 
 
-def choose_for_all(bodies: Bodies, goal: Goal) -> ChoiceForMany:
+def choose_for_all(bodies: Batch, goal: Goal) -> ChoiceForMany:
     """Return a method and a step for all bodies. A warning `AccuracyNotReached` says that one looked at is not near enough.
 
     Raises
@@ -79,14 +79,14 @@ def choose_for_all(bodies: Bodies, goal: Goal) -> ChoiceForMany:
     return choice
 
 
-def pick(bodies: Bodies) -> list[int]:
+def pick(bodies: Batch) -> list[int]:
     """Return the numbers of the bodies to look at: the hardest first, then random ones."""
     most, hardest = HARDEST + RANDOM + VERIFIED, pick_hardest(bodies)
     others = np.random.default_rng(SEED).permutation(len(bodies))[:most].tolist()
     return [*hardest, *(i for i in others if i not in hardest)][:most]
 
 
-def pick_hardest(bodies: Bodies) -> list[int]:
+def pick_hardest(bodies: Batch) -> list[int]:
     """Return the numbers of the bodies that turn fastest with all their energy, the hardest first."""
     energy = np.sum(momenta_of(bodies) * bodies.w_WB_B0, axis=1) / 2 + field_scales(bodies)
     rates = np.sqrt(energy) / np.sqrt(bodies.principal[0].min(axis=1))
@@ -94,7 +94,7 @@ def pick_hardest(bodies: Bodies) -> list[int]:
     return fastest[np.argsort(-rates[fastest], kind="stable")].tolist()
 
 
-def cut_step(bodies: Bodies, chosen: Sequence[int], method: Method, dt: float, goal: Goal) -> Attempts:
+def cut_step(bodies: Batch, chosen: Sequence[int], method: Method, dt: float, goal: Goal) -> Attempts:
     """Return the steps tried from dt, s, on: the last is short enough for the chosen bodies, or shorter ones do not help."""
     attempts: Attempts = ()
     for _ in range(ATTEMPTS):
@@ -108,6 +108,6 @@ def cut_step(bodies: Bodies, chosen: Sequence[int], method: Method, dt: float, g
     return attempts
 
 
-def find_worst(bodies: Bodies, numbers: Sequence[int], method: Method, grid: Grid) -> tuple[float, int]:
+def find_worst(bodies: Batch, numbers: Sequence[int], method: Method, grid: Grid) -> tuple[float, int]:
     """Return the largest estimated error, rad, of the bodies of these numbers, and the number; 0 and -1 of none."""
     return max(((trials_of(bodies.take(i)).estimate_all(method, grid).total, i) for i in numbers), default=(0.0, -1))

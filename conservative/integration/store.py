@@ -5,7 +5,7 @@
     drifts           largest drifts (n, k), dimensionless; the attribute `names` lists the quantities
     outcome          kinds of outcomes (n,), as indices into the attribute `kinds`
     failure          the exceptions of bodies that failed (n,), as JSON; otherwise empty
-    start/NAME       R_WB0, w_WB_B0, inertia, if they differ from body to body, as in `Bodies`
+    start/NAME       R_WB0, w_WB_B0, inertia, if they differ from body to body, as in `Batch`
     parameters/NAME  numbers of the potential that differ from body to body
 
 Numbers are not compressed, because random digits do not compress. Every chunk ends in a CRC-32C checksum, which all readers of
@@ -41,6 +41,7 @@ import numpy as np
 
 from .. import files
 from ..attitude import Array
+from ..batch import Batch
 from ..check import build_unchecked, describe, read_only
 from ..errors import (
     BadInput,
@@ -55,7 +56,6 @@ from ..errors import (
     require_extra,
 )
 from ..grid import Grid
-from ..methods.many import Bodies
 from ..outcome import Outcome, OutcomeKind
 from ..scene import Scene
 from ..version import VERSION
@@ -119,7 +119,7 @@ class Store:
             return False
         return True
 
-    def write(self, first: int, bodies: Bodies, result: BlockResult) -> None:
+    def write(self, first: int, bodies: Batch, result: BlockResult) -> None:
         """Write the result for `bodies`, the block that begins with body number `first`.
 
         Raises
@@ -163,7 +163,7 @@ def _restore_failure(text: str) -> IntegrationFailed:
 
 
 @contextmanager
-def write_store(path: str | Path, label: str, bodies: Bodies, grid: Grid, resume: bool = False) -> Iterator[Store]:
+def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
     """Yield the store of a run, a new one unless it is there. No other process can write to it in the block.
 
     Parameters
@@ -244,7 +244,7 @@ def _make_folder(fresh: Path) -> int:
     return os.open(fresh, os.O_RDONLY)
 
 
-def _create(folder: Path, record: Mapping[str, Any], bodies: Bodies, grid: Grid) -> None:
+def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) -> None:
     """Make the group with no block in it."""
     import zarr
     from zarr.codecs import Crc32cCodec
@@ -271,7 +271,7 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Bodies, grid: Grid)
         add(name, values.shape, ("body", *(f"{name} {k}" for k in range(1, values.ndim))))
 
 
-def list_inputs(bodies: Bodies) -> dict[str, Array]:
+def list_inputs(bodies: Batch) -> dict[str, Array]:
     """Return what differs from body to body, by the name of its array.
 
     Attitudes are (n, 3, 3), body to world, rates (n, 3), rad/s, inertia (n, 3, 3), kg m^2, parameters (n, ...) in SI units.
@@ -281,7 +281,7 @@ def list_inputs(bodies: Bodies) -> dict[str, Array]:
     return found | {f"parameters/{name}": values for name, values in bodies.parameters.items()}
 
 
-def describe_run(label: str, bodies: Bodies, grid: Grid) -> dict[str, Any]:
+def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
     """Return the attributes of the group of a run."""
     inputs = {name: np.ascontiguousarray(values) for name, values in list_inputs(bodies).items()}
     return {
@@ -373,7 +373,7 @@ def read_store(path: str | Path, scene: Scene | None = None) -> dict[str, Any]:
         (start if group == "start" else parameters)[own] = _OnDisk(store.arrays[name])
     scene = _find_scene(record["scene"], scene)
     return {
-        "bodies": Bodies(
+        "bodies": Batch(
             scene,
             start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3))),
             start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3))),

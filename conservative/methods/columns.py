@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array
+from ..batch import Batch
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..potentials.uniform_gravity import UniformGravity
-from .many import Block, Bodies, pause
+from .many import Block, pause
 
 PIECE = 0.03
 """About how long a call of compiled code may take, s: between two of them, threads can be stopped."""
@@ -54,7 +55,7 @@ def make_room(n: int, m: int) -> Array:
     return room[first : first + n * m].reshape(n, m)
 
 
-def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
+def moments_of_gravity(bodies: Batch, R_BP: Array) -> Array:
     """Return weight times centre of mass (n, 3), N m, in axes (n, 3, 3), of bodies in `UniformGravity`."""
     potential: Any = bodies.scene.potential
     weight, com_B = (np.asarray(bodies.parameters.get(name, getattr(potential, name))) for name in ("weight", "com_B"))
@@ -62,7 +63,7 @@ def moments_of_gravity(bodies: Bodies, R_BP: Array) -> Array:
     return np.asarray((moment_B[:, None, :] @ R_BP)[:, 0, :])
 
 
-def in_gravity_or_free(bodies: Bodies) -> bool:
+def in_gravity_or_free(bodies: Batch) -> bool:
     """Whether the field of the bodies is one that lanes know."""
     return isinstance(bodies.scene.potential, UniformGravity | None)
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array
+from ..batch import Batch
 from ..deferred_imports import kernels
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction
 from ..potentials.uniform_gravity import UniformGravity
-from .many import Bodies
 
 _NONE = (0.0, 0.0, 0.0)
 
@@ -47,26 +47,26 @@ class Fields:
 
 
 @singledispatch
-def find_fields(potential: Any, bodies: Bodies, R_BP: Array) -> Fields | None:
+def find_fields(potential: Any, bodies: Batch, R_BP: Array) -> Fields | None:
     """Return the fields of n bodies in axes R_BP (n, 3, 3), energies in J; None of a kind that is not known here."""
     return None
 
 
 @find_fields.register
-def _find_none(potential: None, bodies: Bodies, R_BP: Array) -> Fields:
+def _find_none(potential: None, bodies: Batch, R_BP: Array) -> Fields:
     n = len(bodies)
     return Fields(None, np.zeros((n, 0)), slice(0), np.zeros((n, 3)), np.zeros(n))
 
 
 @find_fields.register
-def _find_gravity(potential: UniformGravity, bodies: Bodies, R_BP: Array) -> Fields:
+def _find_gravity(potential: UniformGravity, bodies: Batch, R_BP: Array) -> Fields:
     moments = into_axes(read_parameter(bodies, "weight")[:, None] * read_parameter(bodies, "com_B"), R_BP)
     up = np.broadcast_to(potential.axis_W, moments.shape)
     return Fields(kernels("fields").Uniform(*_NONE), moments, slice(3), up, np.linalg.norm(moments, axis=1))
 
 
 @find_fields.register
-def _find_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Fields:
+def _find_springs(potential: LinearSpring, bodies: Batch, R_BP: Array) -> Fields:
     rest, stiffness = read_parameter(bodies, "rest_length"), read_parameter(bodies, "stiffness")
     b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
     farthest = np.maximum(np.linalg.norm(b, axis=1) + np.linalg.norm(A, axis=1), rest)
@@ -75,7 +75,7 @@ def _find_springs(potential: LinearSpring, bodies: Bodies, R_BP: Array) -> Field
 
 
 @find_fields.register
-def _find_attractions(potential: PointAttraction, bodies: Bodies, R_BP: Array) -> Fields:
+def _find_attractions(potential: PointAttraction, bodies: Batch, R_BP: Array) -> Fields:
     b, A = into_axes(read_parameter(bodies, "point_B"), R_BP), read_parameter(bodies, "anchor_W")
     strength = read_parameter(bodies, "strength")
     scale = np.abs(strength) / np.hypot(np.linalg.norm(b, axis=1), np.linalg.norm(A, axis=1))
@@ -84,7 +84,7 @@ def _find_attractions(potential: PointAttraction, bodies: Bodies, R_BP: Array) -
 
 
 @find_fields.register
-def _find_gradients(potential: GravityGradient, bodies: Bodies, R_BP: Array) -> Fields:
+def _find_gradients(potential: GravityGradient, bodies: Batch, R_BP: Array) -> Fields:
     factor = 3 * read_parameter(bodies, "rate")[:, None, None] ** 2
     rows = factor * (np.swapaxes(R_BP, 1, 2) @ read_parameter(bodies, "inertia") @ R_BP)
     e = read_parameter(bodies, "direction_W")
@@ -92,7 +92,7 @@ def _find_gradients(potential: GravityGradient, bodies: Bodies, R_BP: Array) -> 
     return Fields(like, np.column_stack([rows.reshape(-1, 9), e]), slice(9), e, np.linalg.eigvalsh(rows)[:, -1] / 2)
 
 
-def read_parameter(bodies: Bodies, name: str) -> Array:
+def read_parameter(bodies: Batch, name: str) -> Array:
     """Return what the field `name` of each body's potential is, (n,), (n, 3) or (n, 3, 3), in its own unit: N, m, rad/s ..."""
     if name in bodies.parameters:
         return np.asarray(bodies.parameters[name], dtype=float)

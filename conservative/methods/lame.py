@@ -37,6 +37,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, to_quaternion
+from ..batch import Batch
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
@@ -47,7 +48,7 @@ from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .columns import find_unit_of_time, find_units_of_moments, in_gravity_or_free, moments_of_gravity, take_pieces, turn_samples
-from .many import Block, Bodies, RunMany
+from .many import Block, RunMany
 from .non_spinning import frame_unsupported
 from .principal_axes import PrincipalStart, principal_start, slow_axes, spin_rate, start_along
 from .run_kernel import prepare_run
@@ -112,7 +113,7 @@ class Lame(Method):
         kernel, (label, start, model) = kernels("lame"), scene.derive(convert, self)
         return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(grid.dt))
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Lanes for all tops that it has a step for."""
         return prepare_lanes(self, bodies, grid) if in_gravity_or_free(bodies) else None
 
@@ -174,7 +175,7 @@ class Tops:
         return Tops(self.places, self.J1 / units, self.J3 / units, kappa, self.q, L, self.R_BP)
 
 
-def prepare_lanes(method: Lame, bodies: Bodies, grid: Grid) -> RunMany | None:
+def prepare_lanes(method: Lame, bodies: Batch, grid: Grid) -> RunMany | None:
     """Return the run of many tops with `conservative.kernels.lame_many`; None where none of them has such a step."""
     kernel, n, time = kernels("lame_many"), len(bodies), find_unit_of_time(grid)
     tops, h = find_tops(method, bodies), grid.dt / time
@@ -211,7 +212,7 @@ def march_tops(tops: Tops, table: Array, grid: Grid, n: int) -> RunMany:
     return run
 
 
-def find_tops(method: Lame, bodies: Bodies) -> Tops | None:
+def find_tops(method: Lame, bodies: Batch) -> Tops | None:
     """Return those of the bodies that the method supports, as tops; None where there are none."""
     if has_one_axis(bodies):
         return find_alike(method, bodies)
@@ -225,13 +226,13 @@ def find_tops(method: Lame, bodies: Bodies) -> Tops | None:
     return Tops(*(np.array(column) for column in zip(*found, strict=True))) if found else None
 
 
-def has_one_axis(bodies: Bodies) -> bool:
+def has_one_axis(bodies: Batch) -> bool:
     """Whether all bodies have the same axis of symmetry for certain, as inertia and the direction of their moments are."""
     weights = bodies.parameters.get("weight", np.ones(1))
     return bodies.inertia is None and "com_B" not in bodies.parameters and bool((weights > 0).all() or (weights < 0).all())
 
 
-def find_alike(method: Lame, bodies: Bodies) -> Tops | None:
+def find_alike(method: Lame, bodies: Batch) -> Tops | None:
     """Return what `find_tops` does, of bodies with the same axis."""
     scene, n = bodies.take(0), len(bodies)
     if method.unsupported(scene) is not None:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ..attitude import Array
+from ..batch import Batch
 from ..check import choice, set_fields
 from ..declarations import Candidacy
 from ..deferred_imports import kernels
@@ -19,7 +20,7 @@ from ..scene import Scene
 from ..trajectory import Bounds
 from .bounds import bounds_of
 from .columns import find_unit_of_time, find_units_of_moments, take_pieces
-from .many import Block, Bodies, RunMany
+from .many import Block, RunMany
 from .principal_axes import PrincipalStart, start_along
 from .run_kernel import prepare_run
 from .units import convert_scene, find_units, in_own_units
@@ -107,7 +108,7 @@ class MoserVeselov(Method):
         except BadInput:  # in units of our own
             raise BadInput("dt", f"{grid.dt:g}, for which {self.name} has no step", "a shorter step") from None
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         return prepare_lanes(self, bodies, grid)
 
     @in_own_units
@@ -131,7 +132,7 @@ def calibrate(scene: Scene, method: MoserVeselov, dt: float) -> tuple[str, Princ
     return method.label, start, kernel.Model(tuple(polhode), start.q), kernel.normalise(step)
 
 
-def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany | None:
+def prepare_lanes(method: MoserVeselov, bodies: Batch, grid: Grid) -> RunMany | None:
     """Return the run of many bodies with `conservative.kernels.moser_veselov_many`."""
     kernel, n, s = kernels("moser_veselov_many"), len(bodies), grid.n_samples
     time = find_unit_of_time(grid)
@@ -157,7 +158,7 @@ def prepare_lanes(method: MoserVeselov, bodies: Bodies, grid: Grid) -> RunMany |
     return run
 
 
-def find_given(bodies: Bodies) -> tuple[Array, Array, Array, Array]:
+def find_given(bodies: Batch) -> tuple[Array, Array, Array, Array]:
     """Return moments (n, 3) and R_BP (n, 3, 3), of one body where it is for all, and R_WB0 (n, 3, 3), w_WB_B0 (n, 3), rad/s.
 
     Moments are in units in which the largest of each body is of order one.

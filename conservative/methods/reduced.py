@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..batch import Batch
 from ..check import choice, positive_number
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
@@ -27,7 +28,7 @@ from .columns import (
     take_pieces,
     turn_samples,
 )
-from .many import Block, Bodies, RunMany
+from .many import Block, RunMany
 from .non_spinning import FRAMES, Frame, frame_unsupported, resolve_frame
 from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
@@ -122,7 +123,7 @@ class Reduced(Method):
         coefficients = find_coefficients(self.order, self.composition, self.tol, grid.dt)
         return prepare_run(scene, grid, label, start, kernels("reduced"), model, coefficients)
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Lanes for free bodies and in uniform gravity, in principal axes."""
         return prepare_lanes(self, bodies, grid) if self.frame == "body" and in_gravity_or_free(bodies) else None
 
@@ -145,7 +146,7 @@ BODY_STEP = 2e-8
 """Seconds that a stage takes for a body among many, about: only how often a run can be stopped follows from it."""
 
 
-def prepare_lanes(method: Reduced, bodies: Bodies, grid: Grid) -> RunMany:
+def prepare_lanes(method: Reduced, bodies: Batch, grid: Grid) -> RunMany:
     """Return the run of many bodies with `conservative.kernels.reduced_many`."""
     kernel, n, s = kernels("reduced_many"), len(bodies), grid.n_samples
     moments, R_BP = bodies.principal

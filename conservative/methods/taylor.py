@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, triple
+from ..batch import Batch
 from ..check import describe, positive_number, set_fields
 from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
@@ -20,7 +21,7 @@ from ..potentials.turning import Orbit, Turning, static_part
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
-from .many import Bodies, RunMany
+from .many import RunMany
 from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple
 from .run_kernel import prepare_run
 from .taylor_many import prepare_bodies
@@ -145,7 +146,7 @@ class Taylor(Method):
         run = prepare_run(scene, grid, label, start, kernel, model, coefficients)
         return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         return prepare_bodies(bodies, grid, self.terms) if self.tolerance is None else None
 
 

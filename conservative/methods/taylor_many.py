@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, to_quaternion
+from ..batch import Batch
 from ..deferred_imports import kernels
 from ..grid import Grid
 from .columns import fill_columns, take_pieces
 from .fields_of_many import Fields, find_fields, into_axes
-from .many import Block, Bodies, RunMany
+from .many import Block, RunMany
 from .units import COARSE, SHORTEST
 
 NEARLY_EQUAL = 4e-12
@@ -77,7 +78,7 @@ class Start:
     spin: Array | None
 
 
-def prepare_bodies(bodies: Bodies, grid: Grid, order: int) -> RunMany | None:
+def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
     """Return the run of bodies by series of an order; None where they have to run alone."""
     start = start_bodies(bodies, grid)
     if start is None:
@@ -97,7 +98,7 @@ def prepare_bodies(bodies: Bodies, grid: Grid, order: int) -> RunMany | None:
     return run
 
 
-def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
+def start_bodies(bodies: Batch, grid: Grid) -> Start | None:
     """Return the start of bodies; None where they have to run alone."""
     frames = find_frames(bodies)
     w = into_axes(bodies.w_WB_B0, frames.R_BP)
@@ -116,7 +117,7 @@ def start_bodies(bodies: Bodies, grid: Grid) -> Start | None:
     return Start(build_likes(fields.like), columns, states, spin)
 
 
-def find_frames(bodies: Bodies) -> Frames:
+def find_frames(bodies: Batch) -> Frames:
     """Return the axes of all bodies. Those that may be symmetric are looked at one by one, unless all are the same."""
     moments, R_BP = (np.array(each) for each in bodies.principal)
     J, spinning = moments.copy(), np.zeros(len(bodies), bool)
@@ -147,7 +148,7 @@ def find_units(moments: Array, energy: Array, dt: float) -> Units:
     return Units(*(np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)))
 
 
-def find_momenta(bodies: Bodies, frames: Frames, w: Array, scale: Array) -> Fields:
+def find_momenta(bodies: Batch, frames: Frames, w: Array, scale: Array) -> Fields:
     """Return what stands for the field of free bodies with rates w (n, 3), rad/s: the momentum, whose size is the number.
 
     `scale` (n,) is that of a potential that does nothing, J.

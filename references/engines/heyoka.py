@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.batch import Batch
 from conservative.check import choice, describe, finite_number, positive_integer
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.methods.many import Bodies, RunMany
+from conservative.methods.many import RunMany
 from conservative.methods.units import SI, find_units, in_own_units
 from conservative.potentials.turning import static_part
 from conservative.scene import Scene
@@ -131,7 +132,7 @@ class Heyoka(Method):
 
         return run
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         scenes = [bodies.take(i) for i in range(len(bodies))]
         if not scenes or any(self.unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
             return None

@@ -12,11 +12,12 @@ from threading import Lock
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
+from conservative.batch import Batch
 from conservative.check import choice, positive_integer
 from conservative.errors import Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.methods.many import Block, Bodies, RunMany
+from conservative.methods.many import Block, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -96,7 +97,7 @@ class MuJoCo(Method):
 
         return run
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         mj = load("mujoco", "mujoco", "MuJoCo")
         axes = take_axes(bodies, grid, self.unsupported)
         if axes is None or not hasattr(mj.mjtIntegrator, f"mjINT_{self.integrator.upper()}"):

@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion
+from conservative.batch import Batch
 from conservative.check import choice
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.methods.many import Block, Bodies, RunMany
+from conservative.methods.many import Block, RunMany
 from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -85,7 +86,7 @@ class Pinocchio(Method):
 
         return run
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Return one loop over all bodies, each with a model of its own: Pinocchio has no function for many."""
         pin, axes = load("pinocchio", "pin", "Pinocchio"), take_axes(bodies, grid, self.unsupported)
         if axes is None:

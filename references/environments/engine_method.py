@@ -15,11 +15,12 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 
 from conservative import registry
+from conservative.batch import Batch
 from conservative.check import choice
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.methods.many import Bodies, RunMany
+from conservative.methods.many import RunMany
 from conservative.scene import Scene
 
 from ..engine import gravity_or_free, mass_model_reason, principal_axes
@@ -168,7 +169,7 @@ class EngineMethod(Method):
             return partial(samples.failure, failure)
         return run
 
-    def prepare_many(self, bodies: Bodies, grid: Grid) -> RunMany | None:
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Have the worker prepare the run of many bodies; None where the adapter has none, or not for these bodies."""
         axes = take_axes(bodies, grid, self.unsupported) if self in self.many_settings() else None
         if axes is None:

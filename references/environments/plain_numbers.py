@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import from_quaternion, to_quaternion
+from conservative.batch import Batch
 from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
-from conservative.methods.many import Block, Bodies
+from conservative.methods.many import Block
 from conservative.methods.units import SI, find_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
@@ -53,7 +54,7 @@ def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
     }
 
 
-def take_axes(bodies: Bodies, grid: Grid, unsupported: Callable[[Scene], str | None]) -> list[Axes] | None:
+def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | None]) -> list[Axes] | None:
     """Return each body's start in principal axes; None where one is not supported, or not of order one in SI units."""
     scenes = [bodies.take(i) for i in range(len(bodies))]
     if not scenes or any(unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):

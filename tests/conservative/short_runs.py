@@ -18,10 +18,11 @@ import numpy as np
 import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
+from conservative.batch import Batch
 from conservative.grid import Grid
 from conservative.integration.drifts import find_drifts
 from conservative.method import Method
-from conservative.methods.many import Block, Bodies
+from conservative.methods.many import Block
 
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
@@ -99,7 +100,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
 
 def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
     """Three bodies at once, which start at rates of their own; None where the method runs them one by one."""
-    bodies = Bodies(scene, np.tile(scene.R_WB0, (3, 1, 1)), np.outer((1.0, 0.9, -1.1), scene.w_WB_B0), None, {})
+    bodies = Batch(scene, np.tile(scene.R_WB0, (3, 1, 1)), np.outer((1.0, 0.9, -1.1), scene.w_WB_B0), None, {})
     with np.errstate(all="ignore"):  # compiled, a body that fails goes on in its lane without a word
         run = method.prepare_many(bodies, grid)
         block = run and run()

@@ -15,13 +15,14 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import from_quaternion, orthonormality, rotation_about
+from conservative.batch import Batch
 from conservative.integration import blocks, shared_choice
 from conservative.integration.drifts import find_drifts, list_drifts
 from conservative.integration.inputs import read_bodies
 from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
 from conservative.method import Method, Role
 from conservative.methods.between import Samples
-from conservative.methods.many import Block, Bodies, pause
+from conservative.methods.many import Block, pause
 from conservative.trajectory import Trajectory
 
 TURN = rotation_about((3, -1, 2), 1.3)
@@ -174,7 +175,7 @@ def test_parts_of_an_ensemble(ensemble):
     np.testing.assert_array_equal(part[1].R_WB, ensemble[5].R_WB)
     np.testing.assert_array_equal(part[-1].R_WB, ensemble[7].R_WB)
     np.testing.assert_array_equal(part.drifts["energy"], ensemble.drifts["energy"][3:9:2])
-    assert isinstance(part.bodies, Bodies)
+    assert isinstance(part.bodies, Batch)
     assert ensemble.outcome(-1).ok
     assert ensemble.ok.all()
     with pytest.raises(IndexError):

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
+from conservative.batch import Batch
 from conservative.kernels import COMPILED
 from conservative.methods import columns
-from conservative.methods.many import Block, Bodies
+from conservative.methods.many import Block
 from conservative.references.precise import Precise
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]
@@ -188,7 +189,7 @@ KINDS = (
 )
 
 
-def mixed(n: int) -> Bodies:
+def mixed(n: int) -> Batch:
     """Bodies of all kinds, in axes that are those of the body first and then turned, and random ones."""
     random = np.random.default_rng(14)
     masses = 10 ** random.uniform(-1, 0, (n, 3)) * 10.0 ** random.integers(-9, 9, (n, 1))
@@ -198,10 +199,10 @@ def mixed(n: int) -> Bodies:
         turned[i] = np.eye(3) if i < len(KINDS) else rotation_about(random.normal(size=3), 2.0)
     inertia = turned @ (moments[:, :, None] * turned.transpose(0, 2, 1))
     start = np.array([rotation_about(random.normal(size=3), random.uniform(0, 3)) for _ in range(n)])
-    return Bodies(SCENE, start, w, (inertia + inertia.transpose(0, 2, 1)) / 2, {})
+    return Batch(SCENE, start, w, (inertia + inertia.transpose(0, 2, 1)) / 2, {})
 
 
-def run(bodies: Bodies, dt: float = 0.3, order: int | str = "exact", steps: int = 40, every: int = 7) -> Block:
+def run(bodies: Batch, dt: float = 0.3, order: int | str = "exact", steps: int = 40, every: int = 7) -> Block:
     """The block of a run in lanes."""
     found = cv.MoserVeselov(order).prepare_many(bodies, cv.Grid(dt, steps, every))
     assert found is not None
@@ -225,8 +226,8 @@ def test_one_inertia_is_for_all() -> None:
     turn = rotation_about((3, -1, 2), 1.3)
     inertia = turn @ np.diag([1.0, 1.4, 2.0]) @ turn.T
     shared = cv.Scene("turned", cv.RigidBody(inertia), np.eye(3), (0, 0, 1), 1.0)
-    found = run(Bodies(shared, bodies.R_WB0, bodies.w_WB_B0, None, {}))
-    wanted = run(Bodies(SCENE, bodies.R_WB0, bodies.w_WB_B0, np.tile(shared.body.inertia, (11, 1, 1)), {}))
+    found = run(Batch(shared, bodies.R_WB0, bodies.w_WB_B0, None, {}))
+    wanted = run(Batch(SCENE, bodies.R_WB0, bodies.w_WB_B0, np.tile(shared.body.inertia, (11, 1, 1)), {}))
     np.testing.assert_allclose(found.R_WB, wanted.R_WB, rtol=0, atol=1e-14)  # measured 2e-15: axes of two eigensolvers
 
 
@@ -236,7 +237,7 @@ def test_a_body_does_not_depend_on_its_neighbours() -> None:
     block, w, inertia = run(bodies, 1.2, steps=9), bodies.w_WB_B0.copy(), bodies.inertia.copy()
     w[1::8], w[3::8], w[5::8], w[7] = 0.0, 50.0, w[9], np.nan
     inertia[5::8] = inertia[9]
-    other, moved = run(Bodies(SCENE, bodies.R_WB0, w, inertia, {}), 1.2, steps=9), run(bodies[5:], 1.2, steps=9)
+    other, moved = run(Batch(SCENE, bodies.R_WB0, w, inertia, {}), 1.2, steps=9), run(bodies[5:], 1.2, steps=9)
     np.testing.assert_array_equal(other.R_WB[::2], block.R_WB[::2])
     np.testing.assert_array_equal(other.w_WB_B[::2], block.w_WB_B[::2])
     np.testing.assert_array_equal(moved.R_WB, block.R_WB[5:])
@@ -249,11 +250,11 @@ def test_who_has_no_step_is_left_alone() -> None:
     bodies = mixed(12)
     w = bodies.w_WB_B0 / np.maximum(np.linalg.norm(bodies.w_WB_B0, axis=1, keepdims=True), 1e-9)
     still, slow, fast = np.zeros(3), 1e-70 * w[10], 21.0 * w[11]
-    some = Bodies(SCENE, bodies.R_WB0[9:12], np.array([still, slow, fast]), bodies.inertia[9:12], {})
+    some = Batch(SCENE, bodies.R_WB0[9:12], np.array([still, slow, fast]), bodies.inertia[9:12], {})
     assert run(some).finished.tolist() == [True, False, False]
     if COMPILED:  # in plain Python, the root of a negative number leaves all to be run alone
         assert run(some, order=4).finished.tolist() == [True, False, False]
-    assert run(Bodies(SCENE, bodies.R_WB0[:6], 4.9 * w[:6], bodies.inertia[:6], {}), order=4).finished.tolist() == [True] * 6
+    assert run(Batch(SCENE, bodies.R_WB0[:6], 4.9 * w[:6], bodies.inertia[:6], {}), order=4).finished.tolist() == [True] * 6
 
 
 def test_pieces_and_repetitions_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

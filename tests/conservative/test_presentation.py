@@ -13,12 +13,12 @@ import pytest
 import conservative as cv
 from conservative import presentation
 from conservative.attitude import angle_between, rotation_about
+from conservative.batch import Batch
 from conservative.errors import Diverged
 from conservative.grid import Grid
 from conservative.integration import distributions, pictures
 from conservative.integration.distributions import QUANTILES, angle_quantiles, blocks, mean_attitudes, project
 from conservative.integration.spread import spread
-from conservative.methods.many import Bodies
 from conservative.scenes import brick_flip
 
 R0 = rotation_about((0.3, -1.2, 0.7), 0.83)
@@ -141,7 +141,7 @@ def ensemble(n, grid=GRID, attitude="2deg"):
     starts = cv.spread(SCENE, n, attitude=attitude)
     turns = np.stack([rotation_about((1, 2, 3), 0.01 * t) for t in grid.t])
     drifts = {"energy": np.linspace(1e-16, 3e-13, n), "momentum": np.full(n, 2e-15)}
-    bodies = Bodies(SCENE, starts["R_WB0"], starts["w_WB_B0"], None, {})
+    bodies = Batch(SCENE, starts["R_WB0"], starts["w_WB_B0"], None, {})
     R = turns[None] @ starts["R_WB0"][:, None]
     return cv.Ensemble(bodies, grid, R, np.zeros((n, grid.n_samples, 3)), drifts, "mine==1/turn", {})
 

@@ -9,9 +9,10 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import rotation_about
+from conservative.batch import Batch
 from conservative.method import Method
 from conservative.methods import columns
-from conservative.methods.many import Block, Bodies
+from conservative.methods.many import Block
 
 TURN = rotation_about((3, -1, 2), 1.3)
 TOP = cv.RigidBody(TURN @ np.diag([1.1, 1.1, 0.6]) @ TURN.T)
@@ -19,7 +20,7 @@ GRAVITY = cv.UniformGravity(4.0, (0.3, -0.2, 0.4))
 ON_AXIS = cv.UniformGravity(4.0, 0.5 * TURN[:, 2])
 
 
-def generic(n: int, potential: cv.UniformGravity | None = None) -> Bodies:
+def generic(n: int, potential: cv.UniformGravity | None = None) -> Batch:
     """Bodies with moments, axes, attitudes and speeds (0.05 to 5 rad/s) of their own; each third is 1e28 times as heavy."""
     random = np.random.default_rng(14)
     turned = np.array([rotation_about(random.normal(size=3), 2.0) for _ in range(n)])
@@ -28,7 +29,7 @@ def generic(n: int, potential: cv.UniformGravity | None = None) -> Bodies:
     w = random.normal(size=(n, 3)) * 10 ** random.uniform(-1.5, 0.5, (n, 1))
     scene = cv.Scene("generic", cv.RigidBody((1, 1.4, 2)), np.eye(3), (0, 0, 1), 1.0, potential)
     weights = {} if potential is None else {"weight": random.uniform(1, 4, n) * moments[:, 0]}
-    return Bodies(scene, starts(n), w, (inertia + inertia.transpose(0, 2, 1)) / 2, weights)
+    return Batch(scene, starts(n), w, (inertia + inertia.transpose(0, 2, 1)) / 2, weights)
 
 
 def starts(n: int) -> np.ndarray:
@@ -37,14 +38,14 @@ def starts(n: int) -> np.ndarray:
     return np.array([rotation_about(random.normal(size=3), random.uniform(0, 3)) for _ in range(n)])
 
 
-def tops(n: int, potential: cv.UniformGravity | None = ON_AXIS, **parameters: Any) -> Bodies:
+def tops(n: int, potential: cv.UniformGravity | None = ON_AXIS, **parameters: Any) -> Batch:
     """The same symmetric body at speeds of 0.1 to 10 rad/s."""
     random = np.random.default_rng(16)
     scene = cv.Scene("tops", TOP, np.eye(3), (0, 0, 1), 1.0, potential)
-    return Bodies(scene, starts(n), random.normal(size=(n, 3)) * 10 ** random.uniform(-1, 0.7, (n, 1)), None, parameters)
+    return Batch(scene, starts(n), random.normal(size=(n, 3)) * 10 ** random.uniform(-1, 0.7, (n, 1)), None, parameters)
 
 
-def run(method: Method, bodies: Bodies, grid: cv.Grid) -> Block:
+def run(method: Method, bodies: Batch, grid: cv.Grid) -> Block:
     """The block of a run in lanes."""
     found = method.prepare_many(bodies, grid)
     assert found is not None
@@ -52,7 +53,7 @@ def run(method: Method, bodies: Bodies, grid: cv.Grid) -> Block:
     return block
 
 
-def differ(method: Method, bodies: Bodies, grid: cv.Grid) -> list[int]:
+def differ(method: Method, bodies: Batch, grid: cv.Grid) -> list[int]:
     """Which bodies were not finished, or are not the same to the last bit as alone; those that fail alone are left out."""
     block, found = run(method, bodies, grid), []
     for i in range(len(bodies)):
@@ -76,19 +77,19 @@ def differ(method: Method, bodies: Bodies, grid: cv.Grid) -> list[int]:
         (cv.Lame(), tops(5, com_B=np.outer(np.linspace(-1, 1, 5), TURN[:, 2])), 0.3),
     ],
 )
-def test_many_are_those_of_one_at_a_time(method: Method, bodies: Bodies, dt: float) -> None:
+def test_many_are_those_of_one_at_a_time(method: Method, bodies: Batch, dt: float) -> None:
     """11 bodies: a lane of eight, and three in the second. Bits are the same; what is promised is 1e-14."""
     assert differ(method, bodies, cv.Grid(dt, 40, 7)) == []
 
 
 @pytest.mark.parametrize(("method", "bodies", "dt"), [(cv.Reduced(), generic(17, GRAVITY), 0.4), (cv.Lame(), tops(17), 0.7)])
-def test_a_body_does_not_depend_on_its_neighbours(method: Method, bodies: Bodies, dt: float) -> None:
+def test_a_body_does_not_depend_on_its_neighbours(method: Method, bodies: Batch, dt: float) -> None:
     """Not even in its last bit: neighbours that rest, need more parts or corrections, have no step at all; other places."""
     grid, w = cv.Grid(dt, 30, 7), bodies.w_WB_B0.copy()
     w[1::4], w[3::8], w[7] = 0.0, 8.0, 1e7
-    block, other = run(method, bodies, grid), run(method, Bodies(bodies.scene, bodies.R_WB0, w, None, {}), grid)
+    block, other = run(method, bodies, grid), run(method, Batch(bodies.scene, bodies.R_WB0, w, None, {}), grid)
     if bodies.inertia is not None:
-        other = run(method, Bodies(bodies.scene, bodies.R_WB0, w, bodies.inertia, bodies.parameters), grid)
+        other = run(method, Batch(bodies.scene, bodies.R_WB0, w, bodies.inertia, bodies.parameters), grid)
     moved = run(method, bodies[5:], grid)
     np.testing.assert_array_equal(other.R_WB[::2], block.R_WB[::2])
     np.testing.assert_array_equal(other.w_WB_B[::2], block.w_WB_B[::2])
@@ -99,7 +100,7 @@ def test_a_body_does_not_depend_on_its_neighbours(method: Method, bodies: Bodies
 
 def test_who_has_no_solution_alone_is_not_finished() -> None:
     top = cv.scenes.lagrange_top()
-    bodies = Bodies(top, np.tile(top.R_WB0, (3, 1, 1)), np.outer((1.0, 0.1, 0.0), top.w_WB_B0), None, {})
+    bodies = Batch(top, np.tile(top.R_WB0, (3, 1, 1)), np.outer((1.0, 0.1, 0.0), top.w_WB_B0), None, {})
     grid = cv.Grid(0.5, 3)
     finished = [cv.Reduced().solve(bodies.take(i), grid).ok for i in range(3)]
     assert run(cv.Reduced(), bodies, grid).finished.tolist() == finished
@@ -110,22 +111,22 @@ def test_a_body_without_symmetry_is_left_to_others() -> None:
     inertia = np.tile(TOP.inertia, (3, 1, 1))
     inertia[1, 0, 0] *= 1.001
     bodies = tops(3, None)
-    block = run(cv.Lame(), Bodies(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, inertia, {}), cv.Grid(0.1, 5))
+    block = run(cv.Lame(), Batch(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, inertia, {}), cv.Grid(0.1, 5))
     assert block.finished.tolist() == [True, False, True]
     assert np.isnan(block.R_WB[1]).all()
-    one = Bodies(bodies.scene, bodies.R_WB0[:1], bodies.w_WB_B0[:1], inertia[1:2], {})
+    one = Batch(bodies.scene, bodies.R_WB0[:1], bodies.w_WB_B0[:1], inertia[1:2], {})
     assert cv.Lame().prepare_many(one, cv.Grid(0.1, 5)) is None
 
 
 def test_other_fields_and_frames_run_one_by_one() -> None:
     scene = cv.Scene("sprung", TOP, TURN, (0, 0, 1), 1.0, cv.LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0.0, 0.3), 0.1))
-    sprung = Bodies(scene, TURN[None], np.ones((1, 3)), None, {})
+    sprung = Batch(scene, TURN[None], np.ones((1, 3)), None, {})
     for method, bodies in ((cv.Reduced(), sprung), (cv.Lame(), sprung), (cv.Reduced(frame="auto"), tops(3))):
         assert method.prepare_many(bodies, cv.Grid(0.1, 5)) is None
 
 
 @pytest.mark.parametrize(("method", "bodies"), [(cv.Reduced(), generic(9)), (cv.Lame(), tops(9))])
-def test_pieces_and_repetitions_change_nothing(method: Method, bodies: Bodies, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pieces_and_repetitions_change_nothing(method: Method, bodies: Batch, monkeypatch: pytest.MonkeyPatch) -> None:
     again = method.prepare_many(bodies, cv.Grid(0.3, 40, 7))
     assert again is not None
     whole = again()

@@ -8,8 +8,9 @@ import pytest
 
 import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about
+from conservative.batch import Batch
 from conservative.methods import columns
-from conservative.methods.many import Block, Bodies
+from conservative.methods.many import Block
 from conservative.references.precise import Precise
 
 from .one_body import drift
@@ -213,7 +214,7 @@ VARIED = {
 }
 
 
-def draw(field: str, n: int = N, size: float = 0.1) -> Bodies:
+def draw(field: str, n: int = N, size: float = 0.1) -> Batch:
     """Bodies that differ in all that they can differ in; each number of a field by up to `size` of itself."""
     rng = np.random.default_rng(14)
     rotations = (from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]) for q in rng.normal(size=(2, n, 4)))
@@ -228,16 +229,16 @@ def draw(field: str, n: int = N, size: float = 0.1) -> Bodies:
         spread = rng.uniform(1 - size, 1 + size, (n, *(1,) * value.ndim))
         parameters[name] = value * (spread if value.ndim == 2 else rng.uniform(1 - size, 1 + size, (n, *value.shape)))
     scene = cv.Scene("many", cv.RigidBody(inertia[0]), R_WB0[0], (1, 2, 3), 2.0, potential)
-    return Bodies(scene, R_WB0, rng.normal(size=(n, 3)) * 2, inertia, parameters)
+    return Batch(scene, R_WB0, rng.normal(size=(n, 3)) * 2, inertia, parameters)
 
 
-def run(bodies: Bodies, grid: cv.Grid, order: int) -> Block:
+def run(bodies: Batch, grid: cv.Grid, order: int) -> Block:
     many = cv.Taylor(order).prepare_many(bodies, grid)
     assert many is not None
     return many()
 
 
-def off_one_at_a_time(bodies: Bodies, found: Block, grid: cv.Grid, order: int) -> float:
+def off_one_at_a_time(bodies: Batch, found: Block, grid: cv.Grid, order: int) -> float:
     """The largest difference from the same bodies alone: of attitudes, and of rates relative to the largest of a body."""
     off = []
     for i in range(len(bodies)):
@@ -268,7 +269,7 @@ def test_symmetric_bodies_turn_in_a_frame_that_does_not_spin(field: str) -> None
     some = np.where((np.arange(N) % 2)[:, None, None], drawn.inertia, symmetric)
     for inertia in (None, some):
         held = replace(drawn.scene, body=cv.RigidBody(symmetric), potential=potential)
-        bodies = Bodies(held, drawn.R_WB0, drawn.w_WB_B0, inertia, {})
+        bodies = Batch(held, drawn.R_WB0, drawn.w_WB_B0, inertia, {})
         found = run(bodies, grid, 14)
         assert found.finished.all()
         assert off_one_at_a_time(bodies, found, grid, 14) < 2e-14  # measured 5e-15
@@ -279,7 +280,7 @@ def test_symmetric_bodies_turn_in_a_frame_that_does_not_spin(field: str) -> None
 def test_units_of_bodies_do_not_matter(moment: float, time: float) -> None:
     bodies, grid = draw("gravity"), cv.Grid(0.05 * time, 10, 10)
     parameters = {**bodies.parameters, "weight": bodies.parameters["weight"] * moment / time / time}
-    scaled = Bodies(bodies.scene, bodies.R_WB0, bodies.w_WB_B0 / time, bodies.inertia * moment, parameters)
+    scaled = Batch(bodies.scene, bodies.R_WB0, bodies.w_WB_B0 / time, bodies.inertia * moment, parameters)
     found = run(scaled, grid, 12)
     assert found.finished.all()
     assert off_one_at_a_time(scaled, found, grid, 12) < 2e-14  # measured 8e-16
@@ -293,7 +294,7 @@ def test_a_body_that_cannot_be_projected_is_not_finished_and_disturbs_nobody() -
     fast = bodies.w_WB_B0.copy()
     fast[[1, 6]] *= ((20.0,), (1e90,))  # one is far from its invariants, of one nothing is finite
     fast[2] *= 1.7  # several corrections
-    found = run(Bodies(bodies.scene, bodies.R_WB0, fast, bodies.inertia, bodies.parameters), grid, 6)
+    found = run(Batch(bodies.scene, bodies.R_WB0, fast, bodies.inertia, bodies.parameters), grid, 6)
     np.testing.assert_array_equal(found.finished, [True, False, True, True, True, True, False])
     np.testing.assert_array_equal(found.R_WB[[0, 3, 4, 5]], usual.R_WB[[0, 3, 4, 5]])
     np.testing.assert_array_equal(found.w_WB_B[[0, 3, 4, 5]], usual.w_WB_B[[0, 3, 4, 5]])
@@ -315,4 +316,4 @@ def test_what_runs_alone() -> None:
     assert cv.Taylor(tolerance=1e-9).prepare_many(bodies, cv.Grid(0.1, 10, 1)) is None
     satellite = cv.Orbit(0.7, (0, 0, 1)).gravity_gradient(GRADIENT, (1, 0, 0))
     held = replace(bodies.scene, potential=satellite)
-    assert cv.Taylor().prepare_many(Bodies(held, bodies.R_WB0, bodies.w_WB_B0, None, {}), cv.Grid(0.1, 10, 1)) is None
+    assert cv.Taylor().prepare_many(Batch(held, bodies.R_WB0, bodies.w_WB_B0, None, {}), cv.Grid(0.1, 10, 1)) is None

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from conservative import BadInput, registry
+from conservative.batch import Batch
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.grid import Grid
-from conservative.methods.many import Bodies
 from conservative.references.engine import principal_axes
 from conservative.references.engines.inside import mujoco as inside
 from conservative.references.environments.plain_numbers import ManySamples, describe_many
@@ -44,7 +44,7 @@ def test_a_body_among_many_moves_as_it_does_alone(name, bodies, allowed):
     assert first.finished.all()
     assert differences(first, method, bodies).max() < allowed
     assert np.array_equal(first.R_WB, again.R_WB)
-    other = Bodies(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, bodies.inertia[::-1].copy(), bodies.parameters)
+    other = Batch(bodies.scene, bodies.R_WB0, bodies.w_WB_B0, bodies.inertia[::-1].copy(), bodies.parameters)
     assert differences(first, method, other)[0] > 1e-3
 
 
@@ -58,7 +58,7 @@ def test_a_batch_that_does_not_get_there_says_so(monkeypatch):
 def test_a_rollout_that_stands_still_is_not_finished():
     rates = TOPS.w_WB_B0.copy()
     rates[2] = 1e4
-    many = Bodies(TOPS.scene, TOPS.R_WB0, rates, TOPS.inertia, TOPS.parameters)
+    many = Batch(TOPS.scene, TOPS.R_WB0, rates, TOPS.inertia, TOPS.parameters)
     block = registry.method("mujoco:RK4").prepare_many(many, GRID)()
     assert block.finished.tolist() == [True, True, False, True, True]
     assert np.isnan(block.R_WB[2, -1]).all()
@@ -89,5 +89,5 @@ def test_bad_settings_of_batches(settings):
 
 def test_what_cannot_run_at_once_says_so():
     assert registry.method("heyoka:frame=lean").prepare_many(FREE, GRID) is None
-    small = Bodies(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-29, TOPS.parameters)
+    small = Batch(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-29, TOPS.parameters)
     assert registry.method("mujoco:RK4").prepare_many(small, GRID) is None

@@ -1,0 +1,122 @@
+"""A batch: n bodies in scenes of one kind, in arrays with a leading body axis. A single body is a batch of one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .attitude import Array, to_quaternion
+from .body import RigidBody
+from .check import build_unchecked
+from .potentials.potential import AnyPotential
+from .potentials.turning import Turning, static_part
+from .potentials.varied import OneByOne, Varied
+from .scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """n independent bodies in scenes of one kind. The constructor checks nothing.
+
+    Attributes
+    ----------
+    scene
+        The scene that provides everything that the other attributes do not.
+    R_WB0, w_WB_B0
+        Initial attitudes (n, 3, 3), body to world, and angular velocities (n, 3), rad/s, body axes.
+    inertia
+        Tensors (n, 3, 3), kg m^2, body axes; None if all bodies have the scene's.
+    parameters
+        Numbers (n, ...) of the scene's potential that differ from body to body, by the names of its fields; of a field that
+        turns, those of the field in its own axes.
+    """
+
+    scene: Scene
+    R_WB0: Array
+    w_WB_B0: Array
+    inertia: Array | None
+    parameters: Mapping[str, Array]
+
+    def __len__(self) -> int:
+        return len(self.R_WB0)
+
+    def __getitem__(self, part: slice) -> Batch:
+        inertia = None if self.inertia is None else self.inertia[part]
+        parameters = {name: values[part] for name, values in self.parameters.items()}
+        return Batch(self.scene, self.R_WB0[part], self.w_WB_B0[part], inertia, parameters)
+
+    @classmethod
+    def of(cls, scene: Scene) -> Batch:
+        """Return a batch of one body, that of a scene."""
+        return cls(scene, scene.R_WB0[None], scene.w_WB_B0[None], None, {})
+
+    @cached_property
+    def first(self) -> Scene:
+        """The scene of body 0: `scene` itself, with its cache, if the batch was made of it alone."""
+        scene = self.scene
+        same = self.R_WB0.base is scene.R_WB0 and self.w_WB_B0.base is scene.w_WB_B0
+        return scene if same and self.inertia is None and not self.parameters else self.take(0)
+
+    def take(self, i: int) -> Scene:
+        """Return the scene of body i."""
+        inertia = None if self.inertia is None else self.inertia[i]
+        body = self.scene.body if inertia is None else build_unchecked(RigidBody, inertia=inertia)
+        potential = self.take_potential(i)
+        return replace_unchecked(self.scene, body=body, potential=potential, R_WB0=self.R_WB0[i], w_WB_B0=self.w_WB_B0[i])
+
+    def take_potential(self, i: int) -> AnyPotential | None:
+        """Return the potential of body number i."""
+        potential: Any = self.scene.potential
+        if not self.parameters:
+            return potential
+        numbers = {name: values[i].item() if values[i].ndim == 0 else values[i] for name, values in self.parameters.items()}
+        own = replace(static_part(potential), **numbers)
+        return Turning(own, potential.orbit) if isinstance(potential, Turning) else own
+
+    @cached_property
+    def varied(self) -> Varied:
+        """The fields of all bodies, where they have numbers of their own: those that turn as they are in their axes."""
+        vary = getattr(static_part(self.scene.potential), "vary", None)
+        if vary is not None:
+            return vary(self.parameters)
+        return OneByOne([static_part(self.take_potential(i)) for i in range(len(self))])
+
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal moments (n, 3), kg m^2, and rotations R_BP (n, 3, 3), as `RigidBody` has them, body by body."""
+        n = len(self)
+        if self.inertia is None:
+            body = self.scene.body
+            return np.broadcast_to(body.moments, (n, 3)), np.broadcast_to(body.R_BP, (n, 3, 3))
+        return principal_axes(self.inertia)
+
+    @cached_property
+    def q_WP0(self) -> Array:
+        """Attitudes (n, 4) of the principal axes at the start, scalar first."""
+        return to_quaternion(self.R_WB0 @ self.principal[1])
+
+    @cached_property
+    def L_P0(self) -> Array:
+        """Angular momenta (n, 3) at the start, kg m^2/s, principal axes."""
+        moments, R_BP = self.principal
+        return np.asarray((self.w_WB_B0[:, None, :] @ R_BP)[:, 0, :] * moments)
+
+
+def principal_axes(inertia: Array) -> tuple[Array, Array]:
+    """Return moments (n, 3), kg m^2, and right-handed axes (n, 3, 3) of tensors; diagonal ones keep their own axes."""
+    diagonal = np.diagonal(inertia, axis1=-2, axis2=-1)
+    plain = np.count_nonzero(inertia - diagonal[..., None] * np.eye(3), axis=(-2, -1)) == 0
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, :, 2] *= np.sign(np.linalg.det(axes))[:, None]
+    moments[plain], axes[plain] = diagonal[plain], np.eye(3)
+    return moments, axes
+
+
+def replace_unchecked(scene: Scene, **changes: Any) -> Scene:
+    """Return the scene with other fields, which are known to be right, and nothing derived from the old ones."""
+    kept = ("name", "t_end", "dt", "extra_invariants", "group", "source")
+    return build_unchecked(Scene, **{name: getattr(scene, name) for name in kept}, **changes)
