@@ -1,23 +1,22 @@
-"""Random bodies in four kinds of field: what every statement about the speed of a method is a statement about.
+"""Random bodies in four kinds of field.
 
-A body is drawn from the numbers of NumPy's bit generator PCG64, seeded with (seed, number of the field, index): the same to
-round-off on every machine, whatever else is drawn. u below is uniform in [0, 1), each one drawn anew.
+A body is drawn from NumPy's bit generator PCG64, seeded with (seed, number of the field, index), so it is the same to
+round-off on every machine. Below, u is uniform in [0, 1), drawn again for each use.
 
-* Moments J1 <= J2 <= J3: condition J3/J1 = 1.1 to 100, log-uniform; J2 uniform between max(J1, J3 - J1) and J3, so that a mass
-  distribution has them (J1 + J2 >= J3); their mean 0.1 to 10 kg m^2, log-uniform. Bodies of a high condition are needles.
-* Body axes turned from the principal ones by a rotation uniform on the group, so that the inertia is a full matrix. The start
-  attitude is another such rotation.
-* Start rates of 0.3 to 3 rad/s, log-uniform, and the body's point, 0.1 to 1 m from the pivot, log-uniform, each in a direction
-  that is uniform but for having at least a tenth of its length along every principal axis. Gravity is along the world's -z;
-  the direction of its gradient, and of an anchor, is uniform in the world.
+* Moments J1 <= J2 <= J3. The condition J3/J1 is 1.1 to 100, log-uniform. J2 is uniform between max(J1, J3 - J1) and J3, so a
+  mass distribution with these moments exists. Their mean is 0.1 to 10 kg m^2, log-uniform. A high condition means a needle.
+* The body axes are turned from the principal axes by a rotation uniform on the group, so the inertia is a full matrix. The
+  initial attitude is another such rotation.
+* The initial rates are 0.3 to 3 rad/s, log-uniform. The body's point is 0.1 to 1 m from the pivot, log-uniform. Both have
+  directions that are uniform, except that each component along a principal axis is at least a tenth of the length. Gravity is
+  along the world's -z. The directions of its gradient and of an anchor are uniform in the world.
 * The anchor of a spring or an attraction is (1 + g) times as far from the pivot as the body's point, g = 0.2 to 3,
-  log-uniform: they come no closer than g times the point's distance from the pivot, so that there is no collision, and an
-  attraction can be up to 121 times as strong in a passage as at its weakest. The spring's rest length is u times the anchor's
-  distance.
-* Strength: half of the range that the energy of the field has over all attitudes is 0.3 to 3 times the kinetic energy at the
-  start, log-uniform.
+  log-uniform. There is no collision, but the force of an attraction can vary by a factor of 121. The spring's rest length is u
+  times the anchor's distance.
+* Strength: half of the range of the field's energy over all attitudes is 0.3 to 3 times the initial kinetic energy,
+  log-uniform.
 
-The motion lasts `TURN` rad at the rate of the start. Source: ours.
+The motion lasts `TURN` rad at the initial rate.
 """
 
 from __future__ import annotations
@@ -45,23 +44,23 @@ RATE = (0.3, 3.0)
 ARM = (0.1, 1.0)
 GAP = (0.2, 3.0)
 ENERGY = (0.3, 3.0)
-"""Ranges of what is log-uniform: J3/J1; kg m^2; rad/s; m; of the anchor; half of the field's range over the kinetic energy."""
+"""Log-uniform ranges: J3/J1; kg m^2; rad/s; m; g of the anchor; half of the field's range over the initial kinetic energy."""
 OFF_AXIS = 0.1
-"""Least component of a direction along each principal axis."""
+"""Smallest component of a direction along each principal axis."""
 TURN = 12.0
-"""Length of the motion, rad at the rate of the start."""
+"""Length of the motion, rad at the initial rate."""
 
 Draw = Callable[[], float]
 """Returns the next u."""
 
 
 def random_body(field: str = FIELDS[0], seed: int = 0, index: int = 0) -> Scene:
-    """Return body number `index` of those that a seed gives in a field, under the name that builds it again.
+    """Return the random body with number `index` of a seed, in one of the `FIELDS`.
 
     Raises
     ------
     BadInput
-        The field is none of `FIELDS`, or seed or index is not an integer of 0 or more.
+        The field is unknown, or seed or index is not an integer of 0 or more.
     """
     choice("field", field, FIELDS)
     entropy = (_count("seed", seed), FIELDS.index(field), _count("index", index))
@@ -78,7 +77,7 @@ def random_body(field: str = FIELDS[0], seed: int = 0, index: int = 0) -> Scene:
 
 
 def name_of(field: str, seed: int, index: int) -> str:
-    """Return the registered name of a body, which a command and `conservative.registry.scene` take."""
+    """Return the name that `conservative.registry.scene` and the commands accept for a body."""
     return f"random_body:field={field},seed={seed},index={index}"
 
 
@@ -102,11 +101,11 @@ def _direction(draw: Draw) -> Array:
 
 
 def _off_axes(draw: Draw) -> Array:
-    """Return a unit vector (3,) as uniform as `OFF_AXIS` allows."""
+    """Return a unit vector (3,), uniform except that no component is below `OFF_AXIS`."""
     while True:
-        found = _direction(draw)
-        if np.abs(found).min() >= OFF_AXIS:
-            return found
+        direction = _direction(draw)
+        if np.abs(direction).min() >= OFF_AXIS:
+            return direction
 
 
 def _rotation(draw: Draw) -> Array:
@@ -117,7 +116,6 @@ def _rotation(draw: Draw) -> Array:
 
 
 def _moments(draw: Draw) -> Array:
-    """Return principal moments (3,), kg m^2."""
     condition = _log_uniform(draw, CONDITION)
     least = max(1.0, condition - 1)
     J = np.array((1.0, least + draw() * (condition - least), condition))
@@ -160,7 +158,7 @@ def _anchor(draw: Draw, point_B: Array) -> Array:
 
 
 def half_range(field: PointPotential, rest_length: float = math.inf) -> float:
-    """Return half of the range of a field's energy over all attitudes, J; it is least at the rest length, where it has one."""
+    """Return half of the range of a field's energy over all attitudes, J. A spring's energy is lowest at its rest length."""
     near, far = (float(np.linalg.norm(field.anchor_W)) + sign * float(np.linalg.norm(field.point_B)) for sign in (-1, 1))
     values = field.energy_of(np.array((near, far, min(max(rest_length, near), far))))
     return float(np.ptp(values)) / 2

@@ -19,7 +19,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import angle_between, cayley, from_quaternion, hat, orthonormality, rotation_about, to_quaternion
 from conservative.potentials.potential import torque_W
-from conservative.scenes.turned_frame import in_body_frame
+from conservative.scenes.transforms import in_body_frame
 
 SWEEPS, STAGNATION = 60, 1e-16
 States = Iterator[tuple[np.ndarray, np.ndarray]]

@@ -16,7 +16,7 @@ from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.references.environments.engine_method import rate_limit_reason
 from conservative.scenes import slow_motion
-from conservative.scenes.turned_frame import in_body_frame
+from conservative.scenes.transforms import in_body_frame
 
 NAMES = tuple(registry.list_scenes())
 REFERENCE = json.loads((Path(__file__).parents[1] / "data" / "reference_states.json").read_text())["cases"]

@@ -11,7 +11,7 @@ import conservative as cv
 from conservative import deferred_imports
 from conservative.attitude import angle_between, rotation_about
 from conservative.method import Role
-from conservative.scenes.turned_frame import in_body_frame
+from conservative.scenes.transforms import in_body_frame
 
 STEPS, DT = 40, 0.04
 # Measured 2e-14 nearly always; 1.4e-12 where a run of Taylor(order=8) is split: corrections are weighed by scales of the start.

@@ -28,7 +28,7 @@ from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.motion import _BLOCK
 from conservative.references.precise import Precise
-from conservative.scenes.lagrange_top import cone
+from conservative.scenes.tops import cone
 from conservative.trajectory import Counters
 
 # Attitude and rates; measured beside: the largest over the four scenes.

@@ -1,0 +1,67 @@
+"""The same motion in other units of time or in another body frame."""
+
+from __future__ import annotations
+
+from ..attitude import Array
+from ..body import RigidBody
+from ..check import positive_number, rotation
+from ..errors import BadInput
+from ..potentials.uniform_gravity import UniformGravity
+from ..scene import Scene
+
+
+def slow_motion(scene: Scene, slow: float = 4.0) -> Scene:
+    """Return the scene `NAME:slow=4`: the same motion with time stretched by the factor `slow`.
+
+    Engines that limit rates need it: game engines stop at 100 rad/s, and the top of Krenk & Nielsen turns at 141. With f = slow
+
+        R'(f t) = R(t)     w' = w / f     weight' = weight / f^2
+
+    If f is a power of two, both motions have the same digits. The result for f = 1 is the scene itself.
+
+    Raises
+    ------
+    BadInput
+        `slow` is not a finite number above 0, the field is not uniform gravity, or the scene has extra invariants, whose
+        scaling is unknown.
+    """
+    factor, field = positive_number("slow", slow), scene.potential
+    if factor == 1:
+        return scene
+    if isinstance(field, UniformGravity):
+        field = UniformGravity(field.weight / factor**2, field.com_B)
+    elif field is not None:
+        raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
+    if scene.extra_invariants:
+        raise BadInput("scene", "a scene with extra_invariants", "a scene without")
+    return scene.rename(
+        f"{scene.name}:slow={factor:g}",
+        w_WB_B0=scene.w_WB_B0 / factor,
+        t_end=scene.t_end * factor,
+        potential=field,
+        dt=scene.dt * factor,
+        source=f"{scene.source}; {factor:g} times slower",
+    )
+
+
+def in_body_frame(scene: Scene, F: Array, name: str) -> Scene:
+    """Return the same motion in a body frame turned by the rotation F (3, 3), which maps old body components to new ones.
+
+        J' = F J F'     R_WB' = R_WB F'     w' = F w     com' = F com
+
+    Engines have dropped this rotation or applied it twice. The result of a correct method satisfies R_WB' F = R_WB.
+
+    Raises
+    ------
+    BadInput
+        F is not a rotation, or the field is not uniform gravity.
+    """
+    F = rotation("F", F)
+    field = scene.potential
+    if isinstance(field, UniformGravity):
+        field = UniformGravity(field.weight, F @ field.com_B)
+    elif field is not None:
+        raise BadInput("scene", f"a scene with {field!r}", "a free body or one in uniform gravity")
+    return scene.rename(
+        name, body=RigidBody(F @ scene.body.inertia @ F.T), R_WB0=scene.R_WB0 @ F.T, w_WB_B0=F @ scene.w_WB_B0, potential=field
+    )
