@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import lru_cache, wraps
-from typing import Any
+from typing import Any, NamedTuple
 
 from .version import VERSION
 
@@ -69,11 +69,16 @@ class Cost:
         return self.step + self.correction * self.corrections
 
 
+def setting_texts(value: Any) -> dict[str, str]:
+    """Return the texts of the settings of a frozen value that differ from their defaults, such as `tol=1e-09`, by name."""
+    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
+    return {name: f"{name}={setting}" for name, setting, default in settings if setting != default}
+
+
 @lru_cache(maxsize=1024)
 def settings_text(value: Any) -> str:
     """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
-    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
-    return ",".join(f"{name}={setting}" for name, setting, default in settings if setting != default)
+    return ",".join(setting_texts(value).values())
 
 
 def refuse_time(unsupported: Callable[[Any, Any], str | None]) -> Callable[[Any, Any], str | None]:
@@ -88,15 +93,25 @@ def refuse_time(unsupported: Callable[[Any, Any], str | None]) -> Callable[[Any,
     return reason
 
 
+class Maker(NamedTuple):
+    """The package that computes, and its version; empty if the package is not an installed one."""
+
+    package: str
+    version: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.package}=={self.version}" if self.version else self.package
+
+
 @lru_cache(maxsize=256)
-def maker_of(kind: type) -> str:
-    """Return name and version of the package that a class is from."""
+def maker_of(kind: type) -> Maker:
+    """Return the package that a class is from."""
     package = kind.__module__.partition(".")[0]
     if package == __package__:
-        return f"{package}=={VERSION}"
+        return Maker(package, VERSION)
     from importlib import metadata
 
     try:
-        return f"{package}=={metadata.version(package)}"
+        return Maker(package, metadata.version(package))
     except metadata.PackageNotFoundError:
-        return package
+        return Maker(package)

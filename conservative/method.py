@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from .declarations import Candidacy, Cost, maker_of, refuse_time, settings_text
+from .declarations import Candidacy, Cost, Maker, maker_of, refuse_time, setting_texts, settings_text
 from .declarations import Role as Role
 from .grid import Grid, grid_for
 from .scene import Scene
@@ -56,11 +56,23 @@ class Method(ABC):
 
     @property
     def label(self) -> str:
-        """Name and version of the computing package, and the setting, such as `mujoco==4.0.0/RK4`.
+        """Maker and setting, such as `mujoco==4.0.0/RK4`; of our methods maker and name."""
+        setting = "" if self.role == Role.OURS else self.setting()
+        return f"{self.maker}/{setting or self.name}"
 
-        Default: the package of the class, with its version if it is installed.
-        """
-        return f"{maker_of(type(self))}/{self.name}"
+    @property
+    def maker(self) -> Maker:
+        """The package that computes, with its version; default: the package of the class."""
+        return maker_of(type(self))
+
+    @property
+    def setting_parts(self) -> Mapping[str, str]:
+        """The text of each setting that tables show, by its name; default: the settings that are not defaults."""
+        return setting_texts(self)
+
+    def setting(self, without: str | None = None) -> str:
+        """Return the setting as tables show it, such as `tol=1e-06,body`; `without` leaves out one part."""
+        return ",".join(text for name, text in self.setting_parts.items() if name != without)
 
     @property
     @abstractmethod

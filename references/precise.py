@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from conservative.attitude import from_quaternion, to_quaternion
 from conservative.check import describe, positive_integer
+from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -68,8 +69,12 @@ class Precise(Method):
         version("heyoka", "heyoka")
 
     @property
-    def label(self) -> str:
-        return f"heyoka=={version('heyoka', 'heyoka')}/{self.bits} bits"
+    def maker(self) -> Maker:
+        return Maker("heyoka", version("heyoka", "heyoka"))
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        return {"bits": f"{self.bits} bits"}
 
     @property
     def order(self) -> None:

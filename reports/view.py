@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.studies import ENGINES, RANDOM, THROUGHPUT
 
 from .labels import with_names
@@ -154,7 +155,7 @@ def _first(
 def _versions(plan: Plan, source: Provenance) -> Table:
     """Return the versions of the engines that are named for their own studies: in environments, and beside us."""
     apart = {lock.name for lock in source.environments}
-    makers = dict.fromkeys(method.label.partition("/")[0] for method in plan.engines if "/" in method.label)
+    makers = dict.fromkeys(str(method.maker) for method in plan.engines if not isinstance(method, Missing))
     locks = [(lock.name, lock.python, len(lock.packages)) for lock in source.environments if lock.name in makers]
     return engine_tables.versions(locks, [name for name in makers if name not in apart])
 

@@ -116,7 +116,7 @@ class Remote(Method):
     """A method of a version on a scene that both sides know by `scene_name`; `longest` is its longest step there, s."""
 
     side: Side = field(compare=False, repr=False)
-    setting: Setting
+    found: Setting
     scene_name: str
     longest: float
 
@@ -125,15 +125,15 @@ class Remote(Method):
 
     @property
     def name(self) -> str:
-        return self.setting.name
+        return self.found.name
 
     @property
     def label(self) -> str:
-        return self.setting.label
+        return self.found.label
 
     @property
     def order(self) -> int | None:
-        return self.setting.order
+        return self.found.order
 
     def longest_step(self, scene: Scene) -> float:
         return self.longest

@@ -1,12 +1,15 @@
-"""The tidy row that every study yields, and the table of them."""
+"""What a study yields: tidy rows (`Measurement`), and quantities over time (`Samples`). Every field of both is a column."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from conservative.attitude import Array
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
 
@@ -16,31 +19,58 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
-    """One measured value.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Subject:
+    """The scene, the method and the step that a row is about.
 
     Attributes
     ----------
     study, scene
         Names of the study and of the scene; the scene is empty if the row belongs to none.
+    field, seed, body
+        Of a random body: its field or kind, the seed, and its index; "" and None for any other scene.
     method
-        Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back. Empty for
-        what belongs to no one method.
+        Registered name with settings, such as `mujoco:integrator=RK4`; `conservative.registry.method` reads it back. Empty if
+        the row belongs to no single method.
     label
         The same with version, such as `mujoco==4.0.0/RK4`.
-    family, version, setting
-        The parts of what a method is called: `mujoco`, `4.0.0`, `RK4`; no version of ours. Empty for what is no method.
+    family, engine, version, setting
+        Parts of the name: `mujoco@4.0.0`, `mujoco`, `4.0.0`, `RK4`. Our methods have neither engine nor version.
     role
         Which side the method is on.
-    series
-        Name of a line in a chart: the method without its tolerance.
-    series_setting
-        The setting without the tolerance.
+    series, series_setting
+        Name and setting of a line in a chart: those of the method without its tolerance.
     dt
         Step, s, or distance of samples of an adaptive method; NaN if the row belongs to no single step.
+    """
+
+    study: str
+    scene: str
+    field: str = ""
+    seed: int | None = None
+    body: int | None = None
+    method: str
+    label: str
+    family: str = ""
+    engine: str = ""
+    version: str = ""
+    setting: str = ""
+    role: Role
+    series: str
+    series_setting: str = ""
+    dt: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement(Subject):
+    """One measured value.
+
+    Attributes
+    ----------
+    bodies, way
+        Of a run of many bodies: how many, and how they ran, such as "one at a time"; None and "" for a single body.
     quantity
-        Name of the invariant that a drift is of; else empty.
+        Name of the invariant that a drift is of, or of the statistic of an error over many bodies; else empty.
     measure, value
         Measure, and value in its unit; NaN if it could not be measured.
     outcome
@@ -49,17 +79,8 @@ class Measurement:
         Further information; may be empty.
     """
 
-    study: str
-    scene: str
-    method: str
-    label: str
-    family: str = ""
-    version: str = ""
-    setting: str = ""
-    role: Role
-    series: str
-    series_setting: str = ""
-    dt: float
+    bodies: int | None = None
+    way: str = ""
     quantity: str = ""
     measure: Measure
     value: float
@@ -67,58 +88,85 @@ class Measurement:
     detail: str = ""
 
 
-COLUMNS = (
-    *("study", "scene", "method", "label", "family", "version", "setting", "role", "series", "series_setting"),
-    *("dt", "quantity", "measure", "value", "unit"),
-    *("outcome", "reason", "step", "time", "residual", "detail"),
-)
-"""Columns of the table, in order."""
-_NUMBERS = frozenset({"dt", "value", "step", "time", "residual"})
-_AS_THEY_ARE = (
-    *("study", "scene", "method", "label", "family", "version", "setting", "series", "series_setting"),
-    *("dt", "quantity", "value", "detail"),
-)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Samples(Subject):
+    """A quantity over time in one run: times t (n,), s, and values (n,), in the unit that the study documents."""
+
+    quantity: str
+    t: Array
+    value: Array
+
+
+_SUBJECT = tuple(each.name for each in fields(Subject))
+_OUTCOME = ("outcome", "reason", "step", "time", "residual")
+COLUMNS = (*_SUBJECT, "bodies", "way", "quantity", "measure", "value", "unit", *_OUTCOME, "detail")
+"""Columns of the table of measurements, in order."""
+SAMPLE_COLUMNS = (*_SUBJECT, "quantity", "t", "value")
+"""Columns of the table of samples, in order."""
+_NUMBERS = frozenset({"seed", "body", "dt", "bodies", "value", "step", "time", "residual", "t"})
+_COUNTS = ("seed", "body", "bodies")
 
 
 def flat(row: Measurement) -> dict[str, str | float]:
-    """Return a row as text and numbers by column: enums as their texts, the outcome as its fields, nan where it has none."""
+    """Return a row as text and numbers by column: enums as their texts, the outcome as its fields, NaN for None."""
     outcome = row.outcome
-    found = {
-        **{name: getattr(row, name) for name in _AS_THEY_ARE},
-        "role": row.role.value,
+    record: dict[str, Any] = {name: getattr(row, name, None) for name in COLUMNS} | {
         "measure": row.measure.text,
         "unit": row.measure.unit,
         "outcome": outcome.kind.value,
         "reason": outcome.reason,
-        **{name: _number(getattr(outcome, name)) for name in ("step", "time", "residual")},
+        "role": row.role.value,
+        **{name: getattr(outcome, name) for name in ("step", "time", "residual")},
     }
-    return {name: found[name] for name in COLUMNS}
+    return {name: math.nan if value is None else value for name, value in record.items()}
 
 
 def from_flat(record: Mapping[str, Any]) -> Measurement:
     """Return the row of a record from `flat`; raise `KeyError` or `ValueError` for anything else."""
-    return Measurement(
-        **{name: record[name] for name in _AS_THEY_ARE},
-        role=Role(record["role"]),
-        measure=Measure.from_text(record["measure"]),
-        outcome=outcome_of(record),
-    )
+    values = {each.name: record[each.name] for each in fields(Measurement)} | {
+        "role": Role(record["role"]),
+        "measure": Measure.from_text(record["measure"]),
+        "outcome": outcome_of(record),
+    }
+    return Measurement(**values | {name: _count(record[name]) for name in _COUNTS})
+
+
+def flat_samples(samples: Samples) -> dict[str, Any]:
+    """Return samples as a record for JSON."""
+    return vars(samples) | {"role": samples.role.value, "t": samples.t.tolist(), "value": samples.value.tolist()}
+
+
+def samples_from_flat(record: Mapping[str, Any]) -> Samples:
+    """Return the samples of a record from `flat_samples`; raise `KeyError` or `ValueError` for anything else."""
+    t, value = (np.array(record[name], dtype=float) for name in ("t", "value"))
+    values = {each.name: record[each.name] for each in fields(Samples)}
+    return Samples(**values | {"role": Role(record["role"]), "t": t, "value": value})
 
 
 def outcome_of(record: Mapping[str, Any] | pd.Series[Any]) -> Outcome:
     """Return the outcome of a record, or of a row of the table."""
-    step, time, residual = (None if math.isnan(record[name]) else float(record[name]) for name in ("step", "time", "residual"))
-    kind = OutcomeKind(record["outcome"])
-    return Outcome(kind, record["reason"], None if step is None else int(step), time, residual)
+    time, residual = (None if math.isnan(record[name]) else float(record[name]) for name in ("time", "residual"))
+    return Outcome(OutcomeKind(record["outcome"]), record["reason"], _count(record["step"]), time, residual)
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+def _count(value: float) -> int | None:
+    return None if math.isnan(value) else int(value)
 
 
 def frame(rows: Iterable[Measurement]) -> pd.DataFrame:
     """Return the rows as a table: columns as `COLUMNS` has them, text as `string`, numbers as `float64`."""
     import pandas as pd  # here, so that the command line answers --help without it
 
-    table = pd.DataFrame([flat(row) for row in rows], columns=list(COLUMNS))
-    return table.astype({name: "float64" if name in _NUMBERS else "string" for name in COLUMNS})
+    return _typed(pd.DataFrame([flat(row) for row in rows], columns=list(COLUMNS)))
+
+
+def samples_frame(lines: Iterable[Samples]) -> pd.DataFrame:
+    """Return a table with a row for each sample: columns as `SAMPLE_COLUMNS` has them, typed as in `frame`."""
+    import pandas as pd
+
+    parts = [pd.DataFrame(flat_samples(line), columns=list(SAMPLE_COLUMNS)) for line in lines]
+    return _typed(pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(SAMPLE_COLUMNS)))
+
+
+def _typed(table: pd.DataFrame) -> pd.DataFrame:
+    return table.astype({name: "float64" if name in _NUMBERS else "string" for name in table.columns})

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
+import conservative
 from conservative.attitude import Array
+from conservative.declarations import Maker
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -16,34 +18,46 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.measure import Value
-from ..measures.measurement import Measurement
-from ..measures.samples import Samples
+from ..measures.measurement import Measurement, Samples
 from ..measures.timing import Preparation, prepare_and_run
-from .method_names import names_of
+from .selection import Missing, series, tolerance_setting
+
+
+class Drawn(NamedTuple):
+    """A random body: its field or kind, the seed, and its index (None for an ensemble)."""
+
+    field: str = ""
+    seed: int | None = None
+    body: int | None = None
+
+
+NOT_DRAWN = Drawn()
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and a method on a grid within a study."""
+    """A scene and a method on a grid within a study; `drawn` if the scene is a random body."""
 
     study: str
     scene: Scene
     method: Method
     grid: Grid
+    drawn: Drawn = NOT_DRAWN
 
     @cached_property
-    def _names(self) -> dict[str, Any]:
-        """The names of the method, looked up once: the version of an engine can be in a file."""
-        return asdict(names_of(self.method))
+    def _subject(self) -> dict[str, Any]:
+        """Columns that all rows share, looked up once: the version of an engine can be in a file."""
+        subject = {"study": self.study, "scene": self.scene.name, **self.drawn._asdict(), **names_of(self.method)}
+        return subject | {"role": Role(self.method.role), "dt": self.grid.dt}
 
-    def row(self, value: Value, outcome: Outcome = OK, detail: str = "") -> Measurement:
+    def row(
+        self, value: Value, outcome: Outcome = OK, detail: str = "", bodies: int | None = None, way: str = ""
+    ) -> Measurement:
         """Return one row."""
         return Measurement(
-            study=self.study,
-            scene=self.scene.name,
-            **self._names,
-            role=Role(self.method.role),
-            dt=self.grid.dt,
+            **self._subject,
+            bodies=bodies,
+            way=way,
             quantity=value.quantity,
             measure=value.measure,
             value=float(value.value),
@@ -53,20 +67,33 @@ class Case:
 
     def samples(self, quantity: str, t: Array, value: Array) -> Samples:
         """Return one line: values (n,) at times (n,), s."""
-        return Samples(
-            study=self.study,
-            scene=self.scene.name,
-            **self._names,
-            role=Role(self.method.role),
-            dt=self.grid.dt,
-            quantity=quantity,
-            t=t,
-            value=value,
-        )
+        return Samples(**self._subject, quantity=quantity, t=t, value=value)
 
     def blanks(self, values: Iterable[Value], outcome: Outcome) -> list[Measurement]:
         """Return a row without a value for each: what could not be measured is in the table, too."""
         return [self.row(value.blank, outcome) for value in values]
+
+
+def names_of(method: Method) -> dict[str, str]:
+    """Return the columns with names of a method; see `Measurement`."""
+    if isinstance(method, Missing):  # as it was asked for: the engine that knows its version and settings is not there
+        family, _, setting = method.wanted.partition(":")
+        texts = {"label": method.wanted, "family": family, "engine": family, "version": "", "setting": setting}
+        return {"method": method.wanted, **texts, "series": series(method), "series_setting": setting}
+    try:
+        label, maker = method.label, method.maker
+    except MissingEngine:
+        label, maker = method.name, Maker(conservative.__name__)
+    return {
+        "method": method.name,
+        "label": label,
+        "family": method.family,
+        "engine": getattr(method, "engine", method.family) if method.role == Role.ENGINE else "",
+        "version": "" if maker.package == conservative.__name__ else maker.version,
+        "setting": method.setting(),
+        "series": series(method),
+        "series_setting": method.setting(without=tolerance_setting(method)),
+    }
 
 
 @dataclass(frozen=True)

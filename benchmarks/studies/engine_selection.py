@@ -75,7 +75,7 @@ def _environments() -> Iterator[Environment]:
 def _version_here(family: type[Method]) -> str | None:
     """Return the version of an engine beside us; None where it is not installed."""
     try:
-        return family().label.partition("/")[0].partition("==")[2]
+        return family().maker.version
     except MissingEngine:
         return None
 

@@ -23,7 +23,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value
-from ..measures.samples import Samples
+from ..measures.measurement import Samples
 from .case import Case
 from .study import Finding, Progress, Study
 

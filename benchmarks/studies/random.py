@@ -40,10 +40,10 @@ from ..measures.cost_at_error import cost, credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
-from .case import Case, Failure, Success
+from .case import Case, Drawn, Failure, Success
 from .selection import Missing, at_tolerance, series, takes_exact_steps, tolerance_setting
 from .speed import keep_end
-from .study import Progress, Study
+from .study import Progress, Study, Truths
 from .time_limit import attempt_here
 
 DECADES = tuple(10.0**-k for k in range(2, 13))
@@ -77,17 +77,28 @@ TIME = Value(Measure.TIME, math.nan)
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
 
 
-def bodies(number: int, seed: int) -> tuple[Scene, ...]:
-    """Return that many random bodies in each field; the first ones are the same whatever the number.
+@dataclass(frozen=True)
+class RandomStudy(Study):
+    """The study of random bodies; `drawn` are the field, seed and index of each scene."""
+
+    drawn: tuple[Drawn, ...] = ()
+
+
+def random_study(
+    methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False
+) -> RandomStudy:
+    """Return the study of that many random bodies in each field; the first ones are the same whatever the number.
 
     Raises
     ------
     BadInput
-        number is not an integer of 1 or more, or seed not one of 0 or more.
+        bodies is not an integer of 1 or more, seed not one of 0 or more, or there is no method.
     """
-    positive_integer("bodies", number)
-    places = ((field, index) for field in FIELDS for index in range(number))
-    return tuple(random_body(field, seed, index).rename(name_of(field, seed, index)) for field, index in places)
+    positive_integer("bodies", bodies)
+    places = [(field, seed, index) for field in FIELDS for index in range(bodies)]
+    scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
+    drawn = tuple(Drawn(*place) for place in places)
+    return RandomStudy("random", scenes, methods, quick, skip_missing, Truths(precise), drawn=drawn)
 
 
 def settings(method: Method) -> tuple[Method, ...]:
@@ -133,30 +144,34 @@ Line = list[Point]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
+    assert isinstance(study, RandomStudy)
     methods = list({series(method): method for method in study.competitors}.values())
     pieces = len(methods) + 2
-    for i, scene in enumerate(study.scenes):
+    for i, (scene, drawn) in enumerate(zip(study.scenes, study.drawn, strict=True)):
         progress(i * pieces, len(study.scenes) * pieces, f"{scene.name}: truth")
-        truth = study.truth(scene, Grid(scene.t_end / SAMPLES, SAMPLES)).trajectory
+        coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
+        truth = study.truth(scene, coarsest).trajectory
         found: list[Line] = []
         for j, method in enumerate(methods, start=1):
             progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
-            found.append((yield from measure_line(study, cases(study, scene, method), truth)))
+            found.append(
+                (yield from measure_line(study, cases(study.quick, Case(study.name, scene, method, coarsest, drawn)), truth))
+            )
         chosen = worth_timing(found)
         progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(chosen)} settings")
         yield from time_rows(study, chosen)
         yield from (point.case.row(TIME, UNTIMED) for line in found for point in line if point not in chosen)
 
 
-def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the settings of a line, coarse to fine; the one whose row says so of a method that cannot do the scene."""
-    setting, few = tolerance_setting(method), FEW if study.quick else slice(None)
-    grid = Grid(scene.t_end / SAMPLES, SAMPLES)
-    if method.unsupported(scene) or takes_exact_steps(method):
-        return [Case(study.name, scene, method, grid)]
-    if setting is None:
-        return [Case(study.name, scene, method, Grid(scene.t_end / n, n, n // SAMPLES)) for n in STEPS[few]]
-    return [Case(study.name, scene, each, grid) for each in at_tolerances(method, setting, TOLERANCES[few])]
+def cases(quick: bool, case: Case) -> list[Case]:
+    """Return the settings of a line, coarse to fine; only the given case if the method does not support the scene."""
+    method, t_end = case.method, case.scene.t_end
+    tolerance, few = tolerance_setting(method), FEW if quick else slice(None)
+    if method.unsupported(case.scene) or takes_exact_steps(method):
+        return [case]
+    if tolerance is None:
+        return [replace(case, grid=Grid(t_end / n, n, n // SAMPLES)) for n in STEPS[few]]
+    return [replace(case, method=each) for each in at_tolerances(method, tolerance, TOLERANCES[few])]
 
 
 def at_tolerances(method: Method, setting: str, tolerances: Iterable[float]) -> Iterator[Method]:

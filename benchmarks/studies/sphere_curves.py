@@ -16,7 +16,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.samples import Samples
+from ..measures.measurement import Samples
 from .case import Case, Failure
 from .long_runs import case_for
 from .study import Progress, Study

@@ -29,10 +29,8 @@ from . import (
     sphere_curves,
     stability,
     throughput,
-    throughput_extent,
     work_precision,
 )
-from .ensembles import KINDS, draw
 from .study import Finding, Maker, Progress, Study, Truths
 
 MAKERS: Mapping[str, Maker] = {
@@ -88,30 +86,6 @@ def list_hard_studies(
         Study("stability", selection.scenes(stability.SCENES), methods, **options),
         Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), **options),
     )
-
-
-def random_study(methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False) -> Study:
-    """Return the study of that many random bodies in each field.
-
-    Raises
-    ------
-    BadInput
-        bodies is not an integer of 1 or more, seed not one of 0 or more, or there is no method.
-    """
-    return Study(RANDOM, random.bodies(bodies, seed), methods, quick, skip_missing, Truths(random.precise))
-
-
-def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> throughput_extent.ThroughputStudy:
-    """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword, fewer bodies if it is quick.
-
-    Raises
-    ------
-    BadInput
-        A number is not an integer of 1 or more, a seed not one of 0 or more, or there is no method.
-    """
-    scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
-    usual = {"sizes": throughput_extent.QUICK_SIZES, "bodies": throughput_extent.QUICK_BODIES} if quick else {}
-    return throughput_extent.ThroughputStudy(THROUGHPUT, scenes, methods, quick, **{**usual, **extent})
 
 
 def _silent(done: int, total: int, what: str) -> None:

@@ -13,8 +13,7 @@ from conservative.method import Method, Role
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 
-from ..measures.measurement import Measurement
-from ..measures.samples import Samples
+from ..measures.measurement import Measurement, Samples
 
 Progress = Callable[[int, int, str], None]
 """Called before each piece of work: pieces done, pieces in all, and what comes next."""

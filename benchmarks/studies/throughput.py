@@ -18,12 +18,14 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from conservative.attitude import Array, angle_between
 from conservative.batch import Batch
-from conservative.errors import MissingEngine
+from conservative.check import positive_integer
+from conservative.errors import BadInput, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method
 from conservative.outcome import Outcome, OutcomeKind
@@ -33,27 +35,85 @@ from ..measures.cost_at_error import credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved
-from .case import Case
-from .ensembles import DURATION, draw
+from .case import Case, Drawn
+from .ensembles import DURATION, KINDS, draw
 from .many_runs import ManyDone, Way, attempt_many, list_ways
 from .selection import Missing, at_tolerance, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
 from .study import Progress, Study
-from .throughput_extent import (
-    ERRORS,
-    EXACT,
-    EXACT_STEPS,
-    FEW,
-    MEDIAN,
-    MOST,
-    PREPARATION,
-    QUICK_ROUNDS,
-    ROUNDS,
-    SAMPLES,
-    STEPS,
-    TOLERANCES,
-    ThroughputStudy,
+
+ERRORS = (1e-3, 1e-6, 1e-9)
+"""Attitude errors, rad, at which methods are compared."""
+SAMPLES = 12
+"""Instants at which errors are read."""
+STEPS = tuple(
+    SAMPLES * k for k in (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, 128, 181, 256, 362, 512, 724, 1024, 1448, 2048)
 )
+"""Steps of the motion, long to short."""
+EXACT_STEPS = 120
+"""Steps of exact solutions, whose length is free."""
+TOLERANCES = tuple(10.0**-k for k in range(1, 14))
+FEW = slice(1, None, 3)
+"""What a quick study takes of both."""
+SIZES, QUICK_SIZES = tuple(10**k for k in range(7)), (1, 100)
+"""Numbers of bodies."""
+BODIES, QUICK_BODIES = 64, 8
+"""Bodies whose errors are read."""
+PREPARATION = 8.0
+"""How many times longer than a call its preparation may take."""
+ROUNDS, QUICK_ROUNDS = 5, 3
+MEDIAN, MOST = "median", "95 %"
+"""Which error of the bodies a value is of."""
+EXACT = "closed form"
+"""Detail of errors that do not depend on the step."""
+
+
+@dataclass(frozen=True)
+class ThroughputStudy(Study):
+    """The study, of so many bodies.
+
+    Attributes
+    ----------
+    sizes
+        Numbers of bodies that are timed.
+    bodies, seed
+        Number of bodies whose errors are read, and where they are drawn from.
+
+    Raises
+    ------
+    BadInput
+        As `Study` does, and where a size or `bodies` is not an integer of 1 or more.
+    """
+
+    sizes: tuple[int, ...] = SIZES
+    bodies: int = BODIES
+    seed: int = 0
+
+    @property
+    def longest_errors(self) -> float:
+        """Longest run, s, on the way to smaller errors."""
+        return 4 * self.longest_run
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for size in self.sizes:
+            positive_integer("sizes", size)
+        if not self.sizes:
+            raise BadInput("sizes", "none", "one or more")
+        positive_integer("bodies", self.bodies)
+
+
+def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent: Any) -> ThroughputStudy:
+    """Return the study of many random bodies; `extent` has fields of `ThroughputStudy` by keyword, fewer bodies if it is quick.
+
+    Raises
+    ------
+    BadInput
+        A number is not an integer of 1 or more, a seed not one of 0 or more, or there is no method.
+    """
+    scenes = tuple(draw(kind, 1, extent.get("seed", 0)).scene for kind in KINDS)
+    usual = {"sizes": QUICK_SIZES, "bodies": QUICK_BODIES} if quick else {}
+    return ThroughputStudy("throughput", scenes, methods, quick, **{**usual, **extent})
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +155,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         except MissingEngine as error:
             if not study.skip_missing:
                 raise
-            case = Case(study.name, scene, Missing("heyoka", "heyoka", "heyoka"), Grid(DURATION / SAMPLES, SAMPLES))
+            grid = Grid(DURATION / SAMPLES, SAMPLES)
+            case = Case(study.name, scene, Missing("heyoka", "heyoka", "heyoka"), grid, Drawn(scene.name, study.seed))
             yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
             continue
         points: list[Point] = []
@@ -125,7 +186,8 @@ def _attitudes(found: ManyDone | Outcome) -> Array:
 
 
 def _case(kind: Kind, method: Method, grid: Grid) -> Case:
-    return Case(kind.study.name, kind.bodies.scene, method, grid)
+    scene = kind.bodies.scene
+    return Case(kind.study.name, scene, method, grid, Drawn(scene.name, kind.study.seed))
 
 
 def list_cases(kind: Kind, method: Method) -> list[Case]:
@@ -152,28 +214,17 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
             replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit, kind.study.skip_missing
         )
         if isinstance(found, Outcome):
-            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, name_of(way, MEDIAN)), found)
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), found, bodies=len(kind.few), way=way.text)
             if way.method.unsupported(kind.bodies.scene):
                 break
             continue
         errors = read_errors(found, kind.truth)
         n = len(kind.few)
         line.append(Point(way, case, errors, found.spent / n, found.prepare / n))
-        for name, error in errors.items():
-            yield case.row(
-                Value(Measure.ATTITUDE_MAX, error, name_of(way, name)), detail=EXACT * takes_exact_steps(case.method)
-            )
+        detail = EXACT if takes_exact_steps(case.method) else ""
+        for statistic, error in errors.items():
+            yield case.row(Value(Measure.ATTITUDE_MAX, error, statistic), detail=detail, bodies=n, way=way.text)
     return line
-
-
-def say(size: int) -> str:
-    """Return a number of bodies in words."""
-    return "1 body" if size == 1 else f"{size} bodies"
-
-
-def name_of(way: Way, what: str) -> str:
-    """Return the quantity of a row: what it is of, and the way, such as `1000 bodies, one at a time`."""
-    return ", ".join(filter(None, (what, way.text)))
 
 
 def read_errors(found: ManyDone, truth: Array) -> dict[str, float]:
@@ -201,12 +252,12 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
     study, ready = kind.study, {}
     for i, point in enumerate(points):
         if reason := too_long(point, size, study.longest_run):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), reason)
+            yield point.case.row(Value(Measure.TIME, math.nan), reason, bodies=size, way=point.way.text)
             continue
         way = replace(point.way, method=point.case.method)
         found = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
         if isinstance(found, Outcome):
-            yield point.case.row(Value(Measure.TIME, math.nan, name_of(point.way, say(size))), found)
+            yield point.case.row(Value(Measure.TIME, math.nan), found, bodies=size, way=point.way.text)
         else:
             ready[str(i)] = found
     rounds = QUICK_ROUNDS if study.quick else ROUNDS
@@ -238,4 +289,5 @@ def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
     }
     for measure, value in values.items():
         outcome = UNCOUNTED if timing.outcome.ok and math.isnan(value) else timing.outcome
-        yield case.row(Value(measure, value, name_of(point.way, say(size))), outcome, str(timing) if outcome.ok else "")
+        detail = str(timing) if outcome.ok else ""
+        yield case.row(Value(measure, value), outcome, detail, bodies=size, way=point.way.text)

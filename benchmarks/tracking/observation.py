@@ -122,7 +122,7 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     n = grid_for(scene, scene.dt).n_steps
     counts = [n + more for more in MORE_STEPS]
     cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
-    setting, dt = method.label.partition("/")[2], cases[0].grid.dt
+    setting, dt = method.setting(), cases[0].grid.dt
     found = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
     first = attempt_within(study.hang_limit, cases[0], study.skip_missing)
     if isinstance(first, Failure):

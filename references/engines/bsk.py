@@ -49,5 +49,5 @@ class Basilisk(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return self.integrator + (f",tol={self.tol:g}" if self.order is None else "")
+    def setting_parts(self) -> dict[str, str]:
+        return {"integrator": self.integrator} | ({"tol": f"tol={self.tol:g}"} if self.order is None else {})

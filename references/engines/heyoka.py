@@ -11,6 +11,7 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.batch import Batch
 from conservative.check import choice, describe, finite_number, positive_integer
+from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -91,11 +92,15 @@ class Heyoka(Method):
         version("heyoka", "heyoka")
 
     @property
-    def label(self) -> str:
-        many = "".join(
-            f",{part}" for part in (self.width and f"width={self.width}", self.driver != "batch" and self.driver) if part
-        )
-        return f"heyoka=={version('heyoka', 'heyoka')}/tol={self.tol:g},{self.frame}{many}"
+    def maker(self) -> Maker:
+        return Maker("heyoka", version("heyoka", "heyoka"))
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        parts = {"tol": f"tol={self.tol:g}", "frame": self.frame}
+        if self.width:
+            parts["width"] = f"width={self.width}"
+        return parts if self.driver == "batch" else parts | {"driver": self.driver}
 
     @property
     def order(self) -> None:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 from conservative.batch import Batch
 from conservative.check import choice, positive_integer
+from conservative.declarations import Maker
 from conservative.errors import Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -68,9 +69,12 @@ class MuJoCo(Method):
         version("mujoco", "MuJoCo")
 
     @property
-    def label(self) -> str:
-        threads = "" if self.threads == 1 else f",threads={self.threads}"
-        return f"mujoco=={version('mujoco', 'MuJoCo')}/{self.integrator}{threads}"
+    def maker(self) -> Maker:
+        return Maker("mujoco", version("mujoco", "MuJoCo"))
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        return {"integrator": self.integrator} | ({} if self.threads == 1 else {"threads": f"threads={self.threads}"})
 
     @property
     def order(self) -> int:

@@ -27,5 +27,5 @@ class Nimble(EngineMethod):
     as_installed_text = ""
 
     @property
-    def setting(self) -> str:
-        return "semi-implicit Euler"
+    def setting_parts(self) -> dict[str, str]:
+        return {"integrator": "semi-implicit Euler"}

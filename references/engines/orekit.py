@@ -28,8 +28,8 @@ class Orekit(EngineMethod):
     free_only: ClassVar[str] = "TorqueFree is the motion of a free body"
 
     @property
-    def setting(self) -> str:
-        return "TorqueFree"
+    def setting_parts(self) -> dict[str, str]:
+        return {"motion": "TorqueFree"}
 
     @property
     def order(self) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from conservative.attitude import Array, from_quaternion
 from conservative.batch import Batch
 from conservative.check import choice
+from conservative.declarations import Maker
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, RunMany
@@ -59,8 +60,12 @@ class Pinocchio(Method):
         version("pin", "Pinocchio")
 
     @property
-    def label(self) -> str:
-        return f"pin=={version('pin', 'Pinocchio')}/aba+{self.scheme}"
+    def maker(self) -> Maker:
+        return Maker("pin", version("pin", "Pinocchio"))
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        return {"scheme": f"aba+{self.scheme}"}
 
     @property
     def order(self) -> int:

@@ -48,5 +48,5 @@ class Rapier(EngineMethod):
         super().__post_init__()
 
     @property
-    def setting(self) -> str:
-        return f"substeps={self.substeps}" + ",as installed" * self.as_installed
+    def setting_parts(self) -> dict[str, str]:
+        return {**super().setting_parts, "substeps": f"substeps={self.substeps}"}

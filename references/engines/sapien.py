@@ -46,5 +46,5 @@ class Sapien(EngineMethod):
         return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
 
     @property
-    def setting(self) -> str:
-        return "PhysX" + ",as installed" * self.as_installed
+    def setting_parts(self) -> dict[str, str]:
+        return {"engine": "PhysX", **super().setting_parts}

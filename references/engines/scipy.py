@@ -10,6 +10,7 @@ import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.check import choice, describe, finite_number
+from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -68,8 +69,12 @@ class SciPy(Method):
             raise BadInput("rtol", describe(self.rtol), allowed)
 
     @property
-    def label(self) -> str:
-        return f"scipy=={version('scipy', 'SciPy')}/{self.integrator},rtol={self.rtol:g}"
+    def maker(self) -> Maker:
+        return Maker("scipy", version("scipy", "SciPy"))
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        return {"integrator": self.integrator, "rtol": f"rtol={self.rtol:g}"}
 
     @property
     def order(self) -> None:

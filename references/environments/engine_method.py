@@ -17,6 +17,7 @@ import numpy as np
 from conservative import registry
 from conservative.batch import Batch
 from conservative.check import choice
+from conservative.declarations import Maker
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -110,9 +111,8 @@ class EngineMethod(Method):
         return self.family.partition("@")[0]
 
     @property
-    def label(self) -> str:
-        precision = "" if self.precision == "f64" else f",{self.precision}"
-        return f"{self.engine}=={self.environment.version}/{self.setting}{precision}"
+    def maker(self) -> Maker:
+        return Maker(self.engine, self.environment.version)
 
     @property
     def variables(self) -> Mapping[str, str]:
@@ -120,16 +120,18 @@ class EngineMethod(Method):
         return {}
 
     @property
-    def setting(self) -> str:
-        """The settings as the label has them: the first, and those that are not defaults."""
-        (_, first), *others = self._settings().items()
-        defaults = {field.name: field.default for field in fields(self)}  # type: ignore[arg-type]  # subclasses are dataclasses
-        words = [first, *("as installed" for name, value in others if name == "as_installed" and value)]
-        named = [
-            (name, value) for name, value in others if name not in ("precision", "as_installed") and value != defaults[name]
-        ]
-        words += [f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}" for name, value in named]
-        return ",".join(words)
+    def setting_parts(self) -> dict[str, str]:
+        """The first setting, those that are not defaults, and last a precision other than double."""
+        settings, parts = self._settings(), dict[str, str]()
+        for number, field in enumerate(fields(self)):  # type: ignore[arg-type]  # subclasses are dataclasses
+            name, value = field.name, settings[field.name]
+            if name == "as_installed":
+                parts |= {name: "as installed"} if value else {}
+            elif number == 0:
+                parts[name] = str(value)
+            elif name != "precision" and value != field.default:
+                parts[name] = f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
+        return parts if self.precision == "f64" else parts | {"precision": self.precision}
 
     @property
     def order(self) -> int | None:

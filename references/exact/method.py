@@ -26,7 +26,6 @@ from conservative.potentials.potential import AnyPotential
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Bounds, Counters, Trajectory
-from conservative.version import VERSION
 
 from .digits import MP_LOCK
 from .free_body import free_motion
@@ -129,10 +128,6 @@ class Exact(Method):
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
     colour: ClassVar[str] = "black"
-
-    @property
-    def label(self) -> str:
-        return f"conservative=={VERSION}/exact"
 
     @property
     def order(self) -> None:

@@ -14,9 +14,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies.study import Finding
 from conservative.errors import BadInput
 from conservative.files import remove_leftovers, write_text
@@ -167,14 +166,14 @@ def _record(result: StudyResult) -> dict[str, Any]:
     return {
         "by": vars(result.by),
         "rows": list(map(measurement.flat, result.rows)),
-        "samples": list(map(samples.flat, result.samples)),
+        "samples": list(map(measurement.flat_samples, result.samples)),
     }
 
 
 def _result(record: Mapping[str, Any]) -> StudyResult:
     return StudyResult(
         tuple(map(measurement.from_flat, record["rows"])),
-        tuple(map(samples.from_flat, record["samples"])),
+        tuple(map(measurement.samples_from_flat, record["samples"])),
         Origin(**record["by"]),
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Progress
 
@@ -38,7 +38,7 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
     results = [checkpoint.results[name] for name in plan.names]
     return Measurements(
         measurement.frame(row for result in results for row in result.rows),
-        samples.frame(line for result in results for line in result.samples),
+        measurement.samples_frame(line for result in results for line in result.samples),
     )
 
 

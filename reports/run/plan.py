@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from conservative.benchmarks.studies import engine_selection, many_runs, random, selection, studies
+from conservative.benchmarks.studies import engine_selection, many_runs, random, selection, studies, throughput
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
@@ -110,7 +110,7 @@ def plan_report(
     made: list[Study] = []
     # Random bodies come first, as the page shows them first. A method that takes none of them leaves the study out.
     if bodies and (drawn := random.select(every)):
-        made.append(studies.random_study(drawn, bodies, seed, quick, skip_missing))
+        made.append(random.random_study(drawn, bodies, seed, quick, skip_missing))
     # In the order of the table of all studies.
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
@@ -121,5 +121,5 @@ def plan_report(
         made += studies.list_hard_studies(compared, skip_missing, time_limit)
     # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
     if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *found), quick=True))):
-        made.append(studies.throughput_study(many, quick=True, seed=seed, skip_missing=skip_missing, time_limit=time_limit))
+        made.append(throughput.throughput_study(many, quick=True, seed=seed, skip_missing=skip_missing, time_limit=time_limit))
     return Plan(chosen, compared, tuple(made), found, quick, skip_missing, png, time_limit, bodies, seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
-from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.studies import (
     engine_selection,
     hard_cases,
@@ -15,6 +15,7 @@ from conservative.benchmarks.studies import (
     selection,
     stability,
     studies,
+    throughput,
 )
 from conservative.benchmarks.studies.study import Finding, Progress, Study
 from conservative.check import choice
@@ -72,12 +73,12 @@ def plan_study(
         compared = tuple(dict.fromkeys((*named, *others)))
     if name == studies.RANDOM:
         number = DEFAULT_BODIES if bodies is None else bodies
-        return studies.random_study(compared, number, seed or 0, quick, skip_missing)
+        return random.random_study(compared, number, seed or 0, quick, skip_missing)
     if name == studies.THROUGHPUT:
         counts = tuple(read_count("sizes", size) for size in sizes)
         numbers = {"sizes": counts or None, "bodies": bodies, "seed": seed, "time_limit": time_limit}
         given = {key: value for key, value in numbers.items() if value is not None}
-        return studies.throughput_study(compared, quick=quick, skip_missing=skip_missing, **given)
+        return throughput.throughput_study(compared, quick=quick, skip_missing=skip_missing, **given)
     if name == "hard_cases":
         compared = hard_cases.settings(compared)
     if scenes:
@@ -132,5 +133,5 @@ def measure_study(study: Study, progress: Progress, scheduler: str | None = None
     every = list(findings)
     return Measurements(
         measurement.frame(each for each in every if isinstance(each, measurement.Measurement)),
-        samples.frame(each for each in every if isinstance(each, samples.Samples)),
+        measurement.samples_frame(each for each in every if isinstance(each, measurement.Samples)),
     )

@@ -39,8 +39,8 @@ class EngineRow:
 
     Attributes
     ----------
-    engine, label
-        Such as `exudyn==1.13.6`, and the same with the setting.
+    engine, label, setting
+        Such as `exudyn==1.13.6`, `exudyn==1.13.6/RK4` and `RK4`.
     series
         What its line of steps or tolerances is called.
     bits
@@ -65,6 +65,7 @@ class EngineRow:
 
     engine: str
     label: str
+    setting: str
     series: str
     outcome: Outcome = OK
     bits: float = math.nan
@@ -104,8 +105,8 @@ def points_of(table: pd.DataFrame) -> pd.DataFrame:
 def _row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[str, pd.DataFrame]) -> EngineRow:
     first = rows.iloc[0]
     line = lines.get(first["series"], rows.iloc[:0])
-    engine = f"{first['label']}".partition("/")[0]
-    row = EngineRow(engine, str(first["label"]), str(first["series"]), _outcome(rows))
+    engine = "==".join(filter(None, (first["engine"], first["version"])))
+    row = EngineRow(engine, str(first["label"]), str(first["setting"]), str(first["series"]), _outcome(rows))
     row = replace(row, **_facts(rows), **_errors(rows), **_order(line))
     second = work_precision.cost(timed[first["series"]], ERROR) if first["series"] in timed else math.nan
     has_step = not math.isnan(row.expected_order)

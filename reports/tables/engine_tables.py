@@ -156,12 +156,8 @@ def _pair(engine: str, rows: Sequence[EngineRow]) -> Row:
 
 def _short(row: EngineRow) -> list[str | Cell]:
     if math.isnan(row.error):
-        return [_setting(row), outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
-    return [_setting(row), number(row.error), drift(row.energy), turns(row)]
-
-
-def _setting(row: EngineRow) -> str:
-    return row.label.partition("/")[2]
+        return [row.setting, outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
+    return [row.setting, number(row.error), drift(row.energy), turns(row)]
 
 
 def versions(locks: Iterable[tuple[str, str, int]], beside_us: Iterable[str]) -> Table:

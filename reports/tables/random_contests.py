@@ -7,7 +7,6 @@ What a side needs on a body to reach an error is the least that any of its lines
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -23,7 +22,6 @@ from conservative.outcome import OutcomeKind
 
 ANY = "cheapest engine"
 """Stands for all engines: on each body, the cheapest of them."""
-_FIELD = re.compile(r"field=(\w+)")
 
 
 class Cheapest(NamedTuple):
@@ -37,6 +35,7 @@ class Pair(NamedTuple):
     """What both sides need on a body; None where a side does not get there."""
 
     scene: str
+    body: int
     ours: Cheapest | None
     engine: Cheapest | None
 
@@ -96,22 +95,18 @@ def contests(table: pd.DataFrame) -> tuple[Contest, ...]:
     lines = costs(table)
     scenes = list(dict.fromkeys(scene for scene, _ in lines))
     engines = list(dict.fromkeys(side for _, side in lines if side != Role.OURS))
+    drawn = {row["scene"]: (row["field"], int(row["body"])) for row in table[table["study"] == RANDOM].to_dict("records")}
     fields: dict[str, list[str]] = {}
     for scene in scenes:
-        fields.setdefault(_field(scene), []).append(scene)
+        fields.setdefault(drawn[scene][0], []).append(scene)
     rivals = {ANY: engines, **{engine: [engine] for engine in engines}} if engines else {}
     return tuple(
-        Contest(field, rival, error, tuple(_pair(lines, scene, members, error) for scene in bodies))
+        Contest(field, rival, error, tuple(_pair(lines, scene, drawn[scene][1], members, error) for scene in bodies))
         for rival, members in rivals.items()
         for field, bodies in fields.items()
         if any(lines.get((scene, member)) for scene in bodies for member in members)
         for error in DECADES
     )
-
-
-def _field(scene: str) -> str:
-    found = _FIELD.search(scene)
-    return found[1] if found else scene
 
 
 def costs(table: pd.DataFrame, by_family: bool = False) -> Costs:
@@ -134,8 +129,8 @@ def _columns(points: Iterable[Mapping[str, float]]) -> tuple[list[float], list[f
     return [point[Measure.ATTITUDE_MAX.text] for point in good], [point.get(Measure.TIME.text, math.nan) for point in good]
 
 
-def _pair(lines: Costs, scene: str, engines: Iterable[str], error: float) -> Pair:
-    return Pair(scene, _cheapest(lines, scene, [Role.OURS], error), _cheapest(lines, scene, engines, error))
+def _pair(lines: Costs, scene: str, body: int, engines: Iterable[str], error: float) -> Pair:
+    return Pair(scene, body, _cheapest(lines, scene, [Role.OURS], error), _cheapest(lines, scene, engines, error))
 
 
 def _cheapest(lines: Costs, scene: str, sides: Iterable[str], error: float) -> Cheapest | None:

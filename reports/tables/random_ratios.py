@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,6 @@ TERMS = (
     "ratio."
 )
 """What the tables mean."""
-_INDEX = re.compile(r"index=(\d+)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +49,6 @@ def view(found: Sequence[Contest], bodies: int, seed: int) -> RandomView:
     return RandomView(bodies, seed, statements(found), as_table(found), by_engine(found), chart_points(found))
 
 
-def _index(scene: str) -> str:
-    found = _INDEX.search(scene)
-    return found[1] if found else scene
-
-
 def as_table(found: Iterable[Contest], engine: str = ANY) -> Table:
     """Return the contests against an engine, a row for each field and error."""
     header = ["field", "error, rad", "bodies", "mean", "worst", "best", "worst body", "ours, most often", "engine, most often"]
@@ -65,7 +58,7 @@ def as_table(found: Iterable[Contest], engine: str = ANY) -> Table:
 def _row(contest: Contest) -> list[str | Cell]:
     ratios = [_grade(value) for value in (contest.mean, contest.worst, contest.best)]
     winners = [_most_often(found) for found in ([p.ours for p in contest.both], [p.engine for p in contest.both])]
-    worst = _index(contest.both[0].scene) if contest.both else DASH
+    worst = str(contest.both[0].body) if contest.both else DASH
     return [contest.field, tolerance(contest.error), count_text(contest), *ratios, worst, *winners]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
-from conservative.benchmarks.studies.method_names import names_of
+from conservative.benchmarks.studies.case import names_of
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..labels import display_name
@@ -36,7 +36,7 @@ def method_text(advice: Advice) -> str:
     if advice.best is None:
         return advice.line.replace(":", " ")
     names = names_of(advice.best.method)
-    return display_name(names.family, names.version, names.series_setting)
+    return display_name(names["family"], names["version"], names["series_setting"])
 
 
 def json_text(recommendation: Recommendation) -> str:

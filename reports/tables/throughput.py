@@ -10,7 +10,7 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN
+from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN
 from conservative.outcome import OutcomeKind
 
 from .cells import DASH, Cell, Grade, Table, number, tolerance

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,11 +12,10 @@ import pandas as pd
 from conservative.benchmarks.measures.cost_at_error import cost
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput_extent import ERRORS, MEDIAN, MOST
+from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
 
 from .classes import OF_ENGINES, MethodClass, class_of
 
-_SIZE = re.compile(r"(\d+) (?:body|bodies)")
 Setting = dict[tuple[str, int], float]
 """Values of one setting by measure and number of bodies; errors by which one they are, and 0."""
 
@@ -82,14 +80,14 @@ def lines(table: pd.DataFrame) -> tuple[Line, ...]:
     for row in table[table["study"] == THROUGHPUT].to_dict("records"):
         if row["measure"] == Measure.AGREEMENT.text:
             continue
-        what, _, way = str(row["quantity"]).partition(", ")
+        way = row["way"]
         line = found.setdefault((row["scene"], row["line"], way), _line(row, way))
         key = (row["scene"], row["method"], row["dt"], way)
         if key not in settings:
             line.settings.append(settings.setdefault(key, {}))
-        size = _SIZE.fullmatch(what)
         if math.isfinite(row["value"]):
-            settings[key][(row["measure"], int(size[1])) if size else (what, 0)] = float(row["value"])
+            what = (row["quantity"], 0) if row["quantity"] else (row["measure"], int(row["bodies"]))
+            settings[key][what] = float(row["value"])
     return tuple(line for line in found.values() if any(line.settings) or line.group is MethodClass.SOLUTION)
 
 

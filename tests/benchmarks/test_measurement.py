@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure, Value, blanks
-from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, frame, from_flat, outcome_of
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures.measurement import COLUMNS, Measurement, Samples, frame, from_flat, outcome_of
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
 
@@ -25,7 +24,7 @@ ROW = Measurement(
     value=1e-15,
 )
 FAILED = dataclasses.replace(ROW, value=math.nan, outcome=Outcome(OutcomeKind.NOT_CONVERGED, "why", 3, 0.02, 0.5))
-NUMBERS = {"dt", "value", "step", "time", "residual"}
+NUMBERS = {"seed", "body", "bodies", "dt", "value", "step", "time", "residual"}
 LINE = Samples(
     study="long_runs",
     scene="brick_flip",
@@ -82,15 +81,15 @@ def test_every_measure_is_found_by_its_text():
 
 
 def test_samples_survive_json():
-    again = samples.from_flat(json.loads(json.dumps(samples.flat(LINE))))
+    again = measurement.samples_from_flat(json.loads(json.dumps(measurement.flat_samples(LINE))))
     assert (again.role, again.quantity, again.dt) == (LINE.role, LINE.quantity, LINE.dt)
     np.testing.assert_array_equal(again.t, LINE.t)
     np.testing.assert_array_equal(again.value, LINE.value)
 
 
 def test_the_table_of_samples_has_a_row_for_each():
-    full, empty = samples.frame([LINE, LINE]), samples.frame([])
-    assert list(full.columns) == list(empty.columns) == list(samples.COLUMNS)
+    full, empty = measurement.samples_frame([LINE, LINE]), measurement.samples_frame([])
+    assert list(full.columns) == list(empty.columns) == list(measurement.SAMPLE_COLUMNS)
     assert (full.dtypes == empty.dtypes).all()
     assert full["t"].tolist() == [*LINE.t, *LINE.t]
     assert full.index.tolist() == list(range(2 * len(LINE.t)))

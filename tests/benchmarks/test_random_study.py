@@ -11,7 +11,6 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, Point
-from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
@@ -27,7 +26,8 @@ METHODS = (cv.Projected(), method("heyoka"))
 @pytest.fixture(scope="module")
 def rows():
     """Rows of one body in uniform gravity, of a quick study."""
-    study = replace(studies.random_study(METHODS, 1, 3, quick=True), scenes=random.bodies(1, 3)[:1])
+    every = random.random_study(METHODS, 1, 3, quick=True)
+    study = replace(every, scenes=every.scenes[:1], drawn=every.drawn[:1])
     return list(studies.findings(study))
 
 
@@ -36,18 +36,27 @@ def made_up(name, error, spent):
     return Point(Case("random", SCENE, method(name), Grid(0.1, 12)), None, error, spent)
 
 
+def line_of(value, quick=False):
+    """The settings of a method on one body."""
+    return random.cases(quick, Case("random", BODY, value, Grid(BODY.t_end / SAMPLES, SAMPLES)))
+
+
 def test_bodies_are_the_first_ones_whatever_their_number():
-    few, many = random.bodies(2, 3), random.bodies(5, 3)
+    few, many = (random.random_study(METHODS, number, 3).scenes for number in (2, 5))
     assert len(many) == 5 * len(FIELDS)
     by_name = {scene.name: scene for scene in many}
     assert all(np.array_equal(scene.w_WB_B0, by_name[scene.name].w_WB_B0) for scene in few)
     assert {scene.name for scene in few} < set(by_name)
 
 
+def test_rows_have_field_seed_and_index_of_their_body(rows):
+    assert {(row.field, row.seed, row.body) for row in rows} == {("gravity", 3, 0)}
+
+
 @pytest.mark.parametrize(("bodies", "seed", "argument"), [(0, 0, "bodies"), (1.5, 0, "bodies"), (1, -1, "seed")])
 def test_bad_numbers(bodies, seed, argument):
     with pytest.raises(cv.BadInput) as caught:
-        random.bodies(bodies, seed)
+        random.random_study(METHODS, bodies, seed)
     assert caught.value.argument == argument
 
 
@@ -67,7 +76,7 @@ def test_errors_fall_as_far_as_the_last_decade(rows):
 
 
 def test_all_settings_are_read_at_the_same_instants():
-    times = [case.grid.t for each in METHODS for case in random.cases(Study("random", (BODY,), METHODS), BODY, each)]
+    times = [case.grid.t for each in METHODS for case in line_of(each)]
     assert {len(t) for t in times} == {SAMPLES + 1}
     assert all(np.allclose(t, times[0], rtol=1e-12, atol=0) for t in times)
 
@@ -78,13 +87,12 @@ def test_ours_with_a_tolerance_are_among_the_settings():
 
 
 def test_both_sides_have_as_many_settings():
-    study = Study("random", (BODY,), METHODS)
-    assert [len(random.cases(study, BODY, each)) for each in METHODS] == [17, 17]
-    assert [len(random.cases(replace(study, quick=True), BODY, each)) for each in METHODS] == [9, 9]
+    assert [len(line_of(each)) for each in METHODS] == [17, 17]
+    assert [len(line_of(each, quick=True)) for each in METHODS] == [9, 9]
 
 
 def test_a_tolerance_that_an_engine_does_not_take_is_left_out():
-    scipy = [case.method.rtol for case in random.cases(Study("random", (SCENE,), METHODS), SCENE, method("scipy"))]
+    scipy = [case.method.rtol for case in line_of(method("scipy"))]
     assert min(scipy) == 1e-13
 
 

@@ -8,8 +8,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.measures.timing import Timing
 from conservative.benchmarks.recommendation import recommend
 from conservative.benchmarks.studies import long_runs, paper_figures, speed, sphere_curves, stability, studies

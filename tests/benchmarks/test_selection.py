@@ -8,10 +8,10 @@ import pytest
 
 from conservative import BadInput, MissingEngine, Reduced, registry
 from conservative.benchmarks.studies import engine_selection, selection
-from conservative.benchmarks.studies.case import Case, attempt
+from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
-from conservative.benchmarks.studies.method_names import drop_tolerance, names_of
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
+from conservative.declarations import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.outcome import OutcomeKind
@@ -169,9 +169,7 @@ class Adaptive(Method):
     family: ClassVar[str] = "adaptive"
     role: ClassVar[Role] = Role.ENGINE
 
-    @property
-    def label(self):
-        return f"theirs==1.0/{self.name}"
+    maker = Maker("theirs", "1.0")
 
     @property
     def order(self):
@@ -194,26 +192,23 @@ class Adaptive(Method):
         ("pinocchio:RK4", ("pinocchio", "VERSION", "aba+RK4"), "aba+RK4"),
     ],
 )
-def test_the_parts_of_a_name(method, parts, of_series):
+def test_the_columns_of_a_method(method, parts, of_series):
     value = registry.method(method)
     found = names_of(value)
-    version = value.label.partition("==")[2].partition("/")[0]
-    assert (found.family, found.version, found.setting) == tuple(version if part == "VERSION" else part for part in parts)
-    assert found.series_setting == of_series
-    assert (found.method, found.label) == (value.name, value.label)
+    expected = tuple(value.maker.version if part == "VERSION" else part for part in parts)
+    assert (found["family"], found["version"], found["setting"]) == expected
+    assert found["engine"] == ("" if value.role != Role.ENGINE else found["family"])
+    assert found["series_setting"] == of_series
+    assert (found["method"], found["label"]) == (value.name, value.label)
 
 
 def test_a_method_of_another_package_has_its_version_and_its_name_once():
     found = names_of(Adaptive(stol=4, tol=1e-9))
-    assert (found.family, found.version, found.setting) == ("adaptive", "1.0", "stol=4,tol=1e-09")
-    assert (found.series, found.series_setting) == ("adaptive:stol=4", "stol=4")
-
-
-def test_only_the_tolerance_is_dropped():
-    assert drop_tolerance(Adaptive(), "stol=3,tol=1e-06,x") == "stol=3,x"
+    assert (found["family"], found["version"], found["setting"]) == ("adaptive", "1.0", "stol=4,tol=1e-09")
+    assert (found["series"], found["series_setting"]) == ("adaptive:stol=4", "stol=4")
 
 
 def test_a_method_whose_engine_is_missing_is_called_as_it_was_asked_for():
     found = names_of(Missing("mujoco:RK4", "MuJoCo", "mujoco"))
-    assert (found.family, found.version, found.setting) == ("mujoco", "", "RK4")
-    assert found.label == "mujoco:RK4"
+    assert (found["family"], found["version"], found["setting"]) == ("mujoco", "", "RK4")
+    assert found["label"] == "mujoco:RK4"

@@ -51,25 +51,27 @@ def test_bodies_differ_and_stay_what_they_are_in_larger_numbers():
 
 @pytest.fixture(scope="module")
 def rows():
-    study = studies.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=4)
+    study = throughput.throughput_study((Ours("RK4"), MuJoCo("Euler"), Fails()), quick=True, sizes=(1, 3), bodies=4)
     tops = throughput.ThroughputStudy(study.name, study.scenes[:1], study.methods, True, sizes=(1, 3), bodies=4)
     return list(studies.rows(tops))
 
 
-def of(rows, method, measure, quantity):
-    return [row for row in rows if (row.family, row.measure, row.quantity) == (method, measure, quantity)]
+def of(rows, method, measure, **fields):
+    found = [row for row in rows if (row.family, row.measure) == (method, measure)]
+    return [row for row in found if all(getattr(row, name) == value for name, value in fields.items())]
 
 
 def test_errors_fall_and_times_are_of_each_number_of_bodies(rows):
-    errors = [row.value for row in of(rows, "ours", Measure.ATTITUDE_MAX, "median")]
+    errors = [row.value for row in of(rows, "ours", Measure.ATTITUDE_MAX, quantity="median", way="")]
     assert len(errors) >= 4
     assert errors[-1] < 1e-4 < errors[0]
-    for size in ("1 body", "3 bodies", "3 bodies, one at a time", "3 bodies, 2 threads"):
-        times = of(rows, "ours", Measure.TIME, size)
+    for size, way in ((1, ""), (3, ""), (3, "one at a time"), (3, "2 threads")):
+        times = of(rows, "ours", Measure.TIME, bodies=size, way=way)
         assert times
         assert all(row.value > 0 or row.outcome.kind is OutcomeKind.SKIPPED for row in times)
-    assert not of(rows, "mujoco", Measure.TIME, "3 bodies")  # Euler does not get to the least error within the time
-    assert not of(rows, "mujoco", Measure.ATTITUDE_MAX, "median, one at a time")
+    assert not of(rows, "mujoco", Measure.TIME, bodies=3)  # Euler does not get to the least error within the time
+    assert not of(rows, "mujoco", Measure.ATTITUDE_MAX, way="one at a time")
+    assert {(row.field, row.seed) for row in rows} == {("heavy_tops", 0)}
 
 
 def test_the_truths_agree(rows):
@@ -79,7 +81,7 @@ def test_the_truths_agree(rows):
 
 
 def test_an_engine_that_raises_has_a_row(rows):
-    found = of(rows, "fails", Measure.ATTITUDE_MAX, "median")
+    found = of(rows, "fails", Measure.ATTITUDE_MAX, quantity="median")
     assert {row.outcome.kind for row in found} == {OutcomeKind.CRASHED}
     with pytest.raises(RuntimeError):
         many_runs.attempt_many(Way(OursFails()), draw("heavy_tops", 2), Grid(0.1, 2), 10.0)
@@ -97,10 +99,10 @@ def test_without_a_truth_there_is_one_row_of_each_kind(monkeypatch):
         raise MissingEngine("heyoka", "heyoka")
 
     monkeypatch.setattr(throughput, "Heyoka", refuse)
-    skipping = studies.throughput_study((Ours(),), quick=True, skip_missing=True)
+    skipping = throughput.throughput_study((Ours(),), quick=True, skip_missing=True)
     assert [row.outcome.kind for row in studies.rows(skipping)] == [OutcomeKind.MISSING] * 2
     with pytest.raises(MissingEngine):
-        list(studies.rows(studies.throughput_study((Ours(),), quick=True)))
+        list(studies.rows(throughput.throughput_study((Ours(),), quick=True)))
 
 
 class OursFails(Fails):
@@ -144,4 +146,4 @@ def fake(method):
 @pytest.mark.parametrize("extent", [{"sizes": (0,)}, {"sizes": ()}, {"bodies": 0}, {"time_limit": -1.0}])
 def test_numbers_that_make_no_study(extent):
     with pytest.raises(BadInput):
-        studies.throughput_study((Ours(),), **extent)
+        throughput.throughput_study((Ours(),), **extent)

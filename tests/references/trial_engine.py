@@ -26,8 +26,8 @@ class Trial(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("trial", "numpy")
 
     @property
-    def setting(self):
-        return self.do
+    def setting_parts(self):
+        return {"do": self.do}
 
     @property
     def order(self):

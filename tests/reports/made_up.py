@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from conservative import Reduced, registry
-from conservative.benchmarks.measures import samples
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures.measurement import Samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.study import Study
@@ -51,7 +51,8 @@ def measurements():
     names = ({"method": name, "label": name, "series": name, **parts(name)} for name in ("reduced", "mujoco"))
     lines = [Samples(**names_of, t=t, value=1e-15 * t, **common) for names_of in names]
     return Measurements(
-        table().drop(columns=["name", "line"]), samples.frame([*lines, *curves(registry.scene("brick_flip"), Reduced())])
+        table().drop(columns=["name", "line"]),
+        measurement.samples_frame([*lines, *curves(registry.scene("brick_flip"), Reduced())]),
     )
 
 

@@ -10,7 +10,7 @@ from conservative.reports.labels import with_names
 
 def row(study, method, measure, value, dt=0.1, **fields):
     """A row of a made-up study; `measure` may be a text such as `energy drift max`."""
-    quantity = ""
+    quantity = fields.pop("quantity", "")
     if isinstance(measure, str):
         if " drift " in measure:
             quantity, measure = measure.split(" drift ")
@@ -20,6 +20,7 @@ def row(study, method, measure, value, dt=0.1, **fields):
     common = {"scene": "made_up", "label": method, "role": Role.OURS, "series": method, **parts(method), **fields}
     common["role"] = Role(common["role"])
     common.setdefault("series_setting", common["setting"])
+    common.setdefault("engine", common["family"] if common["role"] == Role.ENGINE else "")
     return Measurement(
         study=study,
         method=method,

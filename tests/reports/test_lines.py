@@ -7,10 +7,9 @@ import pytest
 
 from conservative import Reduced, RigidBody, Scene, registry, scenes
 from conservative.attitude import rotation_about
-from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.measures.measurement import Measurement
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import sphere_curves, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
@@ -45,7 +44,7 @@ def drifts(*settings):
         )
         for kept, tol in settings
     ]
-    return lines.drifts(with_names(samples.frame(found)))
+    return lines.drifts(with_names(measurement.samples_frame(found)))
 
 
 def test_of_several_tolerances_the_loosest_and_the_tightest_are_drawn():
@@ -62,7 +61,7 @@ def test_fewer_samples_keep_the_last_of_each_line():
 
 @pytest.mark.parametrize("name", ["brick_flip", "lagrange_top"])
 def test_curves_lie_on_the_unit_sphere(name):
-    found = lines.curves(with_names(samples.frame(curves(registry.scene(name), registry.method("reduced")))))
+    found = lines.curves(with_names(measurement.samples_frame(curves(registry.scene(name), registry.method("reduced")))))
     assert np.abs(np.linalg.norm(found[["x", "y", "z"]].to_numpy(), axis=1) - 1).max() < 1e-13  # measured 3e-16
     assert 200 < len(found) <= sphere_curves.SAMPLES
 
@@ -72,7 +71,7 @@ def test_polhode_is_the_same_whatever_the_body_axes():
     S = rotation_about((1.0, 2.0, -0.5), 0.7)
     turned = Scene("turned", RigidBody(S.T @ base.body.inertia @ S), base.R_WB0 @ S, S.T @ base.w_WB_B0, base.t_end, dt=base.dt)
     one, other = (
-        np.abs(lines.curves(with_names(samples.frame(curves(scene, Reduced()))))[["x", "y", "z"]].to_numpy())
+        np.abs(lines.curves(with_names(measurement.samples_frame(curves(scene, Reduced()))))[["x", "y", "z"]].to_numpy())
         for scene in (base, turned)
     )
     assert np.abs(one - other)[:50].max() < 1e-9  # measured 3e-13
@@ -94,7 +93,7 @@ def study():
     scenes = tuple(map(registry.scene, ("brick_flip", "lagrange_top")))
     found = list(studies.findings(Study("paper_figures", scenes, (registry.method("reduced"),))))
     samples_of = [each for each in found if isinstance(each, Samples)]
-    return measurement.frame(each for each in found if isinstance(each, Measurement)), samples.frame(samples_of)
+    return measurement.frame(each for each in found if isinstance(each, Measurement)), measurement.samples_frame(samples_of)
 
 
 def test_body_rates_reverse_twice():

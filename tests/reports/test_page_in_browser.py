@@ -14,7 +14,7 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.comparison.compare import judge
-from conservative.benchmarks.measures import measurement, samples
+from conservative.benchmarks.measures import measurement
 from conservative.reports import document
 from conservative.reports.page import figures, page
 from conservative.reports.page.versions import render_comparison
@@ -231,7 +231,7 @@ def engines_page(tmp_path_factory):
         *at_step("b==2", "Euler", 0.2),
     ]
     plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
-    view = build(plan, Measurements(measurement.frame(rows), samples.frame([])), provenance([]))
+    view = build(plan, Measurements(measurement.frame(rows), measurement.samples_frame([])), provenance([]))
     file = tmp_path_factory.mktemp("page") / "index.html"
     file.write_text(page.render(view, figures.charts(view)), encoding="utf-8")
     with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:

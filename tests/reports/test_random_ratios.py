@@ -27,7 +27,7 @@ FIELD = "spring"
 
 def line(index, method, role, points, field=FIELD, **fields):
     """Rows of a line of settings on a body: pairs of an error and a time, coarse to fine."""
-    common = {"scene": name_of(field, 7, index), "role": role, **fields}
+    common = {"scene": name_of(field, 7, index), "field": field, "seed": 7, "body": index, "role": role, **fields}
     return [
         row("random", method, measure, value, dt, **common)
         for dt, point in enumerate(points)
@@ -105,10 +105,8 @@ def test_every_decade_and_every_field_has_its_row():
 
 
 def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
-    missing = row(
-        "random", "mujoco", Measure.ATTITUDE_MAX, math.nan, scene=name_of(FIELD, 7, 0), role="engine", outcome="unsupported"
-    )
-    assert {each.engine for each in found(*TWICE, [missing])} == {ANY, "heyoka"}
+    missing = line(0, "mujoco", "engine", [(math.nan, math.nan)], outcome="unsupported")
+    assert {each.engine for each in found(*TWICE, missing)} == {ANY, "heyoka"}
 
 
 def test_without_an_engine_there_is_nothing_to_say():

@@ -7,7 +7,7 @@ import pytest
 
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies.throughput_extent import EXACT
+from conservative.benchmarks.studies.throughput import EXACT
 from conservative.reports import document, view
 from conservative.reports.labels import with_names
 from conservative.reports.run.measure import Measurements
@@ -25,20 +25,16 @@ GENERAL, SOLUTION = MethodClass.GENERAL, MethodClass.SOLUTION
 
 def line(method, role, points, way="", scene="heavy_tops", detail="", sizes=(10, 1000)):
     """Rows of a line: pairs of an error, which is that of the median and a tenth of that of the 95th percentile, and a time."""
-    common, found = {"scene": scene, "role": role}, []
+    common = {"scene": scene, "role": role, "way": way}
+    found = []
     for dt, (error, time) in enumerate(points, start=1):
         for which, value in (("median", error), ("95 %", 10 * error)):
-            found.append((dt, Measure.ATTITUDE_MAX, value, which, detail))
+            found.append(row("throughput", method, Measure.ATTITUDE_MAX, value, dt, quantity=which, detail=detail, **common))
         for size in sizes:
-            found.append((dt, Measure.TIME, time * (2 if size == 10 else 1), f"{size} bodies", ""))
-            found.append((dt, Measure.BODY_STEPS, 1 / time, f"{size} bodies", ""))
-    return [
-        measurement.Measurement(
-            **{**vars(row("throughput", method, measure, value, dt, detail=said, **common)), "quantity": name}
-        )
-        for dt, measure, value, what, said in found
-        for name in [", ".join(filter(None, (what, way)))]
-    ]
+            a_body = time * (2 if size == 10 else 1)
+            found.append(row("throughput", method, Measure.TIME, a_body, dt, bodies=size, **common))
+            found.append(row("throughput", method, Measure.BODY_STEPS, 1 / time, dt, bodies=size, **common))
+    return found
 
 
 OURS = line("taylor", "ours", [(1e-3, 1e-6), (1e-6, 2e-5), (1e-10, 4e-5)])

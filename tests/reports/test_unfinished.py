@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from conservative import BadInput, NotConverged
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures.measurement import Samples
 from conservative.method import Role
 from conservative.reports import document
 from conservative.reports.cli.main import main

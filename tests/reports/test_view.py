@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from conservative import Gauss, Method, Reduced, registry
-from conservative.benchmarks.measures import measurement, samples
-from conservative.benchmarks.measures.samples import Samples
+from conservative.benchmarks.measures import measurement
+from conservative.benchmarks.measures.measurement import Samples
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
@@ -52,7 +52,7 @@ def report():
     found = [finding for scene in plan.scenes for finding in curves(scene, Reduced())]
     found += studies.findings(Study("paper_figures", plan.scenes, plan.methods))
     lines = [finding for finding in found if isinstance(finding, Samples)]
-    return plan, Measurements(measurements().table, samples.frame(lines)), provenance(["report"])
+    return plan, Measurements(measurements().table, measurement.samples_frame(lines)), provenance(["report"])
 
 
 def test_what_renders_the_view_integrates_nothing_and_starts_nothing(report, nothing_is_measured, tmp_path):
@@ -135,7 +135,7 @@ def built():
     found += convergence("gauss:stages=2", 4, "lagrange_top")
     drifts = [line("long_runs", scene, "energy") for scene in SCENES]
     table = frame(found).drop(columns=["name", "line"])
-    return view.build(plan, Measurements(table, samples.frame(drifts)), provenance(["report"])), plan, table
+    return view.build(plan, Measurements(table, measurement.samples_frame(drifts)), provenance(["report"])), plan, table
 
 
 def test_scenes_are_those_of_the_plan_in_its_order(built):
@@ -168,7 +168,7 @@ def test_curves_that_are_missing_are_named(built):
     """Both methods should have one, and none has."""
     assert all("reduced" in scene.without_curve for scene in built[0].scenes)
     drawn = dataclasses.replace(built[1], scenes=built[1].scenes[:1])
-    curve = samples.frame([line("sphere_curves", "brick_flip", quantity) for quantity in ("x", "y", "z")])
+    curve = measurement.samples_frame([line("sphere_curves", "brick_flip", quantity) for quantity in ("x", "y", "z")])
     table = built[2]
     found = view.build(drawn, Measurements(table, curve), provenance(["report"]))
     assert "reduced" not in found.scenes[0].without_curve
