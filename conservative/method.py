@@ -5,15 +5,28 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from functools import wraps
+from typing import Any, ClassVar, Self
 
-from .declarations import Candidacy, Cost, Maker, maker_of, refuse_time, setting_texts, settings_text
-from .declarations import Role as Role
+from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
+from .card import Role as Role
 from .grid import Grid, grid_for
 from .scene import Scene
 from .trajectory import Bounds, Trajectory, accept
 
 Run = Callable[[], Trajectory]
+
+
+def _refuse_time(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
+    """Extend `Method.unsupported` by the reason for potentials that depend on time, which most methods do not support."""
+
+    @wraps(unsupported)
+    def reason(method: Method, scene: Scene) -> str | None:
+        if getattr(scene.potential, "time_dependent", False) and not method.card.time_dependent:
+            return "it is for fields that do not depend on time; integrate(scene, error=1e-9) chooses a method for others"
+        return unsupported(method, scene)
+
+    return reason
 
 
 class Method(ABC):
@@ -25,28 +38,17 @@ class Method(ABC):
     ----------
     family, role
         Name of its entry point, and its role: ours, engine or truth.
-    candidacy
-        How the automatic choice considers it; None if it does not.
-    colour
-        A name in `conservative.reports.charts.style.PALETTE`, or a colour such as "#0072B2"; None for any free colour.
-    module, kernel
-        Python module of an engine, and module in `conservative.kernels` whose function `enter` makes all steps of a run; ""
-        for none.
-    time_dependent
-        Whether it supports potentials that depend on time. If not, `unsupported` reports such scenes automatically.
+    card
+        Settings for tables and benchmarks, place in the automatic choice, colour; every entry has a default.
     """
 
     family: ClassVar[str]
     role: ClassVar[Role]
-    candidacy: ClassVar[Candidacy | None] = None
-    colour: ClassVar[str | None] = None
-    module: ClassVar[str] = ""
-    kernel: ClassVar[str] = ""
-    time_dependent: ClassVar[bool] = False
+    card: ClassVar[Card] = Card()
 
     def __init_subclass__(cls) -> None:
         if "unsupported" in vars(cls):
-            cls.unsupported = refuse_time(cls.unsupported)  # type: ignore[method-assign]
+            cls.unsupported = _refuse_time(cls.unsupported)  # type: ignore[method-assign]
 
     @property
     def name(self) -> str:
@@ -92,12 +94,7 @@ class Method(ABC):
         """
         return Bounds(drift=1e-3, orthonormality=0.1)
 
-    @property
-    def cost(self) -> Cost:
-        """Cost of its work, for the automatic choice; default: that of an explicit step of order 8."""
-        return Cost(step=340.0)
-
-    @refuse_time
+    @_refuse_time
     def unsupported(self, scene: Scene) -> str | None:
         """Return the reason why the scene is not supported, or None."""
         return None
@@ -136,29 +133,20 @@ class Method(ABC):
         return self.check(scene, grid, self.prepare(scene, grid)())
 
     @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        """Return the settings that tables and generic tests include."""
-        return (cls(),)
+    def settings_for(cls, purpose: Purpose) -> tuple[Self, ...]:
+        """Return the methods that `card` lists for a purpose, such as "variants" or "suite"."""
+        return tuple(cls.configure(text) for text in cls.card.settings(purpose))
 
     @classmethod
-    def candidate_settings(cls) -> tuple[Method, ...]:
-        """Return the settings that the automatic choice probes if the first one supports the scene; default: all variants."""
-        return cls.variants()
+    def configure(cls, settings: str) -> Self:
+        """Return the method with settings as in a name, such as "RK4,threads=2".
 
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        """Return the settings that the benchmark suite times; default: all variants."""
-        return cls.variants()
-
-    @classmethod
-    def many_settings(cls) -> tuple[Method, ...]:
-        """Return the settings measured on many bodies, the representative one first; default: those of the suite."""
-        return cls.suite_settings()
-
-    @classmethod
-    def picture_settings(cls) -> tuple[Method, ...]:
-        """Return the settings whose motion a report draws; default: the first that it measured."""
-        return ()
+        Raises
+        ------
+        BadInput
+            A setting is unknown or has a wrong value.
+        """
+        return call_with_settings(cls, f"method {cls.family}", settings)
 
     def run(self, scene: Scene, dt: float, t_end: float | None = None, sample_every: int = 1) -> Trajectory:
         """Return the trajectory with step size dt to t_end, s, whatever its outcome. `integrate` raises exceptions instead.

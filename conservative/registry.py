@@ -18,17 +18,16 @@ that runs in an environment of its own is named alike, `exudyn:RK44`, with its v
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
-from .check import describe, printable_text, real_number
+from .card import call_with_settings
+from .check import printable_text
 from .deferred_imports import ENGINES, METHODS, SCENES, list_entries, load_entry
 from .errors import BadInput, MissingEngine, NotLoadable, nearest
 from .method import Method
 from .scene import Scene
 
-T = TypeVar("T")
 _NAME = "a name with its settings, a text"
 
 
@@ -75,9 +74,9 @@ def scene(text: str) -> Scene:
         from .scene_files.scene_file import load
 
         return load(text)
-    name, settings = _split(text)
+    name, _, settings = text.partition(":")
     builder: Callable[..., Scene] = load_entry(SCENES, "scene", name)
-    return _call(builder, f"scene {name}", settings)
+    return call_with_settings(builder, f"scene {name}", settings)
 
 
 def method(text: str) -> Method:
@@ -92,17 +91,12 @@ def method(text: str) -> Method:
     MissingEngine
         The engine is not installed.
     """
-    name, settings = _split(printable_text("method", text, _NAME))
+    name, _, settings = printable_text("method", text, _NAME).partition(":")
     family = _load_method(name)
     if getattr(family, "family", None) != name:
         got = f"{name!r}, whose class {family.__name__} has family = {getattr(family, 'family', None)!r}"
         raise BadInput("method", got, f"family = {name!r}: the name that is registered")
-    return _call(family, f"method {name}", settings)
-
-
-def configure(family: type[Method], settings: str) -> Method:
-    """Return a method of a class with settings as a name has them, such as `RK4,threads=2`. Raise `BadInput` as `method`."""
-    return _call(family, f"method {family.family}", _split(f":{settings}")[1])
+    return family.configure(settings)
 
 
 def _load_method(name: str) -> type[Method]:
@@ -133,48 +127,3 @@ def _load_family(name: str) -> type[Method] | None:
         return None
     whole = isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name
     return family if whole else None
-
-
-def _split(text: str) -> tuple[str, list[str]]:
-    name, _, rest = text.partition(":")
-    return name, [item.strip() for item in rest.split(",") if item.strip()]
-
-
-def _call(target: Callable[..., T], argument: str, settings: list[str]) -> T:
-    """Return what a registered function or class makes of the settings; what it does not take is bad input."""
-    arguments = _arguments(argument, target, settings)
-    try:
-        return target(**arguments)
-    except BadInput:
-        raise
-    except (ArithmeticError, TypeError, ValueError) as error:
-        raise BadInput(argument, describe(",".join(settings)), f"settings that it takes ({error})") from error
-
-
-def _arguments(argument: str, target: Callable[..., object], settings: list[str]) -> dict[str, Any]:
-    """Return keyword arguments from `key=value` items; items without a key go to the parameters in their order."""
-    parameters = list(inspect.signature(target).parameters)
-    found: dict[str, Any] = {}
-    for position, item in enumerate(settings):
-        key, equals, value = item.partition("=")
-        if not equals:
-            key, value = parameters[position] if position < len(parameters) else item, item
-        if key not in parameters:
-            raise BadInput(argument, describe(item), f"settings {nearest(key, parameters)}" if parameters else "no settings")
-        found[key] = _value(value)
-        default = inspect.signature(target).parameters[key].default
-        if isinstance(default, bool):
-            if not isinstance(found[key], bool):
-                raise BadInput(argument, describe(item), f"{key}=true or {key}=false")
-        elif isinstance(default, int | float) and real_number(found[key]) is None:
-            raise BadInput(argument, describe(item), f"{key}=a number, such as {default!r}, its default")
-    return found
-
-
-def _value(text: str) -> object:
-    for convert in (int, float):
-        try:
-            return convert(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False, "none": None}.get(text.lower(), text)

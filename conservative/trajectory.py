@@ -158,7 +158,7 @@ def accept(found: Any, scene: Scene, steps: Grid, method: Any, bounds: Bounds) -
     """
     mistake = _find_mistake(found, scene, steps)
     kept = method.conserves
-    if mistake is None and method.kernel and found.failure is None and _is_kept(found, steps, kept, bounds):
+    if mistake is None and method.card.kernel and found.failure is None and _is_kept(found, steps, kept, bounds):
         return found
     with np.errstate(all="ignore"):
         mistake = mistake or _find_misplaced(found, steps)

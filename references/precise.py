@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conservative.attitude import from_quaternion, to_quaternion
+from conservative.card import Card, Maker
 from conservative.check import describe, positive_integer
-from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -61,8 +61,7 @@ class Precise(Method):
 
     family: ClassVar[str] = "precise"
     role: ClassVar[Role] = Role.TRUTH
-    colour: ClassVar[str] = "grey"
-    time_dependent: ClassVar[bool] = True
+    card: ClassVar[Card] = Card(report=(), colour="grey", time_dependent=True)
 
     def __post_init__(self) -> None:
         _check_bits(self.bits)

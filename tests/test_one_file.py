@@ -16,7 +16,7 @@ SOURCE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-from conservative.declarations import Candidacy, Cost
+from conservative.card import Card, Cost
 from conservative.method import Method, Role
 from conservative.methods.reduced import Reduced
 
@@ -29,8 +29,15 @@ class Borrowed(Method):
 
     family: ClassVar[str] = "borrowed"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(-1, "implicit")
-    colour: ClassVar[str] = "#123456"
+    card: ClassVar[Card] = Card(
+        variants=("parts=1", "parts=2", "parts=3"),
+        suite=("parts=2",),
+        pictures=("parts=3",),
+        rank=-1,
+        group="implicit",
+        cost=lambda method: Cost(step=1e-9),
+        colour="#123456",
+    )
 
     @property
     def order(self):
@@ -40,27 +47,11 @@ class Borrowed(Method):
     def conserves(self):
         return frozenset({"energy"})
 
-    @property
-    def cost(self):
-        return Cost(step=1e-9)
-
-    @classmethod
-    def variants(cls):
-        return cls(1), cls(2), cls(3)
-
-    @classmethod
-    def suite_settings(cls):
-        return (cls(2),)
-
-    @classmethod
-    def picture_settings(cls):
-        return (cls(3),)
-
     def prepare(self, scene, grid):
         return Reduced().prepare(scene, grid)
 '''
 SILENT = (
-    SOURCE.partition("    candidacy:")[0]
+    SOURCE.partition("    card:")[0]
     + """
     order = None
 

@@ -39,9 +39,15 @@ def _methods(names: list[str]) -> Iterator[Method]:
     families = registry.list_families()
     for name in names or sorted(name for name, family in families.items() if family.role == Role.OURS):
         if name in families:
-            yield from getattr(families[name], "suite_settings", families[name].variants)()
+            yield from _suite_settings(families[name])
         elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
             yield registry.method(name)
+
+
+def _suite_settings(family: Any) -> tuple[Method, ...]:
+    if hasattr(family, "settings_for"):
+        return tuple(family.settings_for("suite"))
+    return tuple(getattr(family, "suite_settings", family.variants)())  # versions before cards
 
 
 def describe_scene(given: SimpleNamespace) -> Callable[[], Answer]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import conservative
 from conservative.attitude import Array
-from conservative.declarations import Maker
+from conservative.card import Maker
 from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run

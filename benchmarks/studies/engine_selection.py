@@ -84,7 +84,7 @@ def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
     engine, version = split_requirement(name)
     family = _family(engine, version)
     try:
-        return tuple(dict.fromkeys((*_as_installed(family), *family.variants())))
+        return tuple(dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants"))))
     except MissingEnvironment as error:
         if not skip_missing:
             raise
@@ -107,11 +107,6 @@ def _family(engine: str, version: str) -> type[Method]:
     return found.at_version(version) if version else found
 
 
-def _as_installed(family: type[Method]) -> tuple[Method, ...]:
-    defaults = getattr(family, "user_defaults", lambda: None)()
-    return () if defaults is None else (defaults,)
-
-
 def is_as_installed(method: Method) -> bool:
     """Whether a method is its engine as installed, with nothing set but the step."""
-    return not isinstance(method, Missing) and method in _as_installed(type(method))
+    return not isinstance(method, Missing) and method in method.settings_for("as_installed")

@@ -61,7 +61,7 @@ def list_ways(method: Method) -> tuple[Way, ...]:
 
 def takes_many(method: Method) -> bool:
     """Return whether a method offers to run many bodies at once, at least those of some scenes."""
-    return type(method).prepare_many is not Method.prepare_many and bool(method.many_settings())
+    return bool(method.card.many)
 
 
 class RunBlocks:
@@ -171,7 +171,7 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
 
 def settings(method: Method) -> tuple[Method, ...]:
     """Return the settings that a family's name stands for, where throughput is compared; none of what runs single bodies."""
-    return method.many_settings() if takes_many(method) else ()
+    return method.settings_for("many")
 
 
 def families(methods: tuple[Method, ...], quick: bool = False) -> Iterator[Method]:

@@ -106,9 +106,10 @@ def settings(method: Method) -> tuple[Method, ...]:
 
     Of ours they are those that the automatic choice probes, and those with a tolerance; of engines all.
     """
-    approximate = method.candidacy is not None and not method.candidacy.exact
-    ours = (*method.candidate_settings(), *filter(tolerance_setting, method.variants())) if approximate else ()
-    found = ours if method.role == Role.OURS else method.variants()
+    found = method.settings_for("variants")
+    if method.role == Role.OURS:
+        approximate = method.card.rank is not None and not method.card.exact
+        found = (*method.settings_for("candidates"), *filter(tolerance_setting, found)) if approximate else ()
     return tuple(each for each in found if (each.order or ORDER) >= ORDER)
 
 

@@ -13,24 +13,6 @@ from conservative.method import Method, Role
 from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
-MAIN_METHODS = {
-    "convected": ("convected",),
-    "gauss": ("gauss",),
-    "lame": ("lame",),
-    "moser_veselov": ("moser_veselov",),
-    "projected": ("projected",),
-    "reduced": ("reduced", "reduced:order=8"),
-    "substepped": (),  # Reduced where it converges, as on both default scenes
-    "taylor": ("taylor:order=12",),
-    "heyoka": ("heyoka", "heyoka:frame=non_spinning", "heyoka:frame=lean"),
-    "mujoco": ("mujoco:integrator=Euler", "mujoco"),
-    "pinocchio": ("pinocchio",),
-    "scipy": ("scipy",),
-    "exact": (),
-    "precise": (),
-}
-"""Settings that a report takes of each family by default: the paper's, a family's own default, and the fastest on the default
-scenes (brick_flip, lagrange_top). Of a family that is not listed here, such as one from another package, it takes all."""
 TOLERANCES = ("tol", "rtol", "tolerance")
 """Settings that adaptive methods trade accuracy with, in place of dt."""
 
@@ -40,7 +22,7 @@ Settings = Callable[[Method], tuple[Method, ...]]
 
 def all_variants(method: Method) -> tuple[Method, ...]:
     """Return all settings that a method's family offers."""
-    return method.variants()
+    return method.settings_for("variants")
 
 
 @dataclass(frozen=True)
@@ -113,11 +95,13 @@ def methods(
 
 
 def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
-    """Return the methods that a report takes by default: `MAIN_METHODS`, and all of other families. Raises as `methods`."""
-    listed = [name for names in MAIN_METHODS.values() for name in names]
-    chosen = methods(listed, skip_missing, lambda method: (method,))
-    others = [family for family in registry.list_methods() if family not in MAIN_METHODS]
-    return tuple(dict.fromkeys((*chosen, *methods(others, skip_missing)))) if others else chosen
+    """Return the methods that a report includes by default: those of `Card.report` in all families. Raises as `methods`."""
+    families = registry.list_families()
+    names = []
+    for name in registry.list_methods():
+        settings = families[name].card.settings("report") if name in families else ("",)
+        names += [f"{name}:{setting}" if setting else name for setting in settings]
+    return methods(names, skip_missing, lambda method: (method,))
 
 
 def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:

@@ -44,9 +44,9 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods that are drawn: of each family its `picture_settings`, or the first where it has none of those."""
+    """Return the methods that are drawn: of each family those of `Card.pictures`, or the first where it has none of those."""
     competitors = [method for method in methods if method.role != Role.TRUTH]
-    preferred = [method for method in competitors if method in method.picture_settings()]
+    preferred = [method for method in competitors if method in method.settings_for("pictures")]
     firsts = {method.family: method for method in reversed(competitors)}
     return preferred + [method for family, method in reversed(firsts.items()) if family not in {m.family for m in preferred}]
 

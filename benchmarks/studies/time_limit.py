@@ -82,7 +82,7 @@ def is_known_to_end(method: Method) -> bool:
 
 def is_bounded(method: Method) -> bool:
     """Whether a run ends for certain: our own kernels take a known number of steps, and truths limit themselves."""
-    return bool(method.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
+    return bool(method.card.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
 
 
 def _is_ours(method: Method) -> bool:

@@ -111,8 +111,8 @@ def _hash(content: object) -> str:
 
 
 def points() -> Iterator[Point]:
-    """Yield the points: `suite_settings` of every registered method, of other packages as well, on every scene of the suite."""
-    found = selection.methods(skip_missing=True, settings=lambda method: method.suite_settings())
+    """Yield the points: the settings of `Card.suite` of every registered method on every scene of the suite."""
+    found = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
     methods = [method for method in found if method.role != Role.TRUTH]
     truths = Truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)

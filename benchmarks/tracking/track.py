@@ -134,7 +134,7 @@ def make_plan(environments: Iterable[Environment], settings: Iterable[str], scen
     require_several([environment.version for environment in found])
     if not settings:  # those of the methods that tables show, and of the engine as installed
         family: type[EngineMethod] = registry.engine(found[-1].engine).at_version(found[-1].version)
-        shown = (*family.variants(), *filter(None, [family.user_defaults()]))
+        shown = (*family.settings_for("variants"), *family.settings_for("as_installed"))
         settings = tuple(dict.fromkeys(method.name.partition(":")[2] for method in shown))
     methods = tuple(
         {each.version: registry.method(f"{each.engine}@{each.version}:{setting}") for each in found} for setting in settings

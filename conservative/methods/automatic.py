@@ -5,7 +5,7 @@
    estimate that is reported: a trial cannot see how much a scene amplifies errors later on. Where it is above what was asked
    for, the step is cut and the run repeated, as long as that is not what rounding the scene causes.
 
-Which families are candidates, and what their work costs, they say themselves: `Method.candidacy`, `Method.cost`.
+Which families are candidates, and what their work costs, is on their cards: `Method.card`.
 
 Source: step doubling as in Richardson's extrapolation; the rest is our own.
 """

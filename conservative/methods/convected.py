@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..attitude import Array
+from ..card import Card
 from ..check import positive_number
 from ..errors import NotConverged
 from ..grid import Grid
@@ -44,7 +45,7 @@ class Convected(Method):
 
     family: ClassVar[str] = "convected"
     role: ClassVar[Role] = Role.OURS
-    colour: ClassVar[str] = "sky"
+    card: ClassVar[Card] = Card(pictures=("",), colour="sky")
 
     def __post_init__(self) -> None:
         positive_number("tol", self.tol)
@@ -59,10 +60,6 @@ class Convected(Method):
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid, self.tol, None)
-
-    @classmethod
-    def picture_settings(cls) -> tuple[Convected, ...]:
-        return (cls(),)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

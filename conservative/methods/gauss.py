@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Array, axes_about, from_quaternion, triple
+from ..card import Card, Cost
 from ..check import choice, describe, positive_integer
-from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
@@ -61,9 +61,17 @@ class Gauss(Method):
 
     family: ClassVar[str] = "gauss"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(3, "implicit", longest=1.5)
-    colour: ClassVar[str] = "indigo"
-    kernel: ClassVar[str] = "gauss"
+    card: ClassVar[Card] = Card(
+        variants=("stages=2", "stages=4", "stages=6", "stages=8"),
+        report=("",),
+        suite=("stages=2", "stages=6"),
+        rank=3,
+        group="implicit",
+        longest=1.5,
+        cost=lambda method: Cost(step=90.0, correction=6.5 * method.stages, corrections=12.0),
+        colour="indigo",
+        kernel="gauss",
+    )
 
     def __post_init__(self) -> None:
         allowed = f"an integer of 1 to {MOST_STAGES}"
@@ -82,22 +90,10 @@ class Gauss(Method):
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid)
 
-    @property
-    def cost(self) -> Cost:
-        return Cost(step=90.0, correction=6.5 * self.stages, corrections=12.0)
-
     def unsupported(self, scene: Scene) -> str | None:
         if not isinstance(scene.potential, UniformGravity | None):
             return "collocation keeps quadratic invariants, so a free body or uniform gravity"
         return frame_unsupported(self.frame, scene)
-
-    @classmethod
-    def variants(cls) -> tuple[Gauss, ...]:
-        return tuple(cls(stages) for stages in (2, 4, 6, 8))
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Gauss, ...]:
-        return cls(2), cls(6)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -38,7 +38,7 @@ import numpy as np
 
 from ..attitude import Array, to_quaternion
 from ..batch import Batch
-from ..declarations import Candidacy
+from ..card import Card
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
@@ -72,9 +72,7 @@ class Lame(Method):
 
     family: ClassVar[str] = "lame"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(1, exact=True)
-    colour: ClassVar[str] = "olive"
-    kernel: ClassVar[str] = "lame"
+    card: ClassVar[Card] = Card(many=("",), rank=1, exact=True, colour="olive", kernel="lame")
 
     @property
     def order(self) -> None:

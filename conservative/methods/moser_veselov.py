@@ -10,8 +10,8 @@ import numpy as np
 
 from ..attitude import Array
 from ..batch import Batch
+from ..card import Card
 from ..check import choice, set_fields
-from ..declarations import Candidacy
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
@@ -67,9 +67,17 @@ class MoserVeselov(Method):
 
     family: ClassVar[str] = "moser_veselov"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(0, exact=True)
-    colour: ClassVar[str] = "wine"
-    kernel: ClassVar[str] = "moser_veselov"
+    card: ClassVar[Card] = Card(
+        variants=tuple(f"order={order}" for order in ORDERS),
+        report=("",),
+        suite=("order=2", "order=exact"),
+        many=("order=2", "order=exact"),
+        rank=0,
+        exact=True,
+        candidates=("order=exact",),
+        colour="wine",
+        kernel="moser_veselov",
+    )
 
     def __init__(self, order: int | Literal["exact"] | None = "exact") -> None:
         if order is not None:
@@ -88,18 +96,6 @@ class MoserVeselov(Method):
 
     def longest_step(self, scene: Scene) -> float:
         return 0.99 * step_limit(scene, exact=self.order is None)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(order) for order in ORDERS)
-
-    @classmethod
-    def candidate_settings(cls) -> tuple[MoserVeselov, ...]:
-        return (cls("exact"),)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[MoserVeselov, ...]:
-        return cls(2), cls("exact")
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         require_short_step(scene, grid.dt, exact=self.order is None)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..attitude import Triple, triple
-from ..declarations import Candidacy, Cost
+from ..card import Card, Cost
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL
@@ -41,10 +41,14 @@ class Projected(Method):
 
     family: ClassVar[str] = "projected"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(2, "explicit")
-    colour: ClassVar[str] = "teal"
-    kernel: ClassVar[str] = "projected"
-    time_dependent: ClassVar[bool] = True
+    card: ClassVar[Card] = Card(
+        rank=2,
+        group="explicit",
+        cost=lambda method: Cost(step=340.0, correction=80.0),
+        colour="teal",
+        kernel="projected",
+        time_dependent=True,
+    )
 
     @property
     def order(self) -> int:
@@ -56,10 +60,6 @@ class Projected(Method):
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid)
-
-    @property
-    def cost(self) -> Cost:
-        return Cost(step=340.0, correction=80.0)
 
     def unsupported(self, scene: Scene) -> str | None:
         return "it is for bodies in a field" if scene.free else None

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..batch import Batch
+from ..card import Card, Cost
 from ..check import choice, positive_number
-from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..grid import Grid
 from ..method import Method, Role, Run
@@ -77,9 +77,19 @@ class Reduced(Method):
 
     family: ClassVar[str] = "reduced"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(4, "implicit")
-    colour: ClassVar[str] = "blue"
-    kernel: ClassVar[str] = "reduced"
+    card: ClassVar[Card] = Card(
+        variants=tuple(f"order={order}" for order in BEST),
+        report=("", "order=8"),
+        suite=("order=2", "order=4", "order=6"),
+        many=("order=2", "order=4", "order=6"),
+        pictures=("",),
+        rank=4,
+        group="implicit",
+        candidates=("order=2", "order=4", "order=6", "order=8"),
+        cost=lambda method: Cost(step=10.0, correction=50.0, corrections=method.stages),
+        colour="blue",
+        kernel="reduced",
+    )
 
     def __post_init__(self) -> None:
         composition_of(self.order, self.composition)
@@ -95,27 +105,12 @@ class Reduced(Method):
         return bounds_of(scene, grid, self.tol)
 
     @property
-    def cost(self) -> Cost:
-        return Cost(step=10.0, correction=50.0, corrections=len(composition_of(self.order, self.composition).lengths(1.0)))
+    def stages(self) -> int:
+        """Number of substeps of order 2 in a step."""
+        return len(composition_of(self.order, self.composition).lengths(1.0))
 
     def unsupported(self, scene: Scene) -> str | None:
         return frame_unsupported(self.frame, scene)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(order) for order in BEST)
-
-    @classmethod
-    def candidate_settings(cls) -> tuple[Reduced, ...]:
-        return cls(2), cls(4), cls(6), cls(8)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Reduced, ...]:
-        return cls(2), cls(4), cls(6)
-
-    @classmethod
-    def picture_settings(cls) -> tuple[Reduced, ...]:
-        return (cls(),)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from .. import registry
-from ..declarations import Candidacy
 from ..errors import MissingEngine
 from ..grid import Grid
 from ..method import Method, Role
@@ -129,7 +128,7 @@ class Candidate:
     def prior_work(self) -> float:
         """Return a guess at the work, ns, from order and rate alone: error = (rate * step)^order."""
         step = 1.0 if self.method.order is None else self.goal.target ** (1 / self.method.order)
-        return self.method.cost.least * self.goal.rate * self.goal.duration / step
+        return self.method.card.cost(self.method).least * self.goal.rate * self.goal.duration / step
 
     def expected_work(self, scale: float) -> float:
         """Return the least work, ns, with which it may reach the goal; of a method not tried yet `scale` times its prior."""
@@ -201,34 +200,32 @@ def begin(method: Method, scene: Scene, goal: Goal) -> Candidate:
     """
     if method.order is None:
         return Candidate(method, goal, min(method.longest_step(scene) / 2, goal.t_end / 16))
-    longest = math.inf if method.candidacy is None else method.candidacy.longest
-    return Candidate(method, goal, min(goal.duration / 2, longest / goal.rate))
+    return Candidate(method, goal, min(goal.duration / 2, method.card.longest / goal.rate))
 
 
 def candidates(scene: Scene) -> tuple[Method, ...]:
     """Return the methods worth trying on a scene: an exact family alone where one supports it, else one of each group."""
     found: dict[str, tuple[Method, ...]] = {}
-    for family, candidacy in _ranked_families():
+    for family in _ranked_families():
         settings = _settings(family)
         if not settings or settings[0].unsupported(scene) is not None:
             continue
-        if candidacy.exact:
+        if family.card.exact:
             return settings
-        found.setdefault(candidacy.group or family.family, settings)
+        found.setdefault(family.card.group or family.family, settings)
     return tuple(chain.from_iterable(found.values()))
 
 
-def _ranked_families() -> list[tuple[type[Method], Candidacy]]:
+def _ranked_families() -> list[type[Method]]:
     """Return the families of ours that are candidates, in the order of their ranks."""
-    ours = [family for family in registry.list_families().values() if family.role == Role.OURS]
-    found = [(family, family.candidacy) for family in ours if family.candidacy is not None]
-    return sorted(found, key=lambda entry: entry[1].rank)
+    ours = (family for family in registry.list_families().values() if family.role == Role.OURS)
+    return sorted((family for family in ours if family.card.rank is not None), key=lambda family: family.card.rank or 0)
 
 
 def _settings(family: type[Method]) -> tuple[Method, ...]:
     """Return the settings of a family that are tried; none where what it needs is not installed."""
     try:
-        return family.candidate_settings()
+        return family.settings_for("candidates")
     except MissingEngine:
         return ()
 

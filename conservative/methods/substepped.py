@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from .. import registry
+from ..card import Card
 from ..check import describe, positive_integer
 from ..errors import BadInput, NotConverged
 from ..grid import Grid
@@ -40,7 +41,7 @@ class Substepped(Method):
 
     family: ClassVar[str] = "substepped"
     role: ClassVar[Role] = Role.OURS
-    time_dependent: ClassVar[bool] = True  # `unsupported` asks the other method
+    card: ClassVar[Card] = Card(report=(), time_dependent=True)  # `unsupported` asks the other method
 
     def __post_init__(self) -> None:
         positive_integer("most", self.most)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..attitude import Array, axes_about, triple
 from ..batch import Batch
+from ..card import Card, Cost
 from ..check import describe, positive_number, set_fields
-from ..declarations import Candidacy, Cost
 from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..grid import Grid
@@ -80,10 +80,19 @@ class Taylor(Method):
 
     family: ClassVar[str] = "taylor"
     role: ClassVar[Role] = Role.OURS
-    candidacy: ClassVar[Candidacy] = Candidacy(1, "explicit")
-    colour: ClassVar[str] = "#7B61FF"
-    kernel: ClassVar[str] = "taylor"
-    time_dependent: ClassVar[bool] = True
+    card: ClassVar[Card] = Card(
+        variants=("order=8", "order=12", "order=16", "tolerance=1e-9"),
+        report=("order=12",),
+        suite=("order=14",),
+        many=("order=12", "order=8", "order=10", "order=14"),
+        rank=1,
+        group="explicit",
+        candidates=("order=8", "order=12", "order=16"),
+        cost=lambda method: Cost(step=60.0 + 0.55 * method.terms**2, correction=40.0),
+        colour="#7B61FF",
+        kernel="taylor",
+        time_dependent=True,
+    )
 
     def __init__(self, order: int | None = None, tolerance: float | None = None) -> None:
         if tolerance is not None:
@@ -106,10 +115,6 @@ class Taylor(Method):
         return bounds_of(scene, Grid(grid.dt, parts * grid.n_steps, parts * grid.n_steps))
 
     @property
-    def cost(self) -> Cost:
-        return Cost(step=60.0 + 0.55 * self.terms**2, correction=40.0)
-
-    @property
     def terms(self) -> int:
         """Order of the series, also if a tolerance determines it."""
         if self.tolerance is None:
@@ -122,22 +127,6 @@ class Taylor(Method):
         if scene.derive(turning_rate) is None:
             return "it is for fields that turn about an axis at right angles to their own, as that of a satellite"
         return None
-
-    @classmethod
-    def variants(cls) -> tuple[Taylor, ...]:
-        return (*cls.candidate_settings(), cls(tolerance=1e-9))
-
-    @classmethod
-    def candidate_settings(cls) -> tuple[Taylor, ...]:
-        return tuple(cls(order) for order in (8, 12, 16))
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Taylor, ...]:
-        return (cls(14),)
-
-    @classmethod
-    def many_settings(cls) -> tuple[Taylor, ...]:
-        return tuple(cls(order) for order in (12, 8, 10, 14))
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

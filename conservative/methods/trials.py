@@ -52,7 +52,7 @@ class Estimate:
     error
         Attitude error from a run at twice the step, rad; inf where a run failed, or both have nothing in common.
     work
-        Work of the run, ns by `Method.cost`.
+        Work of the run, ns by `Card.cost`.
     sensitivity
         Attitude error that rounding inertia and start causes, rad; None if it was not asked for.
     """
@@ -232,4 +232,5 @@ def rounding_error(trajectory: Trajectory) -> float:
 
 def count_work(method: Method, trajectory: Trajectory) -> float:
     """Return the work of a run, in ns: the number of steps and of corrections, each times its cost beside those of others."""
-    return method.cost.correction * (trajectory.counters.iterations or 0) + method.cost.step * trajectory.counters.steps
+    cost, counters = method.card.cost(method), trajectory.counters
+    return cost.correction * (counters.iterations or 0) + cost.step * counters.steps

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders, jax_variables
 from ..environments.environment import Distribution
 
@@ -40,8 +42,9 @@ class Brax(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("brax", "brax", oldest="0.14")
     free_only: ClassVar[str] = "Brax reads no ball joint"
     orders: ClassVar[Orders] = {"generalized": 1, "positional": 1, "spring": 1}
-    as_installed_text = "precision=f32"
-    shown = ("generalized", "positional", "spring", "generalized,precision=f32")
+    card: ClassVar[Card] = Card(
+        variants=("generalized", "positional", "spring", "generalized,precision=f32"), as_installed=("precision=f32",)
+    )
 
     @property
     def variables(self) -> Mapping[str, str]:

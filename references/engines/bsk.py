@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import finite_number
 from conservative.errors import BadInput
 
@@ -39,9 +40,7 @@ class Basilisk(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("bsk", "Basilisk.simulation.spacecraft", oldest="2.8")
     free_only: ClassVar[str] = "a spacecraft is free: nothing in Basilisk holds a point of its hub"
     orders: ClassVar[Orders] = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
-    as_installed_text = "RK4"
-    shown = ("Euler", "RK2", "RK4", "RKF78")
-    suite = ("RK4", "RKF78")
+    card: ClassVar[Card] = Card(variants=("Euler", "RK2", "RK4", "RKF78"), suite=("RK4", "RKF78"), as_installed=("RK4",))
 
     def __post_init__(self) -> None:
         if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:

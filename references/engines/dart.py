@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod
 from ..environments.environment import Distribution
 
@@ -23,7 +25,7 @@ class Dart(EngineMethod):
     family: ClassVar[str] = "dart"
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("dartpy", "dartpy", oldest="6.19")
-    as_installed_text = ""
+    card: ClassVar[Card] = Card(as_installed=("",))
 
     @property
     def setting_parts(self) -> dict[str, str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import finite_number
 from conservative.errors import BadInput
 
@@ -37,8 +38,7 @@ class Diffrax(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("diffrax", "diffrax", oldest="0.7")
     orders: ClassVar[Orders] = {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8}
-    shown = ("", "Dopri8", "Dopri8,rtol=1e-9")
-    suite = ("", "Dopri8,rtol=1e-9")
+    card: ClassVar[Card] = Card(variants=("", "Dopri8", "Dopri8,rtol=1e-9"), suite=("", "Dopri8,rtol=1e-9"))
 
     def __post_init__(self) -> None:
         if not 0 <= finite_number("rtol", self.rtol, "a number from 0 to below 1") < 1:

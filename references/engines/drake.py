@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import finite_number
 from conservative.errors import BadInput
 
@@ -49,9 +50,11 @@ class Drake(EngineMethod):
         **{"velocity_implicit_euler": 1, "runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3},
         **{"radau1": 1, "radau3": 3},
     }
-    as_installed_text = "default"
-    shown = ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10")
-    suite = ("discrete", "runge_kutta5")
+    card: ClassVar[Card] = Card(
+        variants=("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10"),
+        suite=("discrete", "runge_kutta5"),
+        as_installed=("default",),
+    )
 
     def __post_init__(self) -> None:
         allowed = "a number above 0 up to 1, or 0 for fixed steps"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders
 from ..environments.environment import Distribution
 
@@ -42,6 +44,6 @@ class Exudyn(EngineMethod):
         **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
         **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
     }
-    as_installed_text = "default"
-    shown = ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha")
-    suite = ("RK44", "RK67")
+    card: ClassVar[Card] = Card(
+        variants=("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"), suite=("RK44", "RK67"), as_installed=("default",)
+    )

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders
 from ..environments.environment import Distribution
 
@@ -41,10 +43,12 @@ class Genesis(EngineMethod):
     family: ClassVar[str] = "genesis"
     distribution: ClassVar[Distribution] = Distribution("genesis-world", "genesis", ("torch",), oldest="1.4")
     orders: ClassVar[Orders] = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2}
-    as_installed_text = "approximate_implicitfast,precision=f32,as_installed=true"
-    shown = (
-        *("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32"),
-        as_installed_text,
+    card: ClassVar[Card] = Card(
+        variants=(
+            *("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32"),
+            "approximate_implicitfast,precision=f32,as_installed=true",
+        ),
+        as_installed=("approximate_implicitfast,precision=f32,as_installed=true",),
     )
 
     @property

@@ -10,8 +10,8 @@ import numpy as np
 
 from conservative.attitude import Array
 from conservative.batch import Batch
+from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number, positive_integer
-from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -25,6 +25,7 @@ from ..engine import STEP_LIMIT, limit_reason, pace_reason, symmetric_axes, vers
 from ..heyoka_equations import accelerations, batches, forms, formulations
 
 FRAMES = ("body", "non_spinning", "lean", "base_vectors")
+_TOLERANCES_AND_FRAMES = tuple(f"tol={tol},frame={frame}" for frame in FRAMES[:3] for tol in ("1e-6", "1e-9", "1e-12", "1e-16"))
 
 SMALLEST_TOL = 1e-20
 """A step of this tolerance has five terms more than one of 1e-16; smaller ones compile ever longer and gain nothing."""
@@ -77,9 +78,18 @@ class Heyoka(Method):
 
     family: ClassVar[str] = "heyoka"
     role: ClassVar[Role] = Role.ENGINE
-    colour: ClassVar[str] = "green"
-    module: ClassVar[str] = "heyoka"
-    time_dependent: ClassVar[bool] = True
+    card: ClassVar[Card] = Card(
+        # Base vectors are the cheapest frame to read if many samples are kept. Lean is often the same: one tolerance is enough.
+        variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors"),
+        report=("", "frame=non_spinning", "frame=lean"),
+        suite=("tol=1e-9", "tol=1e-16"),
+        many=(
+            *("frame=base_vectors", "frame=base_vectors,width=8", "frame=base_vectors,width=16"),
+            *("frame=base_vectors,driver=ensemble", "frame=lean"),
+        ),
+        colour="green",
+        time_dependent=True,
+    )
 
     def __post_init__(self) -> None:
         allowed = f"a number above 0, from {SMALLEST_TOL:g}, and below 1"
@@ -147,22 +157,6 @@ class Heyoka(Method):
             return None
         march, t = batches.MARCHES[self.driver], grid.t
         return lambda: together.read(march(together, t), len(bodies))
-
-    @classmethod
-    def many_settings(cls) -> tuple[Method, ...]:
-        widths = (cls(frame="base_vectors", width=width) for width in (None, 8, 16))
-        return *widths, cls(frame="base_vectors", driver="ensemble"), cls(frame="lean")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        tols = (1e-6, 1e-9, 1e-12, 1e-16)
-        frames = ("body", "non_spinning", "lean")
-        # Base vectors are cheapest to read where many samples are kept; lean is often the same, so that one of these will do.
-        return (*(cls(tol, frame) for frame in frames for tol in tols), cls(1e-9, "base_vectors"))
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls(1e-9), cls(1e-16)
 
 
 def _begin(integrator: Any, problem: formulations.Formulation) -> None:

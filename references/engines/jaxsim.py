@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders, jax_variables
 from ..environments.environment import Distribution
 
@@ -39,8 +41,9 @@ class JaxSim(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("jaxsim", "jaxsim", oldest="0.9")
     free_only: ClassVar[str] = "JaxSim's joints are revolute, prismatic or fixed"
     orders: ClassVar[Orders] = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
-    as_installed_text = "SemiImplicitEuler"
-    shown = ("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32")
+    card: ClassVar[Card] = Card(
+        variants=("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32"), as_installed=("SemiImplicitEuler",)
+    )
 
     @property
     def variables(self) -> Mapping[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import choice
 
 from ..environments.engine_method import EngineMethod, Orders
@@ -43,8 +44,7 @@ class JSBSim(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("jsbsim", "jsbsim", oldest="1.3")
     free_only: ClassVar[str] = "an aircraft flies: nothing in JSBSim holds one of its points"
     orders: ClassVar[Orders] = RATES
-    as_installed_text = "RectEuler"
-    shown = ("RectEuler", "Trapezoidal", "AB2", "AB5")
+    card: ClassVar[Card] = Card(variants=("RectEuler", "Trapezoidal", "AB2", "AB5"), as_installed=("RectEuler",))
 
     def __post_init__(self) -> None:
         choice("attitude", self.attitude, ("", *ATTITUDES))

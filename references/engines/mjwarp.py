@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders
 from ..environments.environment import Distribution
 
@@ -37,6 +39,4 @@ class MJWarp(EngineMethod):
     distribution: ClassVar[Distribution] = Distribution("mujoco-warp", "mujoco_warp", oldest="3.10")
     takes_gravity: ClassVar[bool] = True
     orders: ClassVar[Orders] = {"Euler": 1, "RK4": 4, "implicitfast": 1}
-    as_installed_text = "Euler"
-    shown = ("Euler", "RK4", "implicitfast")
-    many = ("RK4",)
+    card: ClassVar[Card] = Card(variants=("Euler", "RK4", "implicitfast"), many=("RK4",), as_installed=("Euler",))

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod, Orders, jax_variables
 from ..environments.environment import Distribution
 
@@ -39,9 +41,11 @@ class MJX(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("mujoco-mjx", "mujoco.mjx", oldest="3.6")
     orders: ClassVar[Orders] = {"Euler": 1, "RK4": 4, "implicitfast": 1}
-    as_installed_text = "Euler,precision=f32"
-    shown = ("Euler", "implicitfast", "RK4", "RK4,precision=f32")
-    many = ("RK4", "RK4,precision=f32")
+    card: ClassVar[Card] = Card(
+        variants=("Euler", "implicitfast", "RK4", "RK4,precision=f32"),
+        many=("RK4", "RK4,precision=f32"),
+        as_installed=("Euler,precision=f32",),
+    )
 
     @property
     def variables(self) -> Mapping[str, str]:

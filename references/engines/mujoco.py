@@ -13,8 +13,8 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 from conservative.batch import Batch
+from conservative.card import Card, Maker
 from conservative.check import choice, positive_integer
-from conservative.declarations import Maker
 from conservative.errors import Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -60,8 +60,15 @@ class MuJoCo(Method):
 
     family: ClassVar[str] = "mujoco"
     role: ClassVar[Role] = Role.ENGINE
-    colour: ClassVar[str] = "vermilion"
-    module: ClassVar[str] = "mujoco"
+    card: ClassVar[Card] = Card(
+        variants=INTEGRATORS,
+        report=("Euler", ""),
+        suite=("Euler", "RK4"),
+        many=("RK4", "RK4,threads=2", "Euler", "implicit", "implicitfast", "discrete"),
+        pictures=("Euler", "RK4", "implicit"),
+        as_installed=("Euler",),
+        colour="vermilion",
+    )
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -115,27 +122,6 @@ class MuJoCo(Method):
 
         return run
 
-    @classmethod
-    def many_settings(cls) -> tuple[Method, ...]:
-        return cls("RK4"), cls("RK4", threads=2), *(cls(each) for each in INTEGRATORS if each != "RK4")
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(integrator) for integrator in INTEGRATORS)
-
-    @classmethod
-    def user_defaults(cls) -> Method:
-        """Return MuJoCo with nothing set but the step."""
-        return cls("Euler")
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return cls("Euler"), cls("RK4")
-
-    @classmethod
-    def picture_settings(cls) -> tuple[Method, ...]:
-        return cls("Euler"), cls("RK4"), cls("implicit")
-
 
 @dataclass(frozen=True)
 class MuJoCoVersion(EngineMethod):
@@ -156,12 +142,10 @@ class MuJoCoVersion(EngineMethod):
     family: ClassVar[str] = "mujoco"
     distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
     takes_gravity: ClassVar[bool] = True
-    colour: ClassVar[str] = "vermilion"
     orders: ClassVar[Orders] = {name: 4 if name == "RK4" else 1 for name in INTEGRATORS}
-    as_installed_text = "Euler"
-    shown = INTEGRATORS
-    suite = ("Euler", "RK4")
-    many = ("RK4",)
+    card: ClassVar[Card] = Card(
+        variants=INTEGRATORS, suite=("Euler", "RK4"), many=("RK4",), as_installed=("Euler",), colour="vermilion"
+    )
 
 
 class _Quiet:

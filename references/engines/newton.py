@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.scene import Scene
 
 from ..environments.engine_method import EngineMethod, Orders
@@ -54,8 +55,9 @@ class Newton(EngineMethod):
         **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
         **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
     }
-    as_installed_text = "SemiImplicit,as_installed=true"
-    shown = (*orders, as_installed_text)
+    card: ClassVar[Card] = Card(
+        variants=(*orders, "SemiImplicit,as_installed=true"), as_installed=("SemiImplicit,as_installed=true",)
+    )
 
     def unsupported(self, scene: Scene) -> str | None:
         return super().unsupported(scene) or (FREE_ONLY.get(self.solver) if scene.potential is not None else None)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
+
 from ..environments.engine_method import EngineMethod
 from ..environments.environment import Distribution
 
@@ -24,7 +26,7 @@ class Nimble(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     # With NumPy 2 it crashes.
     distribution: ClassVar[Distribution] = Distribution("nimblephysics", "nimblephysics", ("numpy<2",), oldest="0.10")
-    as_installed_text = ""
+    card: ClassVar[Card] = Card(as_installed=("",))
 
     @property
     def setting_parts(self) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import finite_number
 from conservative.errors import BadInput
 
@@ -44,8 +45,9 @@ class OpenSim(EngineMethod):
         **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "RungeKutta2": 2},
         **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
     }
-    as_installed_text = "RungeKuttaMerson,accuracy=1e-3"
-    shown = ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10")
+    card: ClassVar[Card] = Card(
+        variants=("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"), as_installed=("RungeKuttaMerson,accuracy=1e-3",)
+    )
 
     def __post_init__(self) -> None:
         allowed = "a number above 0 up to 1, or 0 for fixed steps"

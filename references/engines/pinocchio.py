@@ -10,8 +10,8 @@ import numpy as np
 
 from conservative.attitude import Array, from_quaternion
 from conservative.batch import Batch
+from conservative.card import Card, Maker
 from conservative.check import choice
-from conservative.declarations import Maker
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.methods.many import Block, RunMany
@@ -52,8 +52,9 @@ class Pinocchio(Method):
 
     family: ClassVar[str] = "pinocchio"
     role: ClassVar[Role] = Role.ENGINE
-    colour: ClassVar[str] = "purple"
-    module: ClassVar[str] = "pinocchio"
+    card: ClassVar[Card] = Card(
+        variants=SCHEMES, report=("",), suite=("RK4",), many=("RK4",), pictures=("Euler",), colour="purple"
+    )
 
     def __post_init__(self) -> None:
         choice("scheme", self.scheme, SCHEMES)
@@ -105,18 +106,6 @@ class Pinocchio(Method):
             return samples.trajectory({"q": np.roll(q, 1, axis=-1), "w": w})
 
         return run
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(cls(scheme) for scheme in SCHEMES)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return (cls("RK4"),)
-
-    @classmethod
-    def picture_settings(cls) -> tuple[Method, ...]:
-        return (cls("Euler"),)
 
 
 def _model(pin: Any, axes: Axes) -> Any:

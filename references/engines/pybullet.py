@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.scene import Scene
 
 from ..environments.engine_method import EngineMethod, Orders, rate_limit_reason
@@ -42,8 +43,7 @@ class PyBullet(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     distribution: ClassVar[Distribution] = Distribution("pybullet", "pybullet", oldest="3.2.5")
     orders: ClassVar[Orders] = {"multibody": 1, "maximal": 1}
-    as_installed_text = "as_installed=true"
-    shown = ("", "maximal", "as_installed=true")
+    card: ClassVar[Card] = Card(variants=("", "maximal", "as_installed=true"), as_installed=("as_installed=true",))
 
     def unsupported(self, scene: Scene) -> str | None:
         if self.body == "maximal" and scene.potential is not None:

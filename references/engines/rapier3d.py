@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.check import positive_integer
 
 from ..environments.engine_method import EngineMethod
@@ -40,8 +41,7 @@ class Rapier(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("rapier3d", "rapier3d", oldest="0.36")
-    as_installed_text = "as_installed=true"
-    shown = ("", "substeps=1", "as_installed=true")
+    card: ClassVar[Card] = Card(variants=("", "substeps=1", "as_installed=true"), as_installed=("as_installed=true",))
 
     def __post_init__(self) -> None:
         positive_integer("substeps", self.substeps)

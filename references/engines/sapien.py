@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from conservative.card import Card
 from conservative.scene import Scene
 
 from ..environments.engine_method import EngineMethod, rate_limit_reason
@@ -39,8 +40,7 @@ class Sapien(EngineMethod):
     takes_gravity: ClassVar[bool] = True
     precision: ClassVar[str] = "f32"
     distribution: ClassVar[Distribution] = Distribution("sapien", "sapien", oldest="3.0")
-    as_installed_text = "as_installed=true"
-    shown = ("", "as_installed=true")
+    card: ClassVar[Card] = Card(variants=("", "as_installed=true"), as_installed=("as_installed=true",))
 
     def unsupported(self, scene: Scene) -> str | None:
         return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)

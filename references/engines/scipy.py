@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.card import Card, Maker
 from conservative.check import choice, describe, finite_number
-from conservative.declarations import Maker
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -58,9 +58,9 @@ class SciPy(Method):
 
     family: ClassVar[str] = "scipy"
     role: ClassVar[Role] = Role.ENGINE
-    colour: ClassVar[str] = "orange"
-    module: ClassVar[str] = "scipy.integrate"
-    time_dependent: ClassVar[bool] = True
+    card: ClassVar[Card] = Card(
+        variants=("rtol=1e-9", "rtol=1e-12"), report=("",), suite=("rtol=1e-9",), colour="orange", time_dependent=True
+    )
 
     def __post_init__(self) -> None:
         choice("integrator", self.integrator, INTEGRATORS)
@@ -111,14 +111,6 @@ class SciPy(Method):
             return axes.trajectory(grid, self.label, R_WF, y[:, 4:], work, *reason)
 
         return run
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return (cls(rtol=1e-9), cls(rtol=1e-12))
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return (cls(rtol=1e-9),)
 
 
 def _count_steps(solver: Any) -> Any:

@@ -16,8 +16,8 @@ import numpy as np
 
 from conservative import registry
 from conservative.batch import Batch
+from conservative.card import Maker
 from conservative.check import choice
-from conservative.declarations import Maker
 from conservative.errors import BadInput, IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
@@ -39,8 +39,6 @@ class EngineMethod(Method):
     `inside/FAMILY.py` beside its own runs in the environment. It has a function `prepare(given)`, where `given` has the fields
     that `plain_numbers.describe` lists.
 
-    Settings in attributes are texts as in names of methods, such as "RK4,precision=f32"; "" stands for the default setting.
-
     Attributes
     ----------
     distribution
@@ -56,11 +54,6 @@ class EngineMethod(Method):
     orders
         The values of its first setting, with their orders; empty if that is not a choice. An order is None if the engine
         chooses its own steps.
-    as_installed_text
-        The engine as installed, with nothing set but the step; None if its user has to choose a setting.
-    shown, suite, many
-        Settings in tables, in the benchmark suite (by default all that are shown), and those that run many bodies at once, by
-        the function `prepare_many` of what runs in the environment.
 
     Raises
     ------
@@ -77,10 +70,6 @@ class EngineMethod(Method):
     takes_gravity: ClassVar[bool] = False
     free_only: ClassVar[str] = ""
     orders: ClassVar[Orders] = MappingProxyType({})
-    as_installed_text: ClassVar[str | None] = None
-    shown: ClassVar[tuple[str, ...]] = ("",)
-    suite: ClassVar[tuple[str, ...]] = ()
-    many: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         """Check the settings, and that there is an environment."""
@@ -115,11 +104,6 @@ class EngineMethod(Method):
         return Maker(self.engine, self.environment.version)
 
     @property
-    def variables(self) -> Mapping[str, str]:
-        """Variables of the process that it runs in; runs with other ones have another process."""
-        return {}
-
-    @property
     def setting_parts(self) -> dict[str, str]:
         """The first setting, those that are not defaults, and last a precision other than double."""
         settings, parts = self._settings(), dict[str, str]()
@@ -134,6 +118,11 @@ class EngineMethod(Method):
         return parts if self.precision == "f64" else parts | {"precision": self.precision}
 
     @property
+    def variables(self) -> Mapping[str, str]:
+        """Variables of the process that it runs in; runs with other ones have another process."""
+        return {}
+
+    @property
     def order(self) -> int | None:
         """Order of convergence in dt: that of the first setting, or 1."""
         return self.orders[next(iter(self._settings().values()))] if self.orders else 1
@@ -144,19 +133,6 @@ class EngineMethod(Method):
         if scene.potential is not None:
             return self.free_only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
         return mass_model_reason(scene)
-
-    @classmethod
-    def user_defaults(cls) -> Method | None:
-        """Return the engine as installed, with nothing set but the step; None where its user has to choose a setting."""
-        return None if cls.as_installed_text is None else registry.configure(cls, cls.as_installed_text)
-
-    @classmethod
-    def variants(cls) -> tuple[Method, ...]:
-        return tuple(registry.configure(cls, text) for text in cls.shown)
-
-    @classmethod
-    def suite_settings(cls) -> tuple[Method, ...]:
-        return tuple(registry.configure(cls, text) for text in cls.suite or cls.shown)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Have the worker prepare the run. Raises `Unsupported` where this version does not have what is asked for."""
@@ -173,17 +149,13 @@ class EngineMethod(Method):
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         """Have the worker prepare the run of many bodies; None where the adapter has none, or not for these bodies."""
-        axes = take_axes(bodies, grid, self.unsupported) if self in self.many_settings() else None
+        axes = take_axes(bodies, grid, self.unsupported) if self in self.settings_for("many") else None
         if axes is None:
             return None
         given = self._given(describe_many(axes, grid))
         run = WorkerRun(worker_of(self.environment, self.variables), given, ManySamples(axes, grid))
         run.prepare()
         return run
-
-    @classmethod
-    def many_settings(cls) -> tuple[Method, ...]:
-        return tuple(registry.configure(cls, text) for text in cls.many)
 
     def _given(self, numbers: Mapping[str, Any]) -> dict[str, Any]:
         return {"adapter": str(_inside(type(self))), "settings": self._settings(), **numbers}

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from conservative.attitude import Array
 from conservative.body import RigidBody
+from conservative.card import Card
 from conservative.check import describe, finite_array, real_array, rotation
 from conservative.errors import BadInput, Unsupported
 from conservative.grid import Grid
@@ -127,7 +128,7 @@ class Exact(Method):
 
     family: ClassVar[str] = "exact"
     role: ClassVar[Role] = Role.TRUTH
-    colour: ClassVar[str] = "black"
+    card: ClassVar[Card] = Card(report=(), colour="black")
 
     @property
     def order(self) -> None:

@@ -52,7 +52,7 @@ PALETTE = {
     "black": BLACK,
     "grey": GREY,
 }
-"""What `Method.colour` can name; families of one role stand in legends in this order."""
+"""What `Card.colour` can name; families of one role stand in legends in this order."""
 _OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
 """For families that name no colour, in the order of their names (Tol's muted scheme)."""
 
@@ -64,13 +64,15 @@ WIDTH, HEIGHT = 420, 260
 
 def family_colours() -> dict[str, str]:
     """Return the colours that registered families name, in the order of legends: by role, then by the palette."""
-    families = [family for family in registry.list_families().values() if family.colour is not None]
-    return {family.family: PALETTE.get(str(family.colour), str(family.colour)) for family in sorted(families, key=_place)}
+    families = [family for family in registry.list_families().values() if family.card.colour is not None]
+    return {
+        family.family: PALETTE.get(str(family.card.colour), str(family.card.colour)) for family in sorted(families, key=_place)
+    }
 
 
 def _place(family: type[Method]) -> tuple[int, int]:
-    places = list(PALETTE)
-    return list(Role).index(family.role), places.index(family.colour) if family.colour in places else len(places)
+    places, colour = list(PALETTE), family.card.colour
+    return list(Role).index(family.role), places.index(colour) if colour in places else len(places)
 
 
 def order_lines(families: Mapping[str, str]) -> Families:

@@ -63,7 +63,7 @@ def methods() -> list[MethodEntry]:
 
 def _variants(name: str) -> list[MethodEntry]:
     try:
-        return [_method(method) for method in registry.method(name).variants()]
+        return [_method(method) for method in registry.method(name).settings_for("variants")]
     except (MissingEngine, BadInput) as missing:
         # An engine that is not installed, or a registered package that is not whole: shown, never fatal for the list.
         return [MethodEntry(name, None, "", None, (), False, str(missing))]

@@ -64,7 +64,7 @@ def quartic():
 def list_methods():
     for family in registry.list_families().values():
         try:
-            yield from family.variants()
+            yield from family.settings_for("variants")
         except cv.MissingEngine:
             continue
 
@@ -73,7 +73,7 @@ def list_runs(method, scenes):
     for scene in scenes:
         if method.unsupported(scene) is None:
             dt = min(scene.dt, 0.9 * method.longest_step(scene))
-            for n_steps in STEPS[bool(method.kernel) and not isinstance(scene.potential, cv.FunctionPotential)]:
+            for n_steps in STEPS[bool(method.card.kernel) and not isinstance(scene.potential, cv.FunctionPotential)]:
                 yield Run(method, scene, dt, n_steps)
 
 

@@ -11,7 +11,7 @@ from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
 from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
-from conservative.declarations import Maker
+from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.outcome import OutcomeKind
@@ -30,7 +30,7 @@ def test_scenes_by_name_with_parameters():
 
 
 def test_a_family_stands_for_its_variants_and_a_name_with_settings_for_one():
-    assert set(methods(["mujoco"])) == set(registry.method("mujoco").variants())
+    assert set(methods(["mujoco"])) == set(registry.method("mujoco").settings_for("variants"))
     assert methods(["mujoco:Euler"]) == (registry.method("mujoco:Euler"),)
 
 

@@ -47,7 +47,7 @@ VALUES = {
     "scene": cv.Scene("own", BODY, np.eye(3), (0, 1, 2), 3, cv.UniformGravity(1, (0, 0, 1)), source="here"),
     "trajectory": cv.Trajectory(cv.scenes.brick_flip(), np.zeros(1), np.eye(3)[None], np.zeros((1, 3)), "nobody"),
     "grid": cv.Grid(0.01, 10),
-    **{method.name: method for name in registry.list_methods() for method in type(registry.method(name)).variants()},
+    **{method.name: method for name in registry.list_methods() for method in registry.method(name).settings_for("variants")},
 }
 
 

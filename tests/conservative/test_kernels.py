@@ -80,7 +80,7 @@ def test_an_edit_of_an_inner_kernel_runs_new_code(tmp_path: Path, setting: str) 
     assert python(["-c", TURN], **environment) == "0.8 1"
 
 
-NAMES = sorted({family.kernel for family in list_families().values() if family.kernel})
+NAMES = sorted({family.card.kernel for family in list_families().values() if family.card.kernel})
 
 
 def named(fields: type) -> Any:

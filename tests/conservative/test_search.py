@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative import grid
 from conservative.attitude import rotation_about
-from conservative.declarations import Candidacy, Cost
+from conservative.card import Card, Cost
 from conservative.errors import AccuracyNotReached, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method, Role
@@ -38,15 +38,12 @@ class Known(cv.Method):
 
     family: ClassVar[str] = "known"
     role: ClassVar[cv.Role] = cv.Role.OURS
+    card: ClassVar[Card] = Card(cost=lambda method: Cost(step=method.step, correction=3.0))
     taken: ClassVar[list] = []
 
     @property
     def order(self):
         return self.power or None
-
-    @property
-    def cost(self):
-        return Cost(step=self.step, correction=3.0)
 
     def prepare(self, scene, grid):
         self.taken.append(grid)
@@ -255,13 +252,13 @@ def runs(monkeypatch):
 
 
 def work(runs):
-    return sum(method.cost.least * steps for method, steps in runs)
+    return sum(method.card.cost(method).least * steps for method, steps in runs)
 
 
 @pytest.mark.parametrize("factor", [1.0, 5.0, 20.0])
 def test_the_choice_for_a_satellite_costs_few_runs(runs, factor):
     found = cv.integrate(satellite(factor), error=1e-9)
-    whole = found.choice.method.cost.least * found.counters.steps
+    whole = found.choice.method.card.cost(found.choice.method).least * found.counters.steps
     assert found.choice.reached
     assert work(runs) < 25 * whole  # measured 5 to 7, where a search that drove all orders to the error took 840 to 15,000
 
@@ -273,10 +270,10 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
     choose(*((high, low) if reverse else (low, high)))
     made = []
     method, _ = search.find_cheapest(trials.Trials(SCENE, {}, lambda method, grid: made.append((method, grid))), error, 8.0)
-    needed = {each: each.cost.least * (0.1 / error * 8) ** (1 / each.power) * 8 for each in (low, high)}
+    needed = {each: each.card.cost(each).least * (0.1 / error * 8) ** (1 / each.power) * 8 for each in (low, high)}
     cheapest = min(needed, key=needed.get)
     assert needed[method] <= search.LENIENCY * needed[cheapest]
-    assert sum(1.5 * each.cost.least * grid.n_steps for each, grid in made) < 40 * needed[method]
+    assert sum(1.5 * each.card.cost(each).least * grid.n_steps for each, grid in made) < 40 * needed[method]
 
 
 def test_work_is_extrapolated_from_the_order():
@@ -388,29 +385,23 @@ def test_progress_is_told_after_a_second_and_not_too_often():
 
 
 def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
-    def family(name, candidacy, supported=True, missing=False):
-        def settings(cls):
+    def family(name, card, supported=True, missing=False):
+        def prepare_settings(self):
             if missing:
                 raise MissingEngine(name, "nothing")
-            return (cls(),)
 
-        return dataclass(frozen=True)(
-            type(
-                name,
-                (Known,),
-                {
-                    "family": name,
-                    "candidacy": candidacy,
-                    "candidate_settings": classmethod(settings),
-                    "unsupported": lambda self, scene: None if supported else "no",
-                },
-            )
-        )
+        members = {
+            "family": name,
+            "card": card,
+            "__post_init__": prepare_settings,
+            "unsupported": lambda self, scene: None if supported else "no",
+        }
+        return dataclass(frozen=True)(type(name, (Known,), members))
 
-    first, second = family("first", Candidacy(2, "group")), family("second", Candidacy(3, "group"))
-    third, none = family("third", Candidacy(1)), family("none", None)
-    exact = family("exact", Candidacy(4, exact=True))
-    gone, other = family("gone", Candidacy(0), missing=True), family("other", Candidacy(0), supported=False)
+    first, second = family("first", Card(rank=2, group="group")), family("second", Card(rank=3, group="group"))
+    third, none = family("third", Card(rank=1)), family("none", Card())
+    exact = family("exact", Card(rank=4, exact=True))
+    gone, other = family("gone", Card(rank=0), missing=True), family("other", Card(rank=0), supported=False)
 
     def names(*families):
         monkeypatch.setattr(search.registry, "list_families", lambda: {each.family: each for each in families})
@@ -419,7 +410,7 @@ def test_candidates_are_ranked_and_an_exact_one_is_alone(monkeypatch):
     assert names(second, none, first, third, gone, other) == ["third", "first"]
     assert names(second, first, exact) == ["exact"]
     assert names(none) == []
-    foreign = family("foreign", Candidacy(0))
+    foreign = family("foreign", Card(rank=0))
     foreign.role = cv.Role.ENGINE
     assert names(foreign, first) == ["first"]
 
@@ -436,14 +427,11 @@ class Spun(Method):
 
     family: ClassVar[str] = "spun"
     role: ClassVar[Role] = Role.OURS
+    card: ClassVar[Card] = Card(cost=lambda method: Cost(step=1.0))
 
     @property
     def order(self):
         return 12
-
-    @property
-    def cost(self):
-        return Cost(step=1.0)
 
     def prepare(self, scene, grid):
         return self._turn(scene, grid, 4.0 * grid.t + self.noise * (1 if grid.n_steps % 4 == 0 else -1))

@@ -169,7 +169,7 @@ def states(trajectory: cv.Trajectory) -> tuple[bytes, bytes, object, str]:
 
 
 BLOCKS = (
-    *((scene, method, 1) for scene, method in LONG_RUNS if registry.method(method).kernel),
+    *((scene, method, 1) for scene, method in LONG_RUNS if registry.method(method).card.kernel),
     ("lagrange_top", "reduced", 30),
     ("lagrange_top", "reduced", 55),
     ("asymmetric_top", "reduced:order=4", 12),
@@ -184,7 +184,7 @@ def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, m
     """Short steps, long ones that the solver reaches in parts, and steps that fail."""
     chosen, motion = registry.method(method), registry.scene(scene)
     dt = min(factor * motion.dt, 0.9 * chosen.longest_step(motion))
-    run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.kernel)
+    run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.card.kernel)
     monkeypatch.setattr(kernel, "PAUSE", 0)
     whole = states(run())
     for pause in (1, 2, 7, 100):
@@ -192,7 +192,9 @@ def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, m
         assert states(run()) == whole
 
 
-@pytest.mark.parametrize("name", sorted({family.kernel for family in registry.list_families().values() if family.kernel}))
+@pytest.mark.parametrize(
+    "name", sorted({family.card.kernel for family in registry.list_families().values() if family.card.kernel})
+)
 def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Kernel:
         PAUSE, FAILURE, pauses = kernels(name).PAUSE, "", []

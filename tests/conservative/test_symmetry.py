@@ -132,7 +132,7 @@ def ours():
     for entry in deferred_imports.list_entries(deferred_imports.METHODS).values():
         if not entry.value.startswith("conservative."):
             continue
-        for method in entry.load().variants():
+        for method in entry.load().settings_for("variants"):
             if method.role == Role.OURS:
                 found.append(replace(method, tol=1e-13) if isinstance(method, cv.Convected) else method)
     return found

@@ -9,6 +9,7 @@ from scipy.special import ellipj, ellipk
 
 import conservative as cv
 from conservative.attitude import angle_between, hat, orthonormality, rotation_about
+from conservative.card import Card
 from conservative.invariants import JACOBI_INTEGRAL
 from conservative.references.engines.scipy import SciPy
 from conservative.scenes import satellites
@@ -130,7 +131,7 @@ def test_motions_of_any_speed(time):
 def test_a_run_that_loses_the_integral_is_cut():
     class Losing(cv.Method):
         family, role, order, conserves = "losing", cv.Role.OURS, 8, frozenset({JACOBI_INTEGRAL})
-        time_dependent, label, kernel = True, "losing", ""
+        label, card = "losing", Card(time_dependent=True)
 
         def prepare(self, scene, grid):
             good = cv.Projected().prepare(scene, grid)()
@@ -166,7 +167,7 @@ class Silent(cv.Method):
 def test_methods_that_do_not_know_of_time_refuse():
     for method in (Unaware(), Silent(), cv.Reduced(), cv.Convected(), cv.Gauss(), cv.Lame(), cv.Substepped("reduced")):
         assert "time" in method.unsupported(scene())
-        with pytest.raises(cv.Unsupported, match="do not depend on the time"):
+        with pytest.raises(cv.Unsupported, match="do not depend on time"):
             cv.integrate(scene(), 0.1, method)
     assert Unaware().unsupported(cv.scenes.brick_flip()) is None
     assert cv.Substepped("projected").unsupported(scene()) is None

@@ -56,7 +56,9 @@ def test_an_engine_agrees_with_truth(method, bound, generic):
     assert np.abs(truth.w_WB_B - found.w_WB_B).max() < bound
 
 
-@pytest.mark.parametrize("method", [m for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for m in cls.variants()])
+@pytest.mark.parametrize(
+    "method", [m for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for m in cls.settings_for("variants")]
+)
 def test_a_run_starts_afresh_each_time_and_samples_do_not_change_it(method, top, heavy):
     run = method.prepare(top, Grid(0.05, 40))
     first = run()
@@ -112,8 +114,8 @@ STEPS = (40, 80, 160, 320)
 
 mujoco_4 = pytest.mark.skipif(version("mujoco") != "4.0.0", reason="measured with MuJoCo 4.0.0; it changes between versions")
 METHODS = [
-    *(pytest.param(method, marks=mujoco_4, id=method.name) for method in MuJoCo.variants()),
-    *(pytest.param(method, id=method.name) for method in Pinocchio.variants()),
+    *(pytest.param(method, marks=mujoco_4, id=method.name) for method in MuJoCo.settings_for("variants")),
+    *(pytest.param(method, id=method.name) for method in Pinocchio.settings_for("variants")),
 ]
 
 
@@ -170,7 +172,9 @@ def test_implicitfast_and_discrete_are_semi_implicit_euler_on_a_ball_joint(heavy
         assert angle_between(euler.R_WB, other.R_WB).max() < 1e-12  # measured 0
 
 
-@pytest.mark.parametrize("method", [*MuJoCo.variants(), *Pinocchio.variants()], ids=lambda method: method.name)
+@pytest.mark.parametrize(
+    "method", [*MuJoCo.settings_for("variants"), *Pinocchio.settings_for("variants")], ids=lambda method: method.name
+)
 def test_evaluations_are_those_of_the_stages_of_each_step(method, free):
     counters = method.run(free, 0.1, t_end=0.7).counters
     assert (counters.steps, counters.evaluations) == (7, 7 * (4 if method.order == 4 else 1))

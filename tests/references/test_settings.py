@@ -14,7 +14,7 @@ from conservative.references.engines.scipy import SciPy
 from conservative.references.heyoka_equations import formulations
 from conservative.references.precise import Precise
 
-EVERYTHING = [method for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for method in cls.variants()]
+EVERYTHING = [method for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for method in cls.settings_for("variants")]
 
 
 @pytest.mark.parametrize("method", EVERYTHING, ids=lambda m: m.name)

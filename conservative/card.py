@@ -1,0 +1,210 @@
+"""The card of a family of methods: its settings for tables and benchmarks, its place in the automatic choice, its colour.
+
+Settings are texts as in the name of a method, such as "RK4" or "order=4,tol=1e-9", and "" for the defaults.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple, TypeVar
+
+from .check import describe, real_number
+from .errors import BadInput, nearest
+from .version import VERSION
+
+T = TypeVar("T")
+Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates", "as_installed"]
+"""What a selection of settings is for; see `Card`."""
+
+
+class Role(StrEnum):
+    """Which side a method is on."""
+
+    OURS = "ours"
+    """Compared with the engines in verdicts; its time is gated."""
+    ENGINE = "engine"
+    """Other people's code."""
+    TRUTH = "truth"
+    """A reference solution, which does not compete."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Cost of a method's work, ns. The automatic choice uses only ratios of costs.
+
+    Attributes
+    ----------
+    step
+        Cost of a step without its corrections.
+    correction
+        Cost of one correction of the nonlinear solver.
+    corrections
+        Smallest number of corrections that a step takes.
+    """
+
+    step: float
+    correction: float = 0.0
+    corrections: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """Smallest cost of a step, ns."""
+        return self.step + self.correction * self.corrections
+
+
+@dataclass(frozen=True)
+class Card:
+    """What reports, the benchmark suite and the automatic choice need to know about a family of methods.
+
+    Every field has a default. A selection of settings that is None is the same as `variants`.
+
+    Attributes
+    ----------
+    variants
+        Settings that tables and generic tests include.
+    report
+        Settings in a report by default.
+    suite
+        Settings timed by the benchmark suite.
+    many
+        Settings for which `Method.prepare_many` runs many bodies at once, the representative one first.
+    pictures
+        Settings whose motion a report draws; if there are none, it draws the first that it measured.
+    as_installed
+        The engine as installed, with nothing set but the step; () if its user has to choose a setting.
+    rank
+        Rank in the automatic choice, `integrate(scene, error=...)`; the lowest comes first. None: the family is not considered.
+    group
+        Only the first family of a group that supports the scene is tried; "" for a family outside all groups.
+    exact
+        Whether there is no truncation error. The first such family that supports the scene is taken without comparison.
+    candidates
+        Settings that the automatic choice tries.
+    longest
+        Longest step that the automatic choice tries, in radians of the fastest possible rotation.
+    cost
+        Returns the cost of a setting's work. Default: that of an explicit step of order 8.
+    colour
+        A name in `conservative.reports.charts.style.PALETTE`, or a colour such as "#0072B2"; None for any free colour.
+    kernel
+        Module in `conservative.kernels` whose function `enter` makes all steps of a run; "" if there is none.
+    time_dependent
+        Whether potentials that depend on time are supported. If not, `Method.unsupported` reports them.
+    """
+
+    variants: tuple[str, ...] = ("",)
+    report: tuple[str, ...] | None = None
+    suite: tuple[str, ...] | None = None
+    many: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
+    as_installed: tuple[str, ...] = ()
+    rank: int | None = None
+    group: str = ""
+    exact: bool = False
+    candidates: tuple[str, ...] | None = None
+    longest: float = math.inf
+    cost: Callable[[Any], Cost] = lambda method: Cost(step=340.0)
+    colour: str | None = None
+    kernel: str = ""
+    time_dependent: bool = False
+
+    def settings(self, purpose: Purpose) -> tuple[str, ...]:
+        """Return the settings for a purpose, with the defaults filled in."""
+        selected: tuple[str, ...] | None = getattr(self, purpose)
+        return self.variants if selected is None else selected
+
+
+class Maker(NamedTuple):
+    """The package that does the computing, and its version; empty if the package is not installed."""
+
+    package: str
+    version: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.package}=={self.version}" if self.version else self.package
+
+
+@lru_cache(maxsize=256)
+def maker_of(kind: type) -> Maker:
+    """Return the package of a class."""
+    package = kind.__module__.partition(".")[0]
+    if package == __package__:
+        return Maker(package, VERSION)
+    from importlib import metadata
+
+    try:
+        return Maker(package, metadata.version(package))
+    except metadata.PackageNotFoundError:
+        return Maker(package)
+
+
+def setting_texts(value: Any) -> dict[str, str]:
+    """Return the texts of the settings of a frozen value that differ from their defaults, such as `tol=1e-09`, by name."""
+    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
+    return {name: f"{name}={setting}" for name, setting, default in settings if setting != default}
+
+
+@lru_cache(maxsize=1024)
+def settings_text(value: Any) -> str:
+    """Return the settings of a frozen value that differ from their defaults: `tol=1e-09,frame=body`."""
+    return ",".join(setting_texts(value).values())
+
+
+def call_with_settings(target: Callable[..., T], argument: str, text: str) -> T:
+    """Return the result of a function or class for settings such as "RK4,threads=2".
+
+    Items without a key are assigned to the parameters in their order. `argument` is the name of the target in messages.
+
+    Raises
+    ------
+    BadInput
+        A setting is unknown or has a wrong value.
+    """
+    settings = [item.strip() for item in text.split(",") if item.strip()]
+    arguments = _read_arguments(argument, target, settings)
+    try:
+        return target(**arguments)
+    except BadInput:
+        raise
+    except (ArithmeticError, TypeError, ValueError) as error:
+        raise BadInput(argument, describe(",".join(settings)), f"settings that it accepts ({error})") from error
+
+
+def _read_arguments(argument: str, target: Callable[..., object], settings: list[str]) -> dict[str, Any]:
+    defaults = _defaults(target)
+    names = list(defaults)
+    arguments: dict[str, Any] = {}
+    for position, item in enumerate(settings):
+        name, equals, text = item.partition("=")
+        if not equals:
+            name, text = names[position] if position < len(names) else item, item
+        if name not in defaults:
+            raise BadInput(argument, describe(item), f"settings {nearest(name, names)}" if names else "no settings")
+        value, default = _read_value(text), defaults[name]
+        if isinstance(default, bool):
+            if not isinstance(value, bool):
+                raise BadInput(argument, describe(item), f"{name}=true or {name}=false")
+        elif isinstance(default, int | float) and real_number(value) is None:
+            raise BadInput(argument, describe(item), f"{name}=a number, such as {default!r}, its default")
+        arguments[name] = value
+    return arguments
+
+
+@lru_cache(maxsize=256)
+def _defaults(target: Callable[..., object]) -> dict[str, Any]:
+    """Return the defaults of the parameters by name. Reading a signature takes longer than everything else here."""
+    return {name: parameter.default for name, parameter in inspect.signature(target).parameters.items()}
+
+
+def _read_value(text: str) -> object:
+    for convert in (int, float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False, "none": None}.get(text.lower(), text)
