@@ -16,22 +16,19 @@ from .run.plan import Plan
 from .run.provenance import Provenance
 from .tables import (
     closing,
-    each_step,
     engine_scenes,
     engine_tables,
     hard_cases,
     headline,
     lines,
     paper,
-    random_contests,
-    random_ratios,
-    random_summary,
+    random_bodies,
     runs,
+    scene_contests,
     throughput,
     work_precision,
 )
 from .tables.cells import Table
-from .tables.classes import with_classes
 from .tables.scene_views import SceneView as SceneView
 from .tables.scene_views import SceneViews
 from .tables.summary import Summary
@@ -82,7 +79,7 @@ class View:
     table: pd.DataFrame
     first: Summary
     about: str
-    random: random_ratios.RandomView | None
+    random: random_bodies.RandomView | None
     throughput: throughput.ThroughputView | None
     headline: tuple[headline.Statement, ...]
     failed: tuple[str, ...]
@@ -106,7 +103,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
     table = every[~every["study"].isin((*ENGINES, RANDOM, THROUGHPUT))].reset_index(drop=True)
     builder = SceneViews.of(table, samples, plan.methods, work_precision.all_points(every))
     scenes = tuple(builder.scene(value) for value in plan.scenes)
-    contests = random_contests.contests(every) if RANDOM in plan.names else ()
+    contests = random_bodies.ratios(every) if RANDOM in plan.names else ()
     first, about = _first(scenes, every, contests, builder.long_drifts)
     return View(
         source=source,
@@ -114,7 +111,7 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         table=measurements.table,
         first=first,
         about=about,
-        random=random_ratios.view(contests, plan.bodies, plan.seed) if RANDOM in plan.names else None,
+        random=random_bodies.view(contests, plan.bodies, plan.seed) if RANDOM in plan.names else None,
         throughput=throughput.view(every) if THROUGHPUT in plan.names else None,
         headline=headline.first_lost(
             [*headline.of_random_bodies(contests), *headline.of_points(builder.points), *_each_step(plan, table)]
@@ -130,24 +127,24 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> View:
         engines=engine_scenes.engine_scenes(every[of_engines], plan.scenes) if plan.engines else (),
         versions=_versions(plan, source),
         closing=tuple((scene.name, closing.scene_table(every, scene.points, scene.name)) for scene in scenes),
-        verdict=closing.verdict(with_classes(builder.points), [scene.name for scene in scenes]),
+        verdict=closing.verdict(builder.points, [scene.name for scene in scenes]),
     )
 
 
 def _each_step(plan: Plan, table: pd.DataFrame) -> Iterator[headline.Statement]:
     for scene in plan.scenes:
-        yield from headline.of_each_step(scene.name, each_step.of_scene(table, scene.name))
+        yield from headline.of_each_step(scene.name, scene_contests.each_step(table, scene.name))
 
 
 def _first(
     scenes: Sequence[SceneView],
     every: pd.DataFrame,
-    contests: Sequence[random_contests.Contest],
+    contests: Sequence[random_bodies.RandomRatios],
     drifts: pd.DataFrame,
 ) -> tuple[Summary, str]:
     """Return the summary of random bodies; without any that of a scene, of one without a closed form if there is one."""
     if contests:
-        return random_summary.of_random_bodies(every, contests, drifts), "Random bodies"
+        return random_bodies.summary(every, contests, drifts), "Random bodies"
     scene = min(scenes, key=lambda scene: scene.integrable)
     return scene.summary, scene.name
 

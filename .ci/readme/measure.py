@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.measures.cost_at_error import cost
+from conservative.benchmarks.contest import cost
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
 CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
@@ -68,7 +68,7 @@ def _random(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """
     common = {"name": "random bodies", "unit": "1", "method": "", "version": ""}
     lost = cases = 0
-    for field, bodies in table.groupby(table["scene"].str.extract(r"field=(\w+)")[0], sort=False):
+    for field, bodies in table.groupby("field", sort=False):
         for error in RANDOM_ERRORS:
             pairs = [
                 tuple(fastest(body[body["role"] == role], error)[0] for role in ("ours", "engine"))

@@ -36,7 +36,7 @@ from conservative.scene import Scene
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 from conservative.trajectory import Trajectory
 
-from ..measures.cost_at_error import cost, credit, first_within
+from ..contest import cost, credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time

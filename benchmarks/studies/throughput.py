@@ -31,7 +31,7 @@ from conservative.method import Method
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engines.heyoka import SMALLEST_TOL, Heyoka
 
-from ..measures.cost_at_error import credit, first_within
+from ..contest import credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved

@@ -11,7 +11,7 @@ from conservative.benchmarks.studies import long_runs, step_ladder
 from conservative.deferred_imports import DEFAULT_METHOD
 
 from ..charts import paper
-from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
+from ..tables import engine_tables, hard_cases, random_bodies, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, markdown
 from ..view import PaperView, View
 
@@ -27,7 +27,7 @@ def render(view: View, charts: Mapping[str, Any], draw: Draw) -> str:
     environment.filters["table"] = markdown
     return environment.get_template("report.md.j2").render(
         view=view,
-        random_terms=random_ratios.TERMS,
+        random_terms=random_bodies.TERMS,
         many_terms=throughput.TERMS,
         pictures={name: draw(name, chart) for name, chart in charts.items()},
         default_method=DEFAULT_METHOD,

@@ -17,7 +17,7 @@ from conservative.benchmarks.studies import long_runs, step_ladder
 
 from ..charts import contrast
 from ..charts.vega_embed import PageFigure
-from ..tables import engine_tables, hard_cases, random_ratios, summary, throughput
+from ..tables import engine_tables, hard_cases, random_bodies, summary, throughput
 from ..tables.cells import CONSERVED, SMALL, tolerance
 from ..view import View
 from . import libraries
@@ -36,7 +36,7 @@ def render(view: View, charts: dict[str, Any]) -> str:
         samples=step_ladder.SAMPLES,
         hard_terms=hard_cases.TERMS,
         many_terms=throughput.TERMS,
-        random_terms=random_ratios.TERMS,
+        random_terms=random_bodies.TERMS,
         figures=figures,
         engine_terms=engine_tables.TERMS,
         conserved=tolerance(CONSERVED),

@@ -40,15 +40,14 @@ def class_of(role: str, method: str) -> MethodClass:
     return MethodClass.SOLVER if found and tolerance_setting(found) else MethodClass.ENGINE
 
 
-def with_classes(points: pd.DataFrame) -> pd.DataFrame:
-    """Return points (see `work_precision.points`) with one more column, `class`."""
-    kinds = [class_of(role, method).value for role, method in zip(points["role"], points["method"], strict=True)]
-    return points.assign(**{"class": pd.Series(kinds, index=points.index, dtype="string")})
+def of_classes(found: pd.DataFrame, *kinds: MethodClass) -> pd.DataFrame:
+    """Return points or costs of methods of some classes."""
+    return found[found["class"].isin(kinds)]
 
 
 def without_solutions(points: pd.DataFrame) -> pd.DataFrame:
     """Return points without those of our solutions of integrable motions."""
-    return points[with_classes(points)["class"] != MethodClass.SOLUTION]
+    return points[points["class"] != MethodClass.SOLUTION]
 
 
 @lru_cache(maxsize=1024)

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.method import Role
 
 from .cells import DASH, Table, factor, number, tolerance
-from .classes import OF_ENGINES, MethodClass
+from .classes import OF_ENGINES, MethodClass, of_classes
 from .rows import of_measure, of_study
-from .summary import MIDDLE, cheapest
-from .work_precision import cost
+from .summary import MIDDLE
 
 HEADER = ("method", "energy", "momentum", "attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
 LEGEND = (
@@ -40,7 +40,8 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
     """
     accuracy = of_study(table, "paper", scene)
     accuracy = accuracy[(accuracy["role"] != Role.TRUTH.value) & accuracy["value"].notna()]
-    costs = {series: cost(line, MIDDLE) for series, line in points.groupby("series", sort=False)}
+    reached = costs(points, [MIDDLE], ["series"])
+    times = dict(zip(reached["series"], reached["time"], strict=True))
     orders = _values(of_measure(of_study(table, "convergence", scene), Measure.ORDER))
     steps = _values(of_measure(of_study(table, "speed", scene), Measure.TIME_PER_STEP))
     body = []
@@ -58,7 +59,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
                 number(float(of_measure(rows, Measure.ATTITUDE_MAX)["value"].max())),
                 DASH if math.isnan(order) else f"{order:.2f}",
                 number(steps.get(method, math.nan) * 1e6),
-                factor(costs.get(series, math.nan) * 1e6),
+                factor(times.get(series, math.nan) * 1e6),
             ]
         )
     return HEADER, body
@@ -69,16 +70,14 @@ def _values(rows: pd.DataFrame) -> dict[str, float]:
 
 
 def verdict(points: pd.DataFrame, scenes: Sequence[str]) -> str:
-    """Return one sentence: on each scene, the fastest engine against our fastest general integrator at `MIDDLE` rad.
-
-    `points` have classes (see `classes.with_classes`).
-    """
-    clauses = [_clause(points[points["scene"] == scene], scene) for scene in scenes]
+    """Return one sentence: on each scene, the fastest engine against our fastest general integrator at `MIDDLE` rad."""
+    reached = costs(points, [MIDDLE])
+    clauses = [_clause(reached[reached["scene"] == scene], scene) for scene in scenes]
     return f"At {tolerance(MIDDLE)} rad, without closed forms: {'; '.join(clauses)}."
 
 
-def _clause(points: pd.DataFrame, scene: str) -> str:
-    ours, engine = cheapest(points, (MethodClass.GENERAL,), MIDDLE), cheapest(points, OF_ENGINES, MIDDLE)
+def _clause(reached: pd.DataFrame, scene: str) -> str:
+    ours, engine = cheapest(of_classes(reached, MethodClass.GENERAL)), cheapest(of_classes(reached, *OF_ENGINES))
     if ours is None or engine is None:
         there = ours or engine
         return f"on {scene} only {there.name} reaches it" if there else f"on {scene} no method reaches it"

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from conservative.benchmarks.contest import cost
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.outcome import OK, Outcome, OutcomeKind
@@ -108,7 +109,8 @@ def _row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[s
     engine = "==".join(filter(None, (first["engine"], first["version"])))
     row = EngineRow(engine, str(first["label"]), str(first["setting"]), str(first["series"]), _outcome(rows))
     row = replace(row, **_facts(rows), **_errors(rows), **_order(line))
-    second = work_precision.cost(timed[first["series"]], ERROR) if first["series"] in timed else math.nan
+    points = timed.get(first["series"])
+    second = math.nan if points is None else cost(points["error"].tolist(), points["time"].tolist(), ERROR)
     has_step = not math.isnan(row.expected_order)
     longest = _longest_step(line) if has_step else math.nan
     per_step = _value(rows, Measure.TIME_PER_STEP) if has_step else math.nan

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ..labels import display_name
-from .classes import OF_ENGINES, MethodClass, with_classes
+from .classes import OF_ENGINES, MethodClass
 from .work_precision import front
 
 COLUMNS = ("name", "family", "class", "single", "line", "setting", "error", "time", "sample", "dt", "within")
@@ -27,11 +27,10 @@ SAME = 0.01
 
 def picture(points: pd.DataFrame) -> pd.DataFrame:
     """Return the picture of one scene, from `work_precision.points`: of each family all that nothing of its own beats."""
-    found = with_classes(points)
-    found = found.assign(
-        name=[_family_name(*row) for row in zip(found["family"], found["version"], found["class"], strict=True)],
-        line=found["name"],
-        setting=found["method"],
+    found = points.assign(
+        name=[_family_name(*row) for row in zip(points["family"], points["version"], points["class"], strict=True)],
+        line=points["name"],
+        setting=points["method"],
         within="",
     )
     best = [front(members).assign(single=False, line=name) for name, members in found.groupby("name", sort=False)]

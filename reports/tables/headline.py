@@ -8,16 +8,14 @@ from itertools import groupby, pairwise
 
 import pandas as pd
 
+from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.studies.each_step import ERROR
 
 from .cells import factor, tolerance
-from .classes import OF_ENGINES, MethodClass, with_classes
-from .each_step import EachStep
-from .random_contests import ANY
-from .random_contests import Contest as RandomContest
-from .random_ratios import count_bodies
-from .summary import cheapest
-from .work_precision import Contest, contests
+from .classes import OF_ENGINES, MethodClass, of_classes
+from .random_bodies import ANY, RandomRatios, count_bodies
+from .scene_contests import EachStep, sides
+from .work_precision import DECADES
 
 TIE = 1.1
 """Ratio of two times below which neither is called faster: reports differ by as much."""
@@ -34,29 +32,27 @@ class Statement:
 
 def of_points(points: pd.DataFrame) -> list[Statement]:
     """Return what is found in the points of all scenes: of general integrators, then of solutions of integrable motions."""
-    found = with_classes(points)
-    general = contests(found[found["class"] != MethodClass.SOLUTION])
-    solutions = contests(found[found["class"].isin([*OF_ENGINES, MethodClass.SOLUTION])])
-    return [*statements(general), *_solutions(solutions)]
+    reached = costs(points, DECADES)
+    return [*statements(sides(reached, MethodClass.GENERAL)), *_solutions(sides(reached, MethodClass.SOLUTION))]
 
 
-def of_random_bodies(found: Iterable[RandomContest]) -> list[Statement]:
+def of_random_bodies(found: Iterable[RandomRatios]) -> list[Statement]:
     """Return on how many random bodies of each field an engine is faster, or alone in getting there, and by how much."""
-    against = [contest for contest in found if contest.engine == ANY and contest.pairs]
+    against = [contest for contest in found if contest.engine == ANY and contest.contests]
     fields = dict.fromkeys(contest.field for contest in against)
     return [_random(field, [contest for contest in against if contest.field == field]) for field in fields]
 
 
-def _random(field: str, members: list[RandomContest]) -> Statement:
+def _random(field: str, members: list[RandomRatios]) -> Statement:
     where = f"random bodies, {field}"
     lost = [(1 / pair.ratio, contest.error) for contest in members for pair in contest.both if pair.ratio < 1]
-    alone = sum(contest.only_engine for contest in members)
+    alone = sum(contest.only_theirs for contest in members)
     if not (lost or alone):
         decades = f"{tolerance(members[0].error)} to {tolerance(members[-1].error)} rad"
-        count = len(members[0].pairs)
+        count = len(members[0].contests)
         bodies = count_bodies(count) if count == 1 else f"any of {count_bodies(count)}"
         return Statement(where, f"no engine is faster than our general integrators on {bodies}, at {decades}.")
-    total = sum(len(contest.pairs) for contest in members)
+    total = sum(len(contest.contests) for contest in members)
     most, error = max(lost, default=(1.0, 0.0))
     slower = f"an engine is faster than our general integrators in {len(lost)} of {total} cases (a body and a decade), "
     slower += f"by up to {factor(most)} times, at {tolerance(error)} rad"
@@ -111,13 +107,12 @@ def of_each_step(scene: str, each: EachStep) -> Iterator[Statement]:
     )
     steps = f"steps of {each.interval:.3g} s, at which a solver need not stop"
     alone = f"where the end alone is kept of {steps}, at {tolerance(ERROR)} rad"
-    for points, where in ((each.kept, kept), (each.alone, alone)):
-        for kind in (MethodClass.GENERAL, MethodClass.SOLUTION) if len(points) else ():
-            ours, engine = cheapest(points, (kind,), ERROR), cheapest(points, OF_ENGINES, ERROR)
+    for found, where in ((each.kept, kept), (each.alone, alone)):
+        for kind in (MethodClass.GENERAL, MethodClass.SOLUTION) if len(found) else ():
+            ours, engine = cheapest(of_classes(found, kind)), cheapest(of_classes(found, *OF_ENGINES))
             if ours and engine:
-                names = (f"{ours.name} ({kind})", engine.name)
                 ratio = engine.time / ours.time
-                yield Statement(scene, f"{_faster(names, ratio)}, {where}.", ratio < 1 / TIE)
+                yield Statement(scene, f"{_faster((f'{ours.name} ({kind})', engine.name), ratio)}, {where}.", ratio < 1 / TIE)
 
 
 def _faster(names: tuple[str, str], ratio: float) -> str:

@@ -12,7 +12,7 @@ from conservative.benchmarks.studies import sphere_curves, step_ladder
 from conservative.method import Method
 from conservative.scene import Scene
 
-from . import each_step, lines, orders, overview, scene, scene_contests, work_precision
+from . import lines, orders, overview, scene, scene_contests, work_precision
 from .cells import Table
 from .classes import without_solutions
 from .summary import Summary, of_scene
@@ -103,7 +103,7 @@ class SceneViews:
     def scene(self, value: Scene) -> SceneView:
         """Return the view of one scene."""
         name, table = value.name, self.table
-        points, drifts, each = _of(self.points, name), _of(self.drifts, name), each_step.of_scene(table, name)
+        points, drifts, each = _of(self.points, name), _of(self.drifts, name), scene_contests.each_step(table, name)
         interval = value.t_end / step_ladder.SAMPLES
         points = points.assign(sample=points["time"] * interval)
         fits, curves = _of(self.fits, name), _of(self.curves, name)
@@ -124,7 +124,7 @@ class SceneViews:
             fit_ends=orders.fit_ends(orders.with_slopes(fits, fits)),
             curves=curves,
             without_curve=tuple(method.name for method in self.pictures if method.name not in set(curves["method"])),
-            contests=scene_contests.contests(points, interval, each),
+            contests=scene_contests.as_table(points, interval, each),
             drift=scene.drift(table, name),
             conservation=overview.conservation(table, name),
             accuracy=scene.accuracy(table, name),

@@ -15,7 +15,7 @@ from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
 from ..labels import with_names
-from . import random_contests, random_ratios, throughput
+from . import random_bodies, throughput
 from .cells import DASH, Cell, Table, markdown, number
 from .rows import prefix_quantity
 
@@ -54,10 +54,10 @@ class StudyRows:
             return list(zip(captions, (self._many.ratios, self._many.costs, self._many.absent), strict=True))
         if self.name != RANDOM:
             return [(f"{self.name}: {len(self.table)} rows", rows_table(self.table))]
-        contests = random_contests.contests(self.table)
+        contests = random_bodies.ratios(with_names(self.table))
         return [
-            ("Random bodies: the cheapest engine's time over ours", random_ratios.as_table(contests)),
-            ("Random bodies: each engine's time over ours, mean (worst to best)", random_ratios.by_engine(contests)),
+            ("Random bodies: the cheapest engine's time over ours", random_bodies.as_table(contests)),
+            ("Random bodies: each engine's time over ours, mean (worst to best)", random_bodies.by_engine(contests)),
         ]
 
     @property
@@ -65,7 +65,7 @@ class StudyRows:
         """What it comes to, in words; only of random bodies, and of many."""
         if self._many:
             return self._many.statements
-        return random_ratios.statements(random_contests.contests(self.table)) if self.name == RANDOM else ()
+        return random_bodies.statements(random_bodies.ratios(with_names(self.table))) if self.name == RANDOM else ()
 
     def csv_text(self) -> str:
         """Return the rows as CSV, in the columns of a report's measurements.csv."""
@@ -73,8 +73,8 @@ class StudyRows:
 
     def json_text(self) -> str:
         """Return everything as JSON; null stands for a number that could not be measured."""
-        contests = random_contests.contests(self.table) if self.name == RANDOM else ()
-        ratios = {"ratios": random_ratios.records(contests)} if contests else {}
+        contests = random_bodies.ratios(with_names(self.table)) if self.name == RANDOM else ()
+        ratios = {"ratios": random_bodies.records(contests)} if contests else {}
         parts = {**ratios, "rows": _records(self.table), "samples": _records(self.samples)}
         return json.dumps({"study": self.name, **self.made, **parts}, indent=1, ensure_ascii=False)
 
@@ -82,7 +82,7 @@ class StudyRows:
         """Return tables and statements as Markdown, and how they were made."""
         tables = [f"## {caption}\n\n{markdown(table)}" for caption, table in self.tables]
         said = ["\n".join(f"- {text}" for text in self.statements)] if self.statements else []
-        terms = {RANDOM: [random_ratios.TERMS], THROUGHPUT: [throughput.TERMS]}.get(self.name, [])
+        terms = {RANDOM: [random_bodies.TERMS], THROUGHPUT: [throughput.TERMS]}.get(self.name, [])
         made = "\n".join(["| | |", "| --- | --- |", *(f"| {name} | {value} |" for name, value in self.made.items())])
         return "\n\n".join([f"# Study: {self.name}", *terms, *said, *tables, f"## How this was made\n\n{made}"]) + "\n"
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pandas as pd
 
+from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.drift_class import CONSERVED, SMALL
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind
 
-from .cells import DASH, Row, Table, factor, number, tolerance
-from .classes import OF_ENGINES, MethodClass, with_classes
-from .each_step import EachStep
+from .cells import DASH, Table, factor, number, tolerance
+from .classes import OF_ENGINES, MethodClass, of_classes
 from .families import first_names, picture
 from .rows import without_outcome
-from .work_precision import cost
+from .scene_contests import EachStep
 
 ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad, that classes are compared at."""
@@ -73,89 +72,65 @@ class Summary:
     classes: Table
 
 
-@dataclass(frozen=True)
-class Cheapest:
-    """The cheapest line of a class at an error: its name, its family, and its time, s per simulated second."""
-
-    name: str
-    family: str
-    time: float
-
-
 def of_scene(
     points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame, integrable: bool, each: EachStep | None = None
 ) -> Summary:
     """Return the summary of a scene: its points, drifts over long runs, failures (see `overview`), samples at each step."""
-    found, data = with_classes(points), picture(points)
-    rows = [_row(kind, found, drifts, troubles) for kind in MethodClass]
+    data, reached, fine = picture(points), costs(points, ERRORS), costs(points, FINE)
+    scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
+    sentence = _sentence(scene, reached[reached["error"] == MIDDLE], integrable)
+    engine = cheapest(of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES))
+    budget = engine.time if engine else math.nan
+    rows = []
+    for kind in MethodClass:
+        members = of_classes(points, kind)
+        row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not take it, or was not measured"]
+        if len(members):
+            families = members["family"].unique()
+            best = [cheapest(of_classes(reached[reached["error"] == error], kind)) for error in ERRORS]
+            row = [
+                f"{kind.value}: {', '.join(families)}",
+                keeps(drifts[drifts["family"].isin(families)]),
+                _error_at(of_classes(fine, kind), budget),
+                *(f"{microseconds(each.time)} {each.name}" if each else DASH for each in best),
+                "; ".join(_failures(troubles[troubles["family"].isin(families)])) or "nowhere here",
+            ]
+        rows.append(row)
     if each is None or each.kept.empty:  # the report has no study of samples at each step
-        return Summary(_sentence(found, integrable), data, first_names(data), (HEADER, rows))
+        return Summary(sentence, data, first_names(data), (HEADER, rows))
     rows = [[*row[:-1], _sample(kind, each), row[-1]] for kind, row in zip(MethodClass, rows, strict=True)]
-    return Summary(_sentence(found, integrable), data, first_names(data), (SCENE_HEADER, rows))
+    return Summary(sentence, data, first_names(data), (SCENE_HEADER, rows))
 
 
 def _sample(kind: MethodClass, each: EachStep) -> str:
-    """Return what a sample costs in a class where all are kept, by whom, and where the end alone is kept."""
-    kept, alone = (cheapest(points, (kind,), ERROR) if len(points) else None for points in (each.kept, each.alone))
+    """Return the cost of a sample in a class with every step stored and with the final state only, and the methods."""
+    kept, alone = (cheapest(of_classes(found, kind)) for found in (each.kept, each.alone))
     if kept is None or alone is None:
         return DASH
     other = "" if alone.name == kept.name else f" {alone.name}"
-    costs = [microseconds(found.time * each.interval) for found in (kept, alone)]
-    return f"{costs[0]} {kept.name}; the end alone: {costs[1]}{other}"
+    stored, final = (microseconds(found.time * each.interval) for found in (kept, alone))
+    return f"{stored} {kept.name}; the end alone: {final}{other}"
 
 
-def cheapest(points: pd.DataFrame, classes: tuple[str, ...], error: float) -> Cheapest | None:
-    """Return the cheapest line of some classes at an error, rad; None where none gets there."""
-    members = points[points["class"].isin(classes)]
-    costs = [
-        Cheapest(str(name), str(line["family"].iloc[0]), cost(line, error))
-        for name, line in members.groupby("name", sort=False)
-    ]
-    return min((each for each in costs if not math.isnan(each.time)), key=lambda each: each.time, default=None)
-
-
-def _sentence(points: pd.DataFrame, integrable: bool) -> str:
-    """Return which side gets to `MIDDLE` faster, without our solutions of integrable motions, and what those do."""
-    ours, engine = cheapest(points, (MethodClass.GENERAL,), MIDDLE), cheapest(points, OF_ENGINES, MIDDLE)
-    solution = cheapest(points, (MethodClass.SOLUTION,), MIDDLE)
-    scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
-    kind = "is integrable, with a closed form" if integrable else "is not integrable: no closed form is known"
-    return f"{scene} {kind}. {' '.join(filter(None, [_contest(ours, engine), _solution(solution, engine)]))}"
-
-
-def _contest(ours: Cheapest | None, engine: Cheapest | None) -> str:
+def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
+    """Return which side reaches `MIDDLE` faster without our solutions of integrable motions, and how fast those are."""
+    ours, engine = cheapest(of_classes(reached, MethodClass.GENERAL)), cheapest(of_classes(reached, *OF_ENGINES))
+    solution = cheapest(of_classes(reached, MethodClass.SOLUTION))
+    parts = [f"{scene} {'is integrable, with a closed form' if integrable else 'is not integrable: no closed form is known'}."]
     goal = f"{tolerance(MIDDLE)} rad"
-    if ours is None or engine is None:
-        there = ours or engine
-        return f"Only {there.name} gets to {goal}." if there else f"Nothing measured gets to {goal}."
-    ratio = engine.time / ours.time
-    first, second = (ours, engine) if ratio >= 1 else (engine, ours)
-    ours_first = "Our cheapest general integrator", "the cheapest engine"
-    one, other = ours_first if ratio >= 1 else ("The cheapest engine", "our cheapest general integrator")
-    return f"{one}, {first.name}, gets to {goal} {factor(max(ratio, 1 / ratio))} times as fast as {other}, {second.name}."
-
-
-def _solution(solution: Cheapest | None, engine: Cheapest | None) -> str:
-    if solution is None or engine is None:
-        return ""
-    ratio = engine.time / solution.time
-    return f"{solution.name}, which solves integrable motions only, is {factor(ratio)} times as fast as {engine.name} there."
-
-
-def _row(kind: MethodClass, points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame) -> Row:
-    members = points[points["class"] == kind]
-    if members.empty:
-        return [kind.value, *[DASH] * (len(HEADER) - 2), "does not take it, or was not measured"]
-    costs = [cheapest(members, (kind,), error) for error in ERRORS]
-    budget = cheapest(points, OF_ENGINES, MIDDLE)
-    families = set(members["family"])
-    return [
-        f"{kind.value}: {', '.join(dict.fromkeys(members['family']))}",
-        keeps(drifts[drifts["family"].isin(families)]),
-        _error_at(members, kind, budget.time if budget else math.nan),
-        *(f"{microseconds(each.time)} {each.name}" if each else DASH for each in costs),
-        "; ".join(_failures(troubles[troubles["family"].isin(families)])) or "nowhere here",
-    ]
+    if ours and engine:
+        first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
+        sides = ["our cheapest general integrator", "the cheapest engine"][:: 1 if first is ours else -1]
+        times = f"{factor(second.time / first.time)} times as fast as {sides[1]}, {second.name}."
+        parts.append(f"{sides[0].capitalize()}, {first.name}, gets to {goal} {times}")
+    elif there := ours or engine:
+        parts.append(f"Only {there.name} gets to {goal}.")
+    else:
+        parts.append(f"Nothing measured gets to {goal}.")
+    if solution and engine:
+        ratio = factor(engine.time / solution.time)
+        parts.append(f"{solution.name}, which solves integrable motions only, is {ratio} times as fast as {engine.name} there.")
+    return " ".join(parts)
 
 
 def microseconds(time: float) -> str:
@@ -180,15 +155,10 @@ def _kind(quantity: str) -> str:
     return "momenta" if "moment" in quantity else quantity
 
 
-def _error_at(points: pd.DataFrame, kind: MethodClass, budget: float) -> str:
-    """Return the smallest of `FINE` that a class gets to at a cost, s per simulated second: smaller ones never cost less."""
-
-    def too_dear(error: float) -> bool:
-        found = cheapest(points, (kind,), error)
-        return found is None or not found.time <= budget * (1 + 1e-9)
-
-    first = bisect_left(FINE, True, key=too_dear)
-    return number(FINE[first - 1], 1) if first else DASH if math.isnan(budget) else f"over {FINE[0]:g}"
+def _error_at(found: pd.DataFrame, budget: float) -> str:
+    """Return the smallest of `FINE` that a class reaches at a cost, s per simulated second."""
+    within = found[found["time"] <= budget * (1 + 1e-9)]["error"]
+    return number(float(within.min()), 1) if len(within) else DASH if math.isnan(budget) else f"over {FINE[0]:g}"
 
 
 def _failures(troubles: pd.DataFrame) -> Iterator[str]:

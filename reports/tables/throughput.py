@@ -1,22 +1,22 @@
-"""The study of throughput as tables, words and data of a picture; see `throughput_lines`."""
+"""The study of throughput: what a body costs among many at an error, and ratios of each engine to ours."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
+from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
-from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN
+from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
 from conservative.outcome import OutcomeKind
 
-from .cells import DASH, Cell, Grade, Table, number, tolerance
-from .classes import MethodClass
-from .random_ratios import ratio_text
-from .throughput_lines import Contest, Line, contests, lines
+from .cells import DASH, Cell, Table, number, tolerance
+from .classes import OF_ENGINES, MethodClass, class_of
+from .random_bodies import grade, ratio_text
 
 TERMS = (
     "The bodies all differ: asymmetric, in turned frames, heavy tops with no point on an axis, or free, drawn from a seed. "
@@ -26,12 +26,15 @@ TERMS = (
     "not count. Solutions of integrable motions are a class apart: solutions take steps of 0.1 s, and would take any. Where "
     "nothing else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
 )
-"""What the tables mean."""
+"""Explanation of the tables."""
+LINE = ["scene", "name", "line", "way", "family", "class"]
+"""Columns that identify a method in one way of running many bodies; `name` includes the way, `line` does not."""
+STATISTICS = (MEDIAN, MOST)
 
 
 @dataclass(frozen=True, eq=False)
 class ThroughputView:
-    """What a report shows of many bodies: `points` has columns kind, error, name, family, size and time, µs."""
+    """The section of a report; `points` has columns kind, error, name, family, size and time, µs."""
 
     statements: tuple[str, ...]
     ratios: Table
@@ -41,70 +44,112 @@ class ThroughputView:
 
 
 def view(table: pd.DataFrame) -> ThroughputView:
-    """Return the view of the named rows of the study."""
-    found = lines(table)
-    compared = list(contests(found))
+    """Return the section from named rows of the study (see `labels.with_names`)."""
+    rows = lines(table)
+    reached = body_costs(rows)
+    compared = list(contests(rows, reached))
+    points = reached[reached["statistic"] == MEDIAN].assign(time=reached["time"] * 1e6)
+    points = points.rename(columns={"scene": "kind", "bodies": "size"})[["kind", "error", "name", "family", "size", "time"]]
     return ThroughputView(
-        tuple(statements(compared)), as_table(compared), cost_table(found), absent(table), chart_points(found)
+        tuple(statements(compared)), as_table(compared), cost_table(rows, reached), absent(table), points.reset_index(drop=True)
     )
 
 
-def as_table(compared: Iterable[Contest]) -> Table:
+def lines(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the study with a value, with the columns of `LINE`."""
+    rows = table[(table["study"] == THROUGHPUT) & (table["measure"] != Measure.AGREEMENT.text)]
+    kinds = [class_of(role, method).value for role, method in zip(rows["role"], rows["method"], strict=True)]
+    rows = rows.assign(name=rows["line"].where(rows["way"] == "", rows["line"] + ", " + rows["way"]), **{"class": kinds})
+    return rows[rows["value"].notna() | (rows["class"] == MethodClass.SOLUTION)]
+
+
+def body_costs(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the time per body and simulated second, s: columns of `LINE`, bodies, statistic, error (rad) and time."""
+    setting = [*LINE, "method", "dt"]
+    values = {measure: rows[rows["measure"] == measure.text] for measure in (Measure.ATTITUDE_MAX, Measure.TIME)}
+    errors = values[Measure.ATTITUDE_MAX][[*setting, "quantity", "value"]].dropna()
+    errors = errors.rename(columns={"quantity": "statistic", "value": "error"})
+    times = values[Measure.TIME][[*setting, "bodies", "value"]].dropna().rename(columns={"value": "time"})
+    sizes = times[[*LINE, "bodies"]].drop_duplicates()  # each setting counts at each size, whether it was timed there or not
+    points = errors.merge(sizes, on=LINE).merge(times, how="left", on=[*setting, "bodies"])
+    reached = costs(points, ERRORS, [*LINE, "statistic", "bodies"])
+    return reached.astype({"bodies": int})
+
+
+def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[tuple[MethodClass, str, str, int, Contest]]:
+    """Yield class of ours, engine, statistic, number of bodies and contest, whose scene is the kind of the bodies.
+
+    Both sides run bodies at once on one thread, or in their only way. The number of bodies is the largest with times of both
+    sides, or of either.
+    """
+    engine = rows["class"].isin(OF_ENGINES)
+    plain = rows[(rows["way"] == "") | (engine & (rows["way"] == "one at a time"))]
+    for kind, here in plain.groupby("scene", sort=False):
+        engines = here[here["class"].isin(OF_ENGINES)]["family"].unique()
+        for group in (MethodClass.GENERAL, MethodClass.SOLUTION):
+            names = here[here["class"] == group]["name"].unique()
+            for rival in engines if len(names) else ():
+                theirs = here[(here["family"] == rival) & here["class"].isin(OF_ENGINES)]["name"].unique()
+                for statistic in STATISTICS:
+                    at = reached[(reached["scene"] == kind) & (reached["statistic"] == statistic)]
+                    sides = at[at["name"].isin(names)], at[at["name"].isin(theirs)]
+                    timed = here[
+                        here["name"].isin([*names, *theirs]) & (here["measure"] == Measure.TIME.text) & here["value"].notna()
+                    ]
+                    for error in ERRORS:
+                        yield group, str(rival), statistic, *_largest(str(kind), error, sides, timed["bodies"])
+
+
+def _largest(kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], timed: pd.Series[float]) -> tuple[int, Contest]:
+    """Return the contest among the most bodies at which both sides reach the error; else the one among the fewest."""
+    sizes = sorted(map(int, timed.unique()), reverse=True) or [1]
+    for size in sizes:
+        ours, theirs = (cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides)
+        if ours and theirs:
+            break
+    return size, Contest(kind, error, ours, theirs)
+
+
+Compared = tuple[MethodClass, str, str, int, Contest]
+
+
+def as_table(compared: Iterable[Compared]) -> Table:
     """Return the contests, a row for each kind, engine and error."""
-    header = [
-        "bodies",
-        "of our methods",
-        "engine",
-        "error, rad",
-        "at",
-        "number",
-        "engine / ours",
-        "ours, µs",
-        "engine, µs",
-        "ours is",
-        "engine is",
-    ]
-    return header, [_contest_row(contest) for contest in compared]
+    header = ["bodies", "of our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
+    return [*header, "ours is", "engine is"], [_contest_row(*each) for each in compared]
 
 
-def _contest_row(contest: Contest) -> list[str | Cell]:
-    ours, theirs, ratio = contest.ours, contest.theirs, contest.ratio
-    good = ratio >= 1
-    graded = (
-        Cell(DASH, Grade.NONE)
-        if math.isnan(ratio)
-        else Cell(f"{'✓' if good else '✗'} {ratio_text(ratio)}", Grade.GOOD if good else Grade.BAD)
-    )
-    times = [number(each.time * 1e6, 3) if each else DASH for each in (ours, theirs)]
-    names = [each.label if each else "no time" for each in (ours, theirs)]
-    kind, error = contest.kind.replace("_", " "), tolerance(contest.error)
-    return [kind, contest.group.value, contest.engine, error, contest.which, f"{contest.size:,}", graded, *times, *names]
+def _contest_row(group: MethodClass, engine: str, statistic: str, size: int, contest: Contest) -> list[str | Cell]:
+    sides: tuple[Cheapest | None, Cheapest | None] = (contest.ours, contest.theirs)
+    times = [number(each.time * 1e6, 3) if each else DASH for each in sides]
+    names = [each.name if each else "no time" for each in sides]
+    at = [contest.scene.replace("_", " "), group.value, engine, tolerance(contest.error), statistic, f"{size:,}"]
+    return [*at, grade(contest.ratio), *times, *names]
 
 
-def cost_table(found: Iterable[Line]) -> Table:
+def cost_table(rows: pd.DataFrame, reached: pd.DataFrame) -> Table:
     """Return every line: body-steps per second at best, the least preparation, and the time among most bodies at each error."""
     header = ["bodies", "method", "class", "10^6 body-steps/s, best", "preparation, µs a body, least"]
-    return [*header, *(f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS)], [
-        _cost_row(line) for line in found
-    ]
+    body = []
+    for (kind, name, _, _, _, group), members in rows.groupby(LINE, sort=False):
+        rate, prepare = (members[members["measure"] == each.text]["value"] for each in (Measure.BODY_STEPS, Measure.PREPARE))
+        mine = reached[(reached["scene"] == kind) & (reached["name"] == name) & (reached["statistic"] == MEDIAN)]
+        times = [_cost_text(mine[mine["error"] == error]) for error in ERRORS]
+        figures = [number(float(rate.max()) / 1e6, 3), number(float(prepare.min()) * 1e6, 3)]
+        body.append([str(kind).replace("_", " "), str(name), str(group), *figures, *times])
+    return [*header, *(f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS)], body
 
 
-def _cost_row(line: Line) -> list[str]:
-    rate, prepare = line.best(Measure.BODY_STEPS, max), line.best(Measure.PREPARE, min)
-    costs = [_cost_text(line, error) for error in ERRORS]
-    return [line.kind.replace("_", " "), line.label, line.group.value, number(rate / 1e6, 3), number(prepare * 1e6, 3), *costs]
-
-
-def _cost_text(line: Line, error: float) -> str:
-    """Return the time among the most bodies at which the line gets to an error, and how many those are."""
-    for size in reversed(line.sizes):
-        if not math.isnan(time := line.cost(error, size)):
-            return f"{number(time * 1e6, 3)} ({size:,})"
-    return DASH
+def _cost_text(found: pd.DataFrame) -> str:
+    """Return the time among the most bodies at which a line reaches an error, and their number."""
+    if found.empty:
+        return DASH
+    most: pd.Series[Any] = found.sort_values("bodies").iloc[-1]
+    return f"{number(most['time'] * 1e6, 3)} ({most['bodies']:,})"
 
 
 def absent(table: pd.DataFrame) -> Table:
-    """Return what of the study did not run, and why; what would have taken too long is left out where fewer bodies ran."""
+    """Return what did not run, and why; sizes left out for lack of time are not listed, as fewer bodies ran."""
     here = table["study"] == THROUGHPUT
     failed = table[
         here & ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
@@ -114,36 +159,21 @@ def absent(table: pd.DataFrame) -> Table:
     return ["bodies", "method", "why not"], rows
 
 
-def statements(compared: Iterable[Contest]) -> Iterator[str]:
-    """Yield what is found at the median, a sentence for each kind, engine and class of ours."""
-    groups: dict[tuple[str, str, MethodClass], list[Contest]] = {}
-    for contest in compared:
-        if contest.which == MEDIAN:
-            groups.setdefault((contest.kind, contest.engine, contest.group), []).append(contest)
-    for (kind, engine, group), members in groups.items():
-        yield f"{kind.replace('_', ' ')}, the cheapest of {group} against {engine}: {'; '.join(map(_words, members))}."
+def statements(compared: Iterable[Compared]) -> Iterator[str]:
+    """Yield the results at the median, a sentence for each kind, engine and class of ours."""
+    groups: dict[tuple[str, str, MethodClass], list[str]] = {}
+    for group, engine, statistic, size, contest in compared:
+        if statistic == MEDIAN:
+            groups.setdefault((contest.scene, engine, group), []).append(_words(engine, size, contest))
+    for (kind, engine, group), words in groups.items():
+        yield f"{kind.replace('_', ' ')}, the cheapest of {group} against {engine}: {'; '.join(words)}."
 
 
-def _words(contest: Contest) -> str:
-    at = f"at {tolerance(contest.error)} rad"
+def _words(engine: str, size: int, contest: Contest) -> str:
+    at, ratio = f"at {tolerance(contest.error)} rad", contest.ratio
     if not contest.ours or not contest.theirs:
-        missing = [name for name, side in (("ours", contest.ours), (contest.engine, contest.theirs)) if not side]
+        missing = [name for name, side in (("ours", contest.ours), (engine, contest.theirs)) if not side]
         return f"{at} there is no time of {' and '.join(missing)}"
-    ratio, among = contest.ratio, f"among {contest.size:,}"
-    return (
-        f"{at} {contest.engine} takes {ratio_text(ratio)} times as long ({among})"
-        if ratio >= 1
-        else (f"{at} {contest.engine} is {ratio_text(1 / ratio)} times as fast as ours ({among})")
-    )
-
-
-def chart_points(found: Iterable[Line]) -> pd.DataFrame:
-    """Return the time of each line at each error over the number of bodies."""
-    rows = [
-        (line.kind, error, line.label, line.family, size, line.cost(error, size) * 1e6)
-        for line in found
-        for error in ERRORS
-        for size in line.sizes
-        if not math.isnan(line.cost(error, size))
-    ]
-    return pd.DataFrame(rows, columns=["kind", "error", "name", "family", "size", "time"])
+    if ratio >= 1:
+        return f"{at} {engine} takes {ratio_text(ratio)} times as long (among {size:,})"
+    return f"{at} {engine} is {ratio_text(1 / ratio)} times as fast as ours (among {size:,})"

@@ -1,76 +1,55 @@
-"""Error against time: what each side needs to reach an error, and where it is beaten.
-
-The cost of an error on a line of measured points is that of `cost_at_error`: no lucky point counts, between two neighbouring
-points the time is interpolated log-log, and nothing is extrapolated.
-"""
+"""Errors and times of runs over steps and tolerances: the points of lines, whose costs are in `benchmarks.contest`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
 
 import pandas as pd
 
-from conservative.benchmarks.measures import cost_at_error
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
+from .classes import class_of
 from .rows import of_study, with_outcome
 
-_NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
 DECADES = tuple(10.0**-k for k in range(1, 14))
+_NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
 _KEYS = ["scene", "series", "method", *_NAMES, "role", "dt"]
 
 
-@dataclass(frozen=True)
-class CheapestLine:
-    """The line that gets to an error in the least time, and that time, s per simulated second."""
+def points(
+    table: pd.DataFrame, study: str = "work_precision", time: Measure = Measure.TIME, untimed: bool = False
+) -> pd.DataFrame:
+    """Return the points of the work-precision study, or of another one with errors and times over steps.
 
-    name: str
-    time: float
+    Parameters
+    ----------
+    table
+        Measurements with names (see `labels.with_names`).
+    study, time
+        Name of the study, and the measure of the time.
+    untimed
+        Whether settings without a time are included, as points with the time NaN.
 
-
-@dataclass(frozen=True)
-class Contest:
-    """An error, and the cheapest way there of either side; None where a side does not get there.
-
-    Ours are whatever the points have of ours: general integrators, or solutions of integrable motions (see `classes`).
-    """
-
-    scene: str
-    error: float
-    ours: CheapestLine | None
-    theirs: CheapestLine | None
-
-    @property
-    def ratio(self) -> float:
-        """How many times faster ours is; below 1 where theirs is; nan where a side does not get there."""
-        return self.theirs.time / self.ours.time if self.ours and self.theirs else math.nan
-
-    @property
-    def lost(self) -> bool:
-        """Whether an engine gets there faster, or alone."""
-        return self.theirs is not None and (self.ours is None or self.ratio < 1)
-
-
-def points(table: pd.DataFrame, study: str = "work_precision", time: Measure = Measure.TIME) -> pd.DataFrame:
-    """Return the measured points of the work-precision study, or of another one with errors and times over steps.
-
-    Columns scene, series, name (what to call its line), method, family, version, setting (of the line), role, dt, error (rad),
-    time (s per simulated second, by the measure `time`); of each line coarse to fine. An error below what the truth is known
-    to is raised to that.
+    Returns
+    -------
+    pd.DataFrame
+        Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see `classes`),
+        dt, error (rad) and time (s per simulated second); each line coarse to fine. An error below the resolution of the
+        reference solution is raised to it.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)
     values = {Measure.ATTITUDE_MAX.text: "error", time.text: "time"}
-    rows = rows[rows["measure"].isin(list(values))]
+    rows = rows[rows["measure"].isin(list(values)) & (rows["role"] != Role.TRUTH.value)]
     wide = rows.pivot_table(index=_KEYS, columns="measure", values="value").reset_index()
     wide = rows[_KEYS].drop_duplicates().merge(wide, how="left", on=_KEYS)  # pivot_table orders rows by the values of the keys
     wide = wide.reindex(columns=[*_KEYS, *values]).rename(columns=values)
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(truth_resolution(table)).fillna(0.0))
-    return _name_lines(wide.dropna(subset=["error", "time"]).reset_index(drop=True))
+    wide = wide.dropna(subset=["error"] if untimed else ["error", "time"]).reset_index(drop=True)
+    kinds = [class_of(role, method).value for role, method in zip(wide["role"], wide["method"], strict=True)]
+    return _name_lines(wide.assign(**{"class": pd.Series(kinds, index=wide.index, dtype="string")}))
 
 
 def all_points(table: pd.DataFrame) -> pd.DataFrame:
@@ -82,7 +61,7 @@ def all_points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def truth_resolution(table: pd.DataFrame) -> dict[str, float]:
-    """Return, for scenes whose truth is approximate (see `Truth`), how far two of its kind agree, rad."""
+    """Return the largest angle between two reference solutions, rad, for scenes without an exact one (see `Truth`)."""
     rows = table[(table["measure"] == Measure.AGREEMENT.text) & (table["detail"] == APPROXIMATE)]
     return {str(scene): float(value) for scene, value in rows.groupby("scene")["value"].max().items()}
 
@@ -95,28 +74,7 @@ def _name_lines(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def front(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of one scene that no other beats in both error and time, cheap to dear."""
+    """Return the points of one scene that no other beats in both error and time, cheapest first."""
     ordered = points.sort_values(["time", "error"])
     best_before = ordered["error"].cummin().shift(fill_value=math.inf)
     return ordered[ordered["error"] < best_before]
-
-
-def cost(line: pd.DataFrame, error: float) -> float:
-    """Return the time at which a line, points coarse to fine, gets to an error; nan where it does not."""
-    return cost_at_error.cost(line["error"].tolist(), line["time"].tolist(), error)
-
-
-def contests(points: pd.DataFrame, decades: Iterable[float] = DECADES) -> list[Contest]:
-    """Return the contest at each decade that at least one side reaches, for each scene."""
-    out = []
-    for scene, members in points.groupby("scene", sort=False):
-        for error in decades:
-            ours, theirs = (_cheapest(members[members["role"] == role.value], error) for role in (Role.OURS, Role.ENGINE))
-            if ours or theirs:
-                out.append(Contest(str(scene), error, ours, theirs))
-    return out
-
-
-def _cheapest(members: pd.DataFrame, error: float) -> CheapestLine | None:
-    costs = [CheapestLine(str(name), cost(line, error)) for name, line in members.groupby("name", sort=False)]
-    return min((c for c in costs if not math.isnan(c.time)), key=lambda c: c.time, default=None)

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from conservative import BadInput, MissingEngine, registry, scenes
+from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
@@ -16,12 +17,11 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import differences, terms
 from conservative.reports.tables.cells import Grade
-from conservative.reports.tables.classes import OF_ENGINES, with_classes
+from conservative.reports.tables.classes import OF_ENGINES, of_classes
 from conservative.reports.tables.closing import verdict
 from conservative.reports.tables.engine_rows import engine_rows, points_of
 from conservative.reports.tables.engine_scenes import engine_scenes
 from conservative.reports.tables.engine_tables import beside, every_setting
-from conservative.reports.tables.summary import cheapest
 from conservative.reports.tables.work_precision import all_points
 
 from .made_up import SCENE, STEPS, at_step, over_steps
@@ -164,9 +164,9 @@ def test_the_verdict_counts_engines_that_only_their_own_studies_measured():
         for each in point("reduced", "ours", error, 1e-5 / dt, dt, scene=SCENE)
     ]
     found = table(ours, over_steps("a==1", "RK4", (1e-5, 1e-7, 1e-9, 1e-11), 4.0))
-    points = with_classes(all_points(found))
+    points = all_points(found)
     assert set(points["name"]) == {"reduced", "a 1 RK4"}
-    assert cheapest(points, OF_ENGINES, 1e-6).name == "a 1 RK4"
+    assert cheapest(of_classes(costs(points, [1e-6]), *OF_ENGINES)).name == "a 1 RK4"
     assert verdict(points, [SCENE]).startswith(f"At 1e-6 rad, without closed forms: on {SCENE} ")
     assert "a 1 RK4" in verdict(points, [SCENE])
     assert len(all_points(table(ours))) == 2

@@ -9,18 +9,18 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
 from conservative.reports import document, view
-from conservative.reports.charts.random_ratios import ratios
+from conservative.reports.charts.random_ratios import ratios as draw_ratios
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import BODIES, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import terms
-from conservative.reports.tables import random_ratios
+from conservative.reports.tables import random_bodies
 from conservative.reports.tables.cells import tolerance
-from conservative.reports.tables.random_contests import ANY, contests
+from conservative.reports.tables.random_bodies import ANY, ratios
 from conservative.scenes.random_body import name_of
 
 from .made_up import measurements
-from .rows import row
+from .rows import frame, row
 
 FIELD = "spring"
 
@@ -41,7 +41,7 @@ def flat(time, least=1e-13):
 
 
 def found(*lines):
-    return contests(measurement.frame([each for rows in lines for each in rows]))
+    return ratios(frame([each for rows in lines for each in rows]))
 
 
 def against(contests_found, engine=ANY, error=1e-6):
@@ -64,23 +64,23 @@ def test_the_mean_is_geometric_and_the_worst_body_is_named():
 
 def test_a_body_that_a_side_misses_is_counted_and_not_dropped():
     contest = against(found(*TWICE, *SLOWER, *OURS_ALONE, *ENGINE_ALONE, *NEITHER))
-    assert (len(contest.pairs), len(contest.both), contest.only_ours, contest.only_engine) == (5, 2, 1, 1)
+    assert (len(contest.contests), len(contest.both), contest.only_ours, contest.only_theirs) == (5, 2, 1, 1)
     assert contest.mean == pytest.approx(1.0)
-    assert random_ratios.count_text(contest) == "2 of 5 (only ours 1, only engine 1, neither 1)"
-    assert random_ratios.count_text(against(found(*TWICE))) == "1 of 1"
+    assert random_bodies.count_text(contest) == "2 of 5 (only ours 1, only engine 1, neither 1)"
+    assert random_bodies.count_text(against(found(*TWICE))) == "1 of 1"
 
 
 def test_a_decade_that_no_pair_reaches_has_no_ratio():
     contest = against(found(*NEITHER))
     assert all(math.isnan(value) for value in (contest.mean, contest.worst, contest.best))
-    assert "neither" in random_ratios.count_text(contest)
+    assert "neither" in random_bodies.count_text(contest)
 
 
 def test_ours_is_the_cheapest_of_all_lines_and_so_is_the_engine():
     lean = line(0, "heyoka:frame=lean", "engine", flat(1.5))
     contest = against(found(*TWICE, line(0, "projected", "ours", flat(0.5)), lean, line(0, "scipy", "engine", flat(9.0))))
     assert contest.mean == pytest.approx(3.0)
-    assert (contest.pairs[0].ours.line, contest.pairs[0].engine.line) == ("projected", "heyoka:frame=lean")
+    assert (contest.contests[0].ours.name, contest.contests[0].theirs.name) == ("projected", "heyoka frame=lean")
     assert against(found(*TWICE, line(0, "scipy", "engine", flat(9.0))), "scipy").mean == pytest.approx(9.0)
 
 
@@ -94,13 +94,13 @@ def test_a_lucky_setting_of_ours_does_not_decide():
 def test_a_setting_that_was_not_timed_or_failed_is_no_way_there():
     untimed = line(0, "gauss", "ours", [(1e-13, math.nan)])
     failed = line(0, "projected", "ours", [(math.nan, math.nan)])
-    assert against(found(untimed, failed, TWICE[1])).only_engine == 1
+    assert against(found(untimed, failed, TWICE[1])).only_theirs == 1
 
 
 def test_every_decade_and_every_field_has_its_row():
     other = [line(0, name, role, flat(1.0), field="gravity") for name, role in (("gauss", "ours"), ("heyoka", "engine"))]
     every = found(*TWICE, *other)
-    _, rows = random_ratios.as_table(every)
+    _, rows = random_bodies.as_table(every)
     assert [each[:2] for each in rows] == [[field, tolerance(e)] for field in (FIELD, "gravity") for e in DECADES]
 
 
@@ -111,18 +111,18 @@ def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
 
 def test_without_an_engine_there_is_nothing_to_say():
     assert found(TWICE[0]) == ()
-    assert random_ratios.statements(found(TWICE[0])) == ()
+    assert random_bodies.statements(found(TWICE[0])) == ()
 
 
 def test_the_table_grades_a_ratio_below_one():
-    _, (first, *_) = random_ratios.as_table(found(*SLOWER))
+    _, (first, *_) = random_bodies.as_table(found(*SLOWER))
     assert str(first[3]) == "✗ 0.50"
-    assert str(random_ratios.as_table(found(*TWICE))[1][0][3]) == "✓ 2.00"
+    assert str(random_bodies.as_table(found(*TWICE))[1][0][3]) == "✓ 2.00"
     assert list(map(str, first[6:])) == ["1", "gauss", "heyoka"]
 
 
 def test_each_engine_has_a_row():
-    header, rows = random_ratios.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
+    header, rows = random_bodies.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
     assert header == ["field", "engine", "1e-3", "1e-6", "1e-9", "1e-12"]
     assert [row[:2] for row in rows] == [[FIELD, "heyoka"], [FIELD, "scipy"]]
     assert rows[0][2:5] == ["1.00 (0.50 to 2.00)"] * 3
@@ -130,16 +130,16 @@ def test_each_engine_has_a_row():
 
 
 def test_numbers_of_json_are_those_of_the_table():
-    record = random_ratios.records(found(*TWICE, *SLOWER))[0]
+    record = random_bodies.records(found(*TWICE, *SLOWER))[0]
     assert (record["mean"], record["worst_scene"], record["both"]) == (pytest.approx(1.0), name_of(FIELD, 7, 1), 2)
-    assert random_ratios.records(found(*ENGINE_ALONE))[-1]["mean"] is None
+    assert random_bodies.records(found(*ENGINE_ALONE))[-1]["mean"] is None
 
 
 def test_the_picture_draws_mean_and_band():
-    points = random_ratios.chart_points(found(*TWICE, *SLOWER, *ENGINE_ALONE))
+    points = random_bodies.chart_points(found(*TWICE, *SLOWER, *ENGINE_ALONE))
     assert len(points) == len(DECADES)
     assert points[["mean", "worst", "best"]].iloc[-1].tolist() == pytest.approx([1.0, 0.5, 2.0])
-    (panel,) = ratios(points, 3, 7).to_dict()["concat"]
+    (panel,) = draw_ratios(points, 3, 7).to_dict()["concat"]
     drawn = {(part["mark"]["type"], part["encoding"]["y"]["field"]) for part in panel["layer"]}
     assert drawn == {("area", "worst"), ("rule", "even"), ("line", "mean")}
 

@@ -8,8 +8,8 @@ import pytest
 from conservative import registry
 from conservative.benchmarks.measures import measurement
 from conservative.reports.labels import with_names
-from conservative.reports.tables import families, random_contests, random_summary, summary
-from conservative.reports.tables.classes import MethodClass, class_of, with_classes
+from conservative.reports.tables import families, random_bodies, summary
+from conservative.reports.tables.classes import MethodClass, class_of
 from conservative.reports.tables.headline import first_lost, of_points, of_random_bodies
 from conservative.reports.tables.work_precision import points
 
@@ -103,12 +103,7 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
 def test_the_cheapest_line_stands_for_its_class_whatever_the_order():
     faster = point("taylor", "ours", 1e-8, 1e-6)
     for lines in ((OURS, faster, SOLVER), (faster, OURS, SOLVER)):
-        assert (
-            summary.cheapest(
-                with_classes(points(frame([each for line in lines for each in line]))), (MethodClass.GENERAL,), 1e-6
-            ).name
-            == "taylor"
-        )
+        assert cells(told(*lines), MethodClass.GENERAL)["µs at 1e-6 rad"] == "1.0 taylor"
 
 
 def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_for_other_scenes():
@@ -149,7 +144,7 @@ def test_at_most_eight_families_are_shown_at_first_of_both_sides():
 
 def random(*lines, drifts=NOTHING):
     table = with_names(measurement.frame([each for rows in lines for each in rows]))
-    return random_summary.of_random_bodies(table, random_contests.contests(table), drifts)
+    return random_bodies.summary(table, random_bodies.ratios(table), drifts)
 
 
 def test_random_bodies_have_a_row_a_class_too():
@@ -172,10 +167,8 @@ def test_random_bodies_have_points_where_most_of_them_get_there():
 
 
 def test_what_is_lost_comes_first():
-    table = measurement.frame([each for rows in (*TWICE, *SLOWER) for each in rows])
-    found = first_lost(
-        [*of_points(points(frame([*OURS, *SOLVER, *SOLUTION]))), *of_random_bodies(random_contests.contests(table))]
-    )
+    table = frame([each for rows in (*TWICE, *SLOWER) for each in rows])
+    found = first_lost([*of_points(points(frame([*OURS, *SOLVER, *SOLUTION]))), *of_random_bodies(random_bodies.ratios(table))])
     assert [each.lost for each in found] == [True, False, False, False]
     assert "11 of 22 cases" in found[0].text
     assert "up to 2.0 times" in found[0].text

@@ -15,7 +15,6 @@ from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.tables import throughput
 from conservative.reports.tables.classes import MethodClass
-from conservative.reports.tables.throughput_lines import contests, lines
 
 from .made_up import measurements
 from .rows import row
@@ -48,32 +47,44 @@ ROWS = measurement.frame([*OURS, *ALONE, *HEYOKA, *SHORT, *FREE, *THEIRS])
 
 @pytest.fixture(scope="module")
 def compared():
-    return {(c.kind, c.engine, c.group, c.error, c.which): c for c in contests(lines(with_names(ROWS)))}
+    rows = throughput.lines(with_names(ROWS))
+    return list(throughput.contests(rows, throughput.body_costs(rows)))
+
+
+def contest(compared, kind, engine, group, error, statistic="median"):
+    """Number of bodies and contest of ours with an engine."""
+    ((size, found),) = [
+        (size, each)
+        for side, rival, which, size, each in compared
+        if (side, rival, which, each.scene, each.error) == (group, engine, statistic, kind, error)
+    ]
+    return size, found
 
 
 def test_contests_are_among_the_most_bodies_of_both_sides(compared):
-    found = compared["heavy_tops", "heyoka", GENERAL, 1e-3, "median"]
-    assert (found.size, found.ratio) == (10, pytest.approx(4.0))
-    assert found.ours.label == "taylor"  # one at a time takes less, and is another way
-    assert compared["heavy_tops", "mujoco", GENERAL, 1e-3, "median"].size == 1000
-    assert compared["heavy_tops", "mujoco", GENERAL, 1e-3, "median"].ratio == pytest.approx(1000.0)
+    size, found = contest(compared, "heavy_tops", "heyoka", GENERAL, 1e-3)
+    assert (size, found.ratio) == (10, pytest.approx(4.0))
+    assert found.ours.name == "taylor"  # one at a time takes less, and is another way
+    size, found = contest(compared, "heavy_tops", "mujoco", GENERAL, 1e-3)
+    assert (size, found.ratio) == (1000, pytest.approx(1000.0))
 
 
-def test_a_peer_that_wins_is_said_to(compared):
-    assert compared["heavy_tops", "heyoka", GENERAL, 1e-6, "median"].ratio == pytest.approx(0.5)
-    (said,) = [text for text in throughput.statements(compared.values()) if "against heyoka" in text and "tops" in text]
+def test_an_engine_that_wins_is_named(compared):
+    assert contest(compared, "heavy_tops", "heyoka", GENERAL, 1e-6)[1].ratio == pytest.approx(0.5)
+    (said,) = [text for text in throughput.statements(compared) if "against heyoka" in text and "tops" in text]
     assert "at 1e-3 rad heyoka takes 4.00 times as long (among 10)" in said
     assert "at 1e-6 rad heyoka is 2.00 times as fast as ours (among 10)" in said
 
 
-def test_what_does_not_get_there_is_no_ratio(compared):
-    (said,) = [text for text in throughput.statements(compared.values()) if "against mujoco" in text]
+def test_a_side_that_does_not_reach_the_error_has_no_ratio(compared):
+    (said,) = [text for text in throughput.statements(compared) if "against mujoco" in text]
     assert "at 1e-6 rad there is no time of mujoco" in said
-    assert compared["heavy_tops", "mujoco", GENERAL, 1e-3, "95 %"].theirs is None
+    assert contest(compared, "heavy_tops", "mujoco", GENERAL, 1e-3, "95 %")[1].theirs is None
 
 
 def test_the_table_has_every_line_and_at_how_many_bodies():
-    _, rows = throughput.cost_table(lines(with_names(ROWS)))
+    found = throughput.lines(with_names(ROWS))
+    _, rows = throughput.cost_table(found, throughput.body_costs(found))
     assert ["heavy tops", "taylor, one at a time"] in [row[:2] for row in rows]
     (heyoka,) = [row for row in rows if row[:2] == ["heavy tops", "heyoka"]]
     assert heyoka[5:7] == ["8 (10)", "20 (10)"]
@@ -112,4 +123,4 @@ def test_a_report_of_scenes_alone_and_a_quick_one_have_no_such_section():
 
 
 def test_exact_solutions_are_a_class_of_their_own(compared):
-    assert {key[2] for key in compared if key[0] == "free_bodies"} == {SOLUTION}
+    assert {group for group, *_, found in compared if found.scene == "free_bodies"} == {SOLUTION}

@@ -2,12 +2,13 @@
 
 import math
 
-import pandas as pd
 import pytest
 
+from conservative.benchmarks.contest import Cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.paper import APPROXIMATE
-from conservative.reports.tables import each_step, headline, scene_contests, summary, work_precision
+from conservative.reports.tables import headline, scene_contests, summary, work_precision
+from conservative.reports.tables.classes import MethodClass
 from conservative.reports.tables.work_precision import points
 
 from .rows import frame, point, row, table
@@ -20,26 +21,24 @@ def statements(contests):
     return [f"{found.scene}: {found.text}" for found in headline.statements(contests)]
 
 
+def contests(found, errors=work_precision.DECADES):
+    return scene_contests.sides(costs(found, errors), MethodClass.GENERAL, errors)
+
+
 def contest(error, *groups):
-    return next(c for c in work_precision.contests(work_precision.points(table(*groups)), [error]))
+    return contests(points(table(*groups)), [error])[0]
 
 
 def test_measured_point_is_its_own_cost():
     found = contest(1e-4, *OURS, *ENGINE)
-    assert found.ours == work_precision.CheapestLine("ours", 4.0)
+    assert found.ours == Cheapest(4.0, "ours")
 
 
 def test_the_cheapest_of_several_lines_counts():
     dear = (point("dear", "ours", 1e-4, 5.0), point("dearer", "engine", 1e-4, 90.0))
     found = contest(1e-4, *OURS, *ENGINE, *dear)
-    assert found.ours == work_precision.CheapestLine("ours", 4.0)
+    assert found.ours == Cheapest(4.0, "ours")
     assert found.theirs.name == "engine"
-
-
-def test_a_lucky_point_is_no_cost():
-    line = pd.DataFrame({"error": [1e-3, 1e-8, 1e-5], "time": [1.0, 2.0, 3.0]})
-    assert work_precision.cost(line, 1e-5) == 2.0
-    assert math.isnan(work_precision.cost(line, 1e-6))
 
 
 def test_between_points_the_cost_is_log_log():
@@ -51,7 +50,7 @@ def test_between_points_the_cost_is_log_log():
 def test_lines_stay_coarse_to_fine_where_they_share_steps():
     first = [point("first", "ours", dt, 1 / dt, dt=dt) for dt in (2.0, 1.0)]
     second = [point("second", "engine", dt, 1 / dt, dt=dt) for dt in (3.0, 2.0, 1.5, 1.0)]
-    found = work_precision.points(table(*first, *second))
+    found = points(table(*first, *second))
     assert found[["name", "dt"]].to_numpy().tolist() == [
         *(["first", 2.0], ["first", 1.0]),
         *(["second", 3.0], ["second", 2.0], ["second", 1.5], ["second", 1.0]),
@@ -62,10 +61,10 @@ def test_nothing_is_claimed_below_what_the_truth_is_known_to():
     def agreement(detail):
         return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
 
-    checked = work_precision.points(table(*OURS, *ENGINE, agreement(APPROXIMATE)))
-    assert [c.error for c in work_precision.contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
-    exact = work_precision.points(table(*OURS, *ENGINE, agreement("")))
-    assert work_precision.contests(exact)[-1].error == 1e-8
+    checked = points(table(*OURS, *ENGINE, agreement(APPROXIMATE)))
+    assert [c.error for c in contests(checked)] == [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
+    exact = points(table(*OURS, *ENGINE, agreement("")))
+    assert contests(exact)[-1].error == 1e-8
 
 
 def test_a_more_accurate_point_counts_for_a_larger_error():
@@ -77,7 +76,7 @@ def test_nothing_is_extrapolated():
     assert found.ours is None
     assert found.lost
     assert math.isnan(found.ratio)
-    assert work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), [1e-9]) == []
+    assert contests(points(table(*OURS, *ENGINE)), [1e-9]) == []
 
 
 def test_points_of_failed_runs_and_of_truths_do_not_compete():
@@ -93,7 +92,7 @@ def test_lines_that_differ_in_tolerance_alone_are_one():
         point("heyoka", "engine", 10.0**-k, k, method=f"heyoka:tol=1e-{k}", version="7.13.2", series_setting="body")
         for k in (3, 9)
     ]
-    found = work_precision.points(table(*groups))
+    found = points(table(*groups))
     assert found["name"].unique().tolist() == ["heyoka 7.13.2 body"]
     assert found["setting"].unique().tolist() == ["body"]
     assert found["series"].unique().tolist() == ["heyoka"]
@@ -101,13 +100,13 @@ def test_lines_that_differ_in_tolerance_alone_are_one():
 
 def test_front_is_what_nothing_beats():
     groups = (*OURS, *ENGINE, point("bad", "engine", 1e-3, 9.0))
-    front = work_precision.front(work_precision.points(table(*groups)))
+    front = work_precision.front(points(table(*groups)))
     assert front["error"].tolist() == [1e-2, 1e-3, 1e-4, 1e-8]
 
 
 def test_verdict_names_the_engine_the_errors_and_the_factor():
     decades = [1e-2, 1e-6, 1e-7]
-    lines = statements(work_precision.contests(work_precision.points(table(*OURS, *ENGINE)), decades))
+    lines = statements(contests(points(table(*OURS, *ENGINE)), decades))
     assert lines == [
         "made_up: engine is 3.5 times as fast as our general integrators, at 1e-6 rad, "  # 16 / (2 x 4^0.6)
         "and reaches 1e-7 rad, which none of them was measured to reach.",
@@ -116,7 +115,7 @@ def test_verdict_names_the_engine_the_errors_and_the_factor():
 
 
 def test_verdict_without_engines_claims_nothing():
-    lines = statements(work_precision.contests(work_precision.points(table(*OURS)), [1e-2]))
+    lines = statements(contests(points(table(*OURS)), [1e-2]))
     assert lines == ["made_up: no engine was measured."]
     assert "no engine" in statements([])[0]
 
@@ -142,7 +141,7 @@ TABLE = frame(
         row("each_step", "mujoco", "attitude error max", 1e-3, DT, role="engine"),
     ]
 )
-FOUND = each_step.of_scene(TABLE, "made_up")
+FOUND = scene_contests.each_step(TABLE, "made_up")
 
 
 def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
@@ -157,18 +156,18 @@ def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
 
 
 def test_contests_have_both_at_last_in_the_units_of_their_columns():
-    header, body = scene_contests.contests(points(TABLE), 0.5, FOUND)
+    header, body = scene_contests.as_table(points(TABLE), 0.5, FOUND)
     assert header[1:4] == ("cheapest general integrator of ours", "µs per s", "µs a sample")
     kept, alone = body[-2:]
     assert kept[:8] == ["1e-6, each 0.1 s kept", "gauss", "3.00", "0.300", "heyoka", "6.00", "0.600", "2.00"]
     assert kept[8:] == ["lame", "1.00", "0.100", "6.00"]
     assert alone[:8] == ["1e-6, each 0.1 s, the end kept", "reduced", "1.00", "0.100", "heyoka", "0.500", "0.0500", "0.500"]
-    assert len(scene_contests.contests(points(TABLE), 0.5)[1]) == len(body) - 2
+    assert len(scene_contests.as_table(points(TABLE), 0.5)[1]) == len(body) - 2
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])
 def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
-    found = each_step.of_scene(table, "made_up")
+    found = scene_contests.each_step(table, "made_up")
     assert list(headline.of_each_step("made_up", found)) == []
     assert len(found.kept) == len(found.alone) == 0
 

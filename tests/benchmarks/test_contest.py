@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from conservative.benchmarks.measures.cost_at_error import SMALLEST, cost, credit, first_within
+from conservative.benchmarks.contest import SMALLEST, cost, credit, first_within
 
 ERRORS, TIMES = [1e-1, 1e-3, 1e-5], [1.0, 2.0, 4.0]
 
