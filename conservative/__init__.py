@@ -1,13 +1,11 @@
 """Conservative integration of rigid-body rotation.
 
-The shortest use of it:
-
     import conservative as cv
 
     trajectory = cv.integrate(cv.scenes.brick_flip(), dt=0.01)
 
-Public names are listed in `__init__.pyi` and imported when they are first used: the pytest plugin is part of this package, and
-must not make every run of pytest import NumPy.
+Public names are listed in `__init__.pyi` and imported when first used: the pytest plugin is part of this package and must not
+import NumPy in every run of pytest.
 """
 
 from lazy_loader import attach_stub

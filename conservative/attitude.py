@@ -1,7 +1,7 @@
-"""Rotations: the hat map, the Cayley map, quaternions (scalar first), angles and the check that a matrix is a rotation.
+"""Rotations: the hat map, the Cayley map, quaternions (scalar first), angles and orthonormality.
 
-Every function is vectorised over leading axes. `R_WB` takes body components to world components. Source: textbook formulas, as
-in M. D. Shuster, A survey of attitude representations (1993), written for small errors.
+Functions are vectorised over leading axes. `R_WB` maps body components to world components. Source: M. D. Shuster, A survey of
+attitude representations (1993).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 ROTATION_TOLERANCE = 1e-9
-"""Largest |R'R - 1| accepted of an attitude that a user hands in."""
+"""Largest |R'R - 1| of an attitude that a user passes."""
 
 
 def hat(v: ArrayLike) -> Array:
@@ -36,12 +36,11 @@ def cayley(v: ArrayLike) -> Array:
 def from_quaternion(q: ArrayLike) -> Array:
     """Return matrices (..., 3, 3) of quaternions (..., 4), scalar first.
 
-    The formula is homogeneous: a quaternion of norm n gives n^2 times a rotation, so that a method which lets its
-    quaternion drift shows that drift as lost orthonormality instead of having it tidied away.
+    A quaternion of norm n gives n^2 times a rotation, so the drift of a method's quaternion shows as lost orthonormality.
     """
     w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
-    R = np.empty((*np.shape(w), 3, 3))  # written in place: engines are timed with it, and stacking takes twice as long
+    R = np.empty((*np.shape(w), 3, 3))  # written in place: stacking takes twice as long, and engines are timed with it
     R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)
     R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = 2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)
     R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz
@@ -51,8 +50,7 @@ def from_quaternion(q: ArrayLike) -> Array:
 def to_quaternion(R: ArrayLike) -> Array:
     """Return unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3).
 
-    Of the four ways to read a quaternion off a matrix the one with the largest component is taken (Shepperd 1978).
-    The sign is chosen so that the scalar part is not negative.
+    Of the four formulas it takes the one with the largest component (Shepperd 1978). The scalar part is not negative.
     """
     R = np.asarray(R, dtype=float)
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
@@ -76,8 +74,7 @@ def to_quaternion(R: ArrayLike) -> Array:
 def angle_between(R_ref: ArrayLike, R: ArrayLike) -> Array:
     """Return the angle in rad, (...), of R_ref' R for attitudes (..., 3, 3).
 
-    Formed as 2 asin(|R - R_ref|_F / sqrt 8), which keeps full relative accuracy at small angles, where acos of the trace loses
-    half the digits. Not a number in, not a number out.
+    2 asin(|R - R_ref|_F / sqrt 8) has full relative accuracy at small angles, where acos of the trace loses half the digits.
     """
     difference = np.asarray(R, dtype=float) - np.asarray(R_ref, dtype=float)
     chord = np.sqrt(np.sum(difference * difference, axis=(-2, -1)) / 8)
@@ -92,7 +89,7 @@ def orthonormality(R: ArrayLike) -> Array:
 
 
 def rotation_about(axis: ArrayLike, angle: float) -> Array:
-    """Return the rotation (3, 3) by `angle`, rad, about `axis` (3,), which need not be of unit length."""
+    """Return the rotation (3, 3) by `angle`, rad, about `axis` (3,) of any length."""
     axis = np.asarray(axis, dtype=float)
     n = axis / np.linalg.norm(axis)
     half = angle / 2
@@ -102,8 +99,8 @@ def rotation_about(axis: ArrayLike, angle: float) -> Array:
 def axes_about(axis: Array, beside: int | None = None) -> Array:
     """Return a rotation (3, 3) whose third column is the unit vector `axis` (3,).
 
-    The first column is at right angles to the coordinate axis number `beside`, which must not be along `axis`; by default it is
-    the one with which e_z gives no rotation at all.
+    The first column is perpendicular to coordinate axis number `beside`, which must not be parallel to `axis`. By default it is
+    the one for which e_z gives the identity.
     """
     other = np.eye(3)[(np.argmax(np.abs(axis)) + 2) % 3 if beside is None else beside]
     first = np.cross(other, axis)
@@ -112,6 +109,6 @@ def axes_about(axis: Array, beside: int | None = None) -> Array:
 
 
 def triple(values: Array) -> Triple:
-    """Return three components (3,), of any unit, as the tuple of floats that kernels take."""
+    """Return an array (3,) as the tuple of floats that kernels accept."""
     x, y, z = values.tolist()
     return x, y, z

@@ -1,4 +1,4 @@
-"""The rigid body: its inertia about the fixed point and what follows from it. Source: definitions of any mechanics textbook."""
+"""The rigid body: its inertia about the fixed point."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .check import LARGEST, finite_array, read_only, set_fields
 from .errors import BadInput
 
 TENSOR_CONDITION = 1e13
-"""Largest ratio of principal moments of a tensor that is not diagonal.
+"""Largest ratio of the principal moments of a tensor that is not diagonal.
 
-Rounding it moves its smallest moment by up to 4e-16 of the largest (measured on 10,000 random ones): at this ratio by 0.4 %,
-and at 1e15 nobody can say whether that moment is above 0. Moments given as such are taken as they are.
+Round-off of the tensor changes its smallest moment by up to 4e-16 of the largest (measured on 10,000 random tensors). That is
+0.4 % at this ratio; at 1e15 even the sign of the smallest moment is unknown. A diagonal tensor has no such limit.
 """
-_ROUNDED = 4e-15
-"""Difference of two equal moments of a tensor that is not diagonal, relative to the largest: twice the 2e-15 of 3,000."""
+_EQUAL = 4e-15
+"""Largest difference of two equal moments of a rotated tensor, relative to the largest: twice the 2e-15 of 3,000 tensors."""
 _ALLOWED = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 
 
@@ -30,15 +30,15 @@ class RigidBody:
     Parameters
     ----------
     inertia
-        Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component
-        is of 1e-30 to 1e30 kg m^2.
+        Principal moments (3,) or inertia tensor (3, 3) about the fixed point, in body axes, kg m^2. The largest component has
+        to be 1e-30 to 1e30 kg m^2.
 
     Raises
     ------
     BadInput
-        The inertia is not finite, not symmetric, not positive definite, or of another shape; or its moments are too far apart,
-        by more than `TENSOR_CONDITION` in a tensor that is not diagonal. Moments that no mass distribution has (J1 + J2 < J3)
-        are let through: the equations hold for them, though some engines refuse them.
+        The inertia is not finite, not symmetric, not positive definite, or of another shape; or a tensor that is not diagonal
+        has moments with a ratio above `TENSOR_CONDITION`. Moments that no mass distribution has (J1 + J2 < J3) are accepted:
+        the equations hold for them, but some engines reject them.
     """
 
     inertia: Array
@@ -51,7 +51,7 @@ class RigidBody:
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
-        """Moments and axes; a tensor that is diagonal already keeps its own axes in their order."""
+        """Moments and axes. A diagonal tensor keeps its axes in their order."""
         if np.count_nonzero(self.inertia - np.diag(np.diag(self.inertia))) == 0:
             return np.diag(self.inertia).copy(), np.eye(3)
         moments, axes = np.linalg.eigh(self.inertia)
@@ -74,7 +74,7 @@ class RigidBody:
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T
 
     def momentum(self, w_WB_B: ArrayLike) -> Array:
-        """Return the angular momentum (..., 3) in body axes, kg m^2/s, for rates (..., 3) in rad/s."""
+        """Return the angular momentum (..., 3), kg m^2/s, for rates (..., 3), rad/s, both in body axes."""
         return np.asarray(w_WB_B, dtype=float) @ self.inertia
 
     def symmetry_axis(self, tolerance: float = 1e-14) -> int | None:
@@ -84,10 +84,10 @@ class RigidBody:
         tensor.
         """
         J = self.moments
-        rounded = 0.0 if np.array_equal(self.R_BP, np.eye(3)) else min(tolerance, _ROUNDED) * J.max()
+        round_off = 0.0 if np.array_equal(self.R_BP, np.eye(3)) else min(tolerance, _EQUAL) * J.max()
         for axis in (2, 1, 0):
-            other, another = (axis + 1) % 3, (axis + 2) % 3
-            if abs(J[other] - J[another]) <= max(tolerance * max(J[other], J[another]), rounded):
+            a, b = J[(axis + 1) % 3], J[(axis + 2) % 3]
+            if abs(a - b) <= max(tolerance * max(a, b), round_off):
                 return axis
         return None
 
@@ -97,14 +97,13 @@ class RigidBody:
 
 
 def _check_tensor(tensor: Array) -> None:
-    scale = np.abs(tensor).max()
-    if np.abs(tensor - tensor.T).max() > 1e-12 * scale:
-        raise BadInput("inertia", f"a matrix that is not symmetric (off by {np.abs(tensor - tensor.T).max():.3g})", _ALLOWED)
-    diagonal = np.diag(tensor)
-    plain = np.count_nonzero(tensor - np.diag(diagonal)) == 0
-    moments = np.sort(diagonal) if plain else np.linalg.eigvalsh(tensor)
+    asymmetry = np.abs(tensor - tensor.T).max()
+    if asymmetry > 1e-12 * np.abs(tensor).max():
+        raise BadInput("inertia", f"a matrix that is not symmetric (off by {asymmetry:.3g})", _ALLOWED)
+    is_diagonal = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
+    moments = np.sort(np.diag(tensor)) if is_diagonal else np.linalg.eigvalsh(tensor)
     if moments[0] <= 0:
         raise BadInput("inertia", f"principal moments {moments.tolist()}, not all positive", _ALLOWED)
-    condition = LARGEST if plain else TENSOR_CONDITION
+    condition = LARGEST if is_diagonal else TENSOR_CONDITION
     if moments[-1] > condition * moments[0]:
         raise BadInput("inertia", f"principal moments {moments.tolist()}", f"{_ALLOWED}, their ratio up to {condition:g}")

@@ -1,3 +1,3 @@
-"""The version, which every label of ours carries."""
+"""The version, part of the label of every method here."""
 
 VERSION = "0.2.0"

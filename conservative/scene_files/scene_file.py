@@ -1,7 +1,7 @@
-"""Scenes from TOML files: a person's own body without a line of Python. Nothing in a file is ever executed.
+"""Scenes from TOML files. Nothing in a file is executed.
 
-`conservative new > my_body.toml` writes a file with every key explained; a command takes `my_body.toml` where it takes the
-name of a scene. Units are SI: m, kg, s, rad. Keys are checked strictly, and every complaint has its line.
+`conservative new > my_body.toml` writes a file that explains every key. Commands accept `my_body.toml` instead of the name of a
+scene. Units are SI: m, kg, s, rad. Unknown keys are errors, and every error contains its line.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from ..shapes import SHAPES, MassDistribution
 from .toml_reader import Table, keys_of, read
 
 _TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "start")
-# The keys of a potential or a shape are the parameters of what builds it, so there is no second list to keep.
+# The keys of a potential or a shape are the parameters of its constructor.
 _POTENTIALS: dict[str, Callable[..., Potential]] = {
     "uniform_gravity": UniformGravity,
     "linear_spring": LinearSpring,
     "point_attraction": PointAttraction,
     "gravity_gradient": GravityGradient,
 }
-_PLACED = ("com_B", "R_BS")
+_PLACEMENT = ("com_B", "R_BS")
 
 
 def template() -> str:
-    """Return a scene file with every key explained, which loads as it is."""
+    """Return a valid scene file that explains every key."""
     return files(__package__).joinpath("template.toml").read_text(encoding="utf-8")
 
 
 def choices() -> dict[str, dict[str, list[str]]]:
-    """Return what can stand under `shape` and `kind`, and the forms of an attitude, each with the keys that go with it."""
+    """Return the shapes, the kinds of potential and the forms of an attitude, each with its keys."""
     potentials = {name: keys_of(build) for name, build in _POTENTIALS.items()}
     potentials["uniform_gravity"].append("g")
-    potentials["gravity_gradient"].remove("inertia")  # the body's
+    potentials["gravity_gradient"].remove("inertia")  # that of the body
     return {
         "shape": {name: keys_of(build) for name, build in SHAPES.items()},
         "kind": potentials,
@@ -62,21 +62,21 @@ def load(path: str | Path) -> Scene:
     Parameters
     ----------
     path
-        The file; paths in it are relative to its folder. `template` shows the format.
+        The file. Paths in it are relative to its folder. `template` shows the format.
 
     Raises
     ------
     BadFile
-        The file cannot be read or a key or value in it cannot be used; a `BadInput` with the line.
+        The file cannot be read, or a key or value is invalid: a `BadInput` with the line.
     MissingEngine
-        The body stands in another file whose engine is not installed.
+        The body is defined in a file of an engine that is not installed.
     """
     if not isinstance(path, str | PathLike):
         raise BadInput("path", describe(path), "the path of a file")
     top = read(Path(path))
     top.only(_TOP)
     t_end = top.value("t_end", "a finite duration above 0, s")
-    body, mass = _body(top.table("body", "inertia, a shape or another file; see `conservative new`"))
+    body, mass = _body(top.table("body", "inertia, a shape or another file; `conservative new` shows them"))
     potential = _field(top, body, mass)
     R_WB0, w_WB_B0 = _start(top.table("start", "w_WB_B and, unless body and world axes agree, R_WB"))
     name = top.text("name", "a text of one character or more") if "name" in top else top.path.stem
@@ -86,14 +86,14 @@ def load(path: str | Path) -> Scene:
 
 
 def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
-    """Return the body and, where the file says so much, its mass and centre of mass."""
+    """Return the body, and its mass and centre of mass if the file has them."""
     sources = ("inertia", "shape", *list_entries(BODY_FILES))
     given = [key for key in table.values if key in sources]
     if not given:
-        table.only({*sources, "name", *_PLACED, *(key for shape in SHAPES.values() for key in keys_of(shape))})
+        table.only({*sources, "name", *_PLACEMENT, *(key for shape in SHAPES.values() for key in keys_of(shape))})
         raise table.bad("inertia", "nothing: the body is missing", "one of " + ", ".join(sources))
     if len(given) > 1:
-        raise table.bad(given[1], f"{given[1]} beside {given[0]}", "one of " + ", ".join(sources))
+        raise table.bad(given[1], f"{given[1]} and {given[0]}", "one of " + ", ".join(sources))
     if given == ["inertia"]:
         table.only(("inertia",))
         return table.call(RigidBody), None
@@ -106,7 +106,7 @@ def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
 
 def _shape(table: Table) -> MassDistribution:
     name = table.choice("shape", SHAPES)
-    table.only(("shape", *keys_of(SHAPES[name]), *_PLACED))
+    table.only(("shape", *keys_of(SHAPES[name]), *_PLACEMENT))
     return table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
 
 
@@ -122,23 +122,20 @@ def _field(top: Table, body: RigidBody, mass: MassDistribution | None) -> AnyPot
     """Return the potential, turned with the orbit if there is one."""
     if "potential" not in top:
         if "orbit" in top:
-            raise top.bad("orbit", "an orbit without a potential that turns with it", "a table potential beside it")
+            raise top.bad("orbit", "an orbit without a potential", "a table [potential] that turns with the orbit")
         return None
-    table = top.table("potential", "kind and what it takes")
+    table = top.table("potential", "kind and its keys")
     if "orbit" not in top:
         return _potential(table, body, mass)
-    orbit = _orbit(top.table("orbit", "rate, rad/s, and normal_W"))
+    orbit_table = top.table("orbit", "rate, rad/s, and normal_W")
+    orbit_table.only(keys_of(Orbit))
+    orbit = orbit_table.call(Orbit)
     if table.choice("kind", _POTENTIALS) == "gravity_gradient":
         if "rate" in table:
-            raise table.bad("rate", "a rate beside an orbit", "none, as a gravity gradient has the rate of the orbit")
+            raise table.bad("rate", "a rate and an orbit", "no rate: a gravity gradient has the rate of the orbit")
         table.only(("kind", "direction_W"))
         return table.call(orbit.gravity_gradient, inertia=body.inertia)
     return Turning(_potential(table, body, mass), orbit)
-
-
-def _orbit(table: Table) -> Orbit:
-    table.only(keys_of(Orbit))
-    return table.call(Orbit)
 
 
 def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:
@@ -146,7 +143,7 @@ def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> 
     known = {"kind", *keys_of(_POTENTIALS[kind])}
     if kind == "uniform_gravity":
         table.only({*known, "g"})
-        return _gravity_on(table, mass) if "g" in table else table.call(UniformGravity)
+        return _gravity(table, mass) if "g" in table else table.call(UniformGravity)
     if kind == "gravity_gradient":
         table.only(known - {"inertia"})
         return table.call(GravityGradient, inertia=body.inertia)
@@ -154,18 +151,15 @@ def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> 
     return table.call(_POTENTIALS[kind])
 
 
-def _gravity_on(table: Table, mass: MassDistribution | None) -> UniformGravity:
+def _gravity(table: Table, mass: MassDistribution | None) -> UniformGravity:
     if mass is None:
-        raise table.bad("g", "an acceleration, but of the body only the inertia is known", "weight, N, and com_B, m, instead")
+        raise table.bad("g", "an acceleration, but only the inertia is known of the body", "weight, N, and com_B, m")
     if "weight" in table or "com_B" in table:
-        raise table.bad(
-            "g", "g beside weight or com_B", "g alone, as the body's mass and centre are known, or both of the others"
-        )
+        raise table.bad("g", "g and weight or com_B", "g alone, or weight and com_B")
     return table.call(mass.gravity)
 
 
 def _start(table: Table) -> tuple[Array, Array]:
-    """Return attitude (3, 3) and rates (3,)."""
     table.only(("R_WB", "w_WB_B"))
     allowed = "three finite rates (3,), rad/s"
     with table.blame():
@@ -174,7 +168,7 @@ def _start(table: Table) -> tuple[Array, Array]:
 
 
 def _attitude(table: Table, key: str) -> Array:
-    """Return the rotation (3, 3) under `key`: a matrix, or a table with another form of it; none is the identity."""
+    """Return the rotation (3, 3) under `key`: a matrix or a table with another form; by default the identity."""
     if key not in table:
         return np.eye(3)
     if not isinstance(table.values[key], dict):
@@ -184,7 +178,7 @@ def _attitude(table: Table, key: str) -> Array:
     forms.only({*_ATTITUDES, "angle"})
     given = {"axis" if form == "angle" else form for form in forms.values}
     if len(given) != 1:
-        got = " beside ".join(forms.values) or "an empty table"
+        got = " and ".join(forms.values) or "an empty table"
         raise table.bad(key, got, "a matrix, or one of: quaternion_wxyz; rotation_vector; axis and angle")
     return forms.call(_ATTITUDES[given.pop()])
 
@@ -207,10 +201,10 @@ def _axis_angle(axis: ArrayLike, angle: float) -> Array:
 
 
 def _direction(argument: str, value: ArrayLike, size: int, allowed: str) -> Array:
-    found = finite_array(argument, value, ((size,),), allowed)
-    if not found.any():
+    direction = finite_array(argument, value, ((size,),), allowed)
+    if not direction.any():
         raise BadInput(argument, describe(value), allowed)
-    return found / np.abs(found).max()
+    return direction / np.abs(direction).max()
 
 
 _ATTITUDES: dict[str, Callable[..., Array]] = {

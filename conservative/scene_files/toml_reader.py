@@ -1,4 +1,4 @@
-"""TOML read strictly: every complaint names the file, the line, the key, what was got and what is allowed."""
+"""Strict reading of TOML: every error contains file, line, key, value and the valid values."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Key = tuple[str, ...]
 Built = TypeVar("Built")
 
 LARGEST = 1_000_000
-"""Bytes of a file that are read at most: a scene has less than a hundredth of it."""
+"""Largest size of a file, bytes. A scene has less than a hundredth of it."""
 MOST_LINES = 100
-"""Lines of one statement: finding its end takes the square of them, seconds at this limit."""
+"""Most lines of one statement. Finding its end takes a time that grows with their square: seconds at this limit."""
 
 
 class BadFile(BadInput):
-    """A file that cannot be used. Attributes beyond a `BadInput`'s: `path`, and `line` (from 1; None where there is none)."""
+    """An invalid file: a `BadInput` with the attributes `path` and `line` (from 1, or None)."""
 
     def __init__(self, path: Path, line: int | None, key: str, got: object, allowed: str) -> None:
         self.path, self.line = path, line
@@ -33,7 +33,7 @@ class BadFile(BadInput):
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table of a TOML file that knows where each of its keys stands.
+    """A table of a TOML file and the lines of its keys.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class Table:
     name
         Key of the table from the top of the file: `()`, `("body",)`.
     values
-        What `tomllib` reads in it.
+        Contents of the table.
     lines
-        Line of every key of the file, counted from 1.
+        Line of every key of the file, from 1.
     """
 
     path: Path
@@ -56,41 +56,41 @@ class Table:
         return key in self.values
 
     def bad(self, key: str, got: object, allowed: str) -> BadFile:
-        """Return the complaint about `key` at its line; at that of the table's own header if the table does not have it."""
+        """Return the error for `key`, at its line or, if the key is missing, at the line of the table's header."""
         line = self.lines.get((*self.name, key)) or self.lines.get(self.name, 1)
         return BadFile(self.path, line, ".".join((*self.name, key)), got, allowed)
 
     def only(self, known: Collection[str]) -> None:
-        """Raise `BadFile` for the first key that is not one of `known`, with the nearest of them."""
+        """Raise `BadFile` for the first key that is not one of `known`."""
         for key in self.values:
             if key not in known:
                 raise self.bad(key, f"the unknown key {key!r}", nearest(key, known))
 
     def value(self, key: str, allowed: str) -> Any:
-        """Return what stands under `key`: text, a number, or an array of numbers; `BadFile` if it is missing or neither."""
+        """Return the value of `key`. Raise `BadFile` if it is missing, or an array of anything but numbers."""
         if key not in self.values:
             raise self.bad(key, "nothing: the key is missing", allowed)
-        found = self.values[key]
-        if isinstance(found, list | int) and not isinstance(found, bool) and not _numeric(found):
-            raise self.bad(key, repr(found), f"{allowed} (numbers, and arrays of them)")
-        return found
+        value = self.values[key]
+        if isinstance(value, list | int) and not isinstance(value, bool) and not _numeric(value):
+            raise self.bad(key, repr(value), f"{allowed} (numbers, and arrays of them)")
+        return value
 
     def text(self, key: str, allowed: str) -> str:
-        """Return a text that is not empty; `BadFile` otherwise."""
-        found = self.value(key, allowed)
-        if not isinstance(found, str) or not found:
-            raise self.bad(key, repr(found), allowed)
-        return found
+        """Return a text that is not empty."""
+        value = self.value(key, allowed)
+        if not isinstance(value, str) or not value:
+            raise self.bad(key, repr(value), allowed)
+        return value
 
     def choice(self, key: str, known: Collection[str]) -> str:
-        """Return a text that is one of `known`; `BadFile`, with the nearest, otherwise."""
-        found = self.text(key, f"one of {', '.join(known)}")
-        if found not in known:
-            raise self.bad(key, repr(found), nearest(found, known))
-        return found
+        """Return a text that is one of `known`."""
+        value = self.text(key, f"one of {', '.join(known)}")
+        if value not in known:
+            raise self.bad(key, repr(value), nearest(value, known))
+        return value
 
     def table(self, key: str, allowed: str) -> Table:
-        """Return the table under `key`; `BadFile` if it is missing or no table."""
+        """Return the table under `key`."""
         if key not in self.values:
             raise self.bad(key, f"nothing: the table [{key}] is missing", allowed)
         if not isinstance(self.values[key], dict):
@@ -99,7 +99,7 @@ class Table:
 
     @contextmanager
     def blame(self, **keys: str) -> Iterator[None]:
-        """Turn a `BadInput` about an argument into a `BadFile` about the key of that name, or the one that `keys` says."""
+        """Turn a `BadInput` for an argument into a `BadFile` for the key of that name, or that `keys` maps it to."""
         try:
             yield
         except BadFile:
@@ -108,9 +108,9 @@ class Table:
             raise self.bad(keys.get(error.argument, error.argument), error.got, error.allowed) from None
 
     def call(self, function: Callable[..., Built], **given: Any) -> Built:
-        """Return `function` of what is `given` and, under its other parameters' names, of what the table has.
+        """Call `function` with the `given` arguments and, for its other parameters, with the values of the table.
 
-        Parameters without a default are required.
+        Keys of parameters without a default are required.
         """
         parameters = {name: p for name, p in inspect.signature(function).parameters.items() if name not in given}
         allowed = f"{function.__name__.strip('_')} takes {', '.join(parameters)}"
@@ -120,7 +120,7 @@ class Table:
 
 
 def keys_of(function: Callable[..., object]) -> list[str]:
-    """Return the names of a function's parameters: what `Table.call` takes from a table for it."""
+    """Return the names of a function's parameters: the keys that `Table.call` reads."""
     return list(inspect.signature(function).parameters)
 
 
@@ -130,8 +130,8 @@ def read(path: Path) -> Table:
     Raises
     ------
     BadFile
-        The file cannot be read, is not text in UTF-8, is larger than `LARGEST`, has a statement of more than `MOST_LINES`
-        lines, or is not TOML.
+        The file cannot be read, is not UTF-8, is larger than `LARGEST`, has a statement of more than `MOST_LINES` lines, or is
+        not TOML.
     """
     allowed = "a TOML file that can be read; `conservative new` writes one"
     try:
@@ -149,21 +149,21 @@ def read(path: Path) -> Table:
     try:
         values = tomllib.loads(source)
     except (ValueError, RecursionError) as error:  # more than TOMLDecodeError: numbers of 5,000 digits, arrays 5,000 deep
-        found = re.search(r"line (\d+)", str(error))
-        line = int(found[1]) if found else source.rstrip().count("\n") + 1
-        raise BadFile(path, line, "", f"what is not TOML: {error}", "TOML 1.0") from None
+        match = re.search(r"line (\d+)", str(error))  # tomllib has the line in its message only
+        line = int(match[1]) if match else source.rstrip().count("\n") + 1
+        raise BadFile(path, line, "", f"a text that is not TOML: {error}", "TOML 1.0") from None
     try:
         return Table(path, (), values, key_lines(source))
     except OverflowError as error:
-        raise BadFile(path, error.args[0], "", f"a statement of more than {MOST_LINES} lines", "shorter ones") from None
+        raise BadFile(path, error.args[0], "", f"a statement of more than {MOST_LINES} lines", "shorter statements") from None
 
 
 def key_lines(source: str) -> dict[Key, int]:
-    """Return the line, from 1, on which every key of a valid TOML text first stands.
+    """Return the line, from 1, of the first occurrence of every key of a valid TOML text.
 
-    `tomllib` does not report lines. A TOML file is a sequence of statements, and no proper prefix of a statement is valid TOML,
-    so growing the text line by line until it parses finds where each ends. Raise `OverflowError`, with its line, for a
-    statement of more than `MOST_LINES` lines.
+    `tomllib` does not report lines. A TOML file is a sequence of statements, and no proper prefix of a statement is valid TOML.
+    A statement therefore ends at the first line up to which it parses. Raise `OverflowError` with the line of a statement that
+    has more than `MOST_LINES` lines.
     """
     lines: dict[Key, int] = {}
     header: Key = ()
@@ -171,13 +171,13 @@ def key_lines(source: str) -> dict[Key, int]:
     for number, line in enumerate(source.split("\n"), start=1):
         statement, start = (statement + "\n" + line, start) if statement else (line, number)
         try:
-            found = tomllib.loads(statement)
+            parsed = tomllib.loads(statement)
         except tomllib.TOMLDecodeError:
             if number - start >= MOST_LINES:
                 raise OverflowError(start) from None
             continue
         is_header = statement.lstrip().startswith("[")
-        keys = list(_paths(found, () if is_header else header))
+        keys = list(_paths(parsed, () if is_header else header))
         if is_header:
             header = keys[-1]
         for key in keys:
@@ -187,7 +187,7 @@ def key_lines(source: str) -> dict[Key, int]:
 
 
 def _paths(value: object, prefix: Key) -> Iterator[Key]:
-    """Yield the key of everything in nested tables, outer ones first; of an array of tables the tables count as one."""
+    """Yield the keys of nested tables, outer ones first. The tables of an array count as one."""
     if isinstance(value, list):
         for item in value:
             yield from _paths(item, prefix)
@@ -198,9 +198,9 @@ def _paths(value: object, prefix: Key) -> Iterator[Key]:
 
 
 def _numeric(value: object) -> bool:
-    """Whether a value is a number, or nested lists hold nothing else. NumPy would make numbers of texts and truths too."""
+    """Whether a value is a number or nested lists of numbers. NumPy would also convert texts and booleans."""
     if isinstance(value, list):
         return all(_numeric(item) for item in value)
     if isinstance(value, int) and not isinstance(value, bool):
-        return abs(value) < 2**63  # what TOML has; Python's go on where a float cannot follow
+        return abs(value) < 2**63  # the range of TOML; larger integers may be out of the range of floats
     return isinstance(value, float)
