@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -145,7 +145,9 @@ def maker_of(kind: type) -> Maker:
 
 def setting_texts(value: Any) -> dict[str, str]:
     """Return the texts of the settings of a frozen value that differ from their defaults, such as `tol=1e-09`, by name."""
-    settings = ((field.name, getattr(value, field.name), field.default) for field in fields(value))
+    settings = (
+        (field.name, getattr(value, field.name), field.default) for field in (fields(value) if is_dataclass(value) else ())
+    )
     return {name: f"{name}={setting}" for name, setting, default in settings if setting != default}
 
 

@@ -176,7 +176,7 @@ def test_a_number_below_nothing_is_shown_as_its_size_is(value):
 
 def test_contests_are_in_microseconds():
     lines = [*point("gauss", "ours", 1e-3, 2e-6), *point("scipy", "engine", 1e-3, 8e-6), *point("lame", "ours", 1e-3, 1e-6)]
-    header, (_, _, line) = scene_contests.contests(points(frame(lines)), 0.5)
+    header, (_, _, line) = scene_contests.as_table(points(frame(lines)), 0.5)
     assert [name for name in header if "µs" in name] == ["µs per s", "µs a sample"] * 3
     sides = (["gauss", "2.00", "1.00"], ["scipy", "8.00", "4.00"], ["4.00"], ["lame", "1.00", "0.500"], ["8.00"])
     assert line == ["1e-3", *chain.from_iterable(sides)]
