@@ -10,7 +10,7 @@
     my_format = "my_package.my_file:body_from_my_format"    # a function of a path and a name, returning a MassDistribution
 
     [project.entry-points."conservative.engines"]
-    my_engine = "my_package.my_engine:MyEngine"         # a class derived from conservative.references' EngineMethod
+    my_engine = "my_package.engines:MyEngine"           # a class made by engine_class of conservative.references
 
 A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`. An engine
 that runs in an environment of its own is named alike, `exudyn:RK44`, with its version if need be: `mujoco@3.6.0:RK4`.

@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,7 @@ class Place:
     @classmethod
     def of(cls, name: str) -> Place:
         """Return the place of a name. Raises `BadInput` if this process has no such scene."""
-        here = inside.describe_scene(SimpleNamespace(**_question(name)))()
+        here = inside.describe_scene(**_question(name))
         return cls(name, registry.scene(name), _define(name, here), Truths())
 
 
@@ -154,7 +153,7 @@ def measure_rows(side: Side, place: Place, settings: Sequence[Setting]) -> Itera
         for each in settings
     ]
     try:
-        definition = _define(place.name, side.ask("scene", **_question(place.name)))
+        definition = _define(place.name, side.ask("describe_scene", **_question(place.name)))
     except IntegrationFailed as failure:
         yield from (Found(replace(row, status=Status.ERROR), str(failure.outcome)) for row in rows)
         return
@@ -167,7 +166,7 @@ def measure_rows(side: Side, place: Place, settings: Sequence[Setting]) -> Itera
 
 def _measure(side: Side, place: Place, setting: Setting, row: Row) -> Found:
     try:
-        pair = side.ask("pair", scene=place.name, method=setting.name)
+        pair = side.ask("describe_pair", scene=place.name, method=setting.name)
         if pair["unsupported"]:
             return Found(replace(row, status=Status.SKIPPED), pair["unsupported"])
         point = points.Point(place.scene, Remote(side, setting, place.name, pair["longest_step"]), place.truths)

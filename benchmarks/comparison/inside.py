@@ -1,16 +1,18 @@
 """The code that runs in the environment of a version: the worker loads this file, and its imports are those of that version.
 
 It uses only parts of `conservative` that old versions have as well: names of methods and scenes, `Grid`, `prepare`, `check`.
-`given` has the name of a `task`, and the values that the docstring of the task names.
+The worker calls its functions, or prepares a run whose task is in `given`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
+
+import numpy as np
 
 from conservative import registry
 from conservative.grid import Grid
@@ -18,30 +20,29 @@ from conservative.method import Method, Role
 from conservative.scene import Scene
 
 Answer = dict[str, Any]
+Array = np.ndarray[Any, Any]
 
 
 def prepare(given: SimpleNamespace) -> Callable[[], Any]:
-    """Return the function of a task."""
-    return TASKS[given.task](given)
+    """Return the run of a task, "solve" or "time"."""
+    return {"solve": solve, "time": keep_running}[given.task](given)
 
 
-def list_methods(given: SimpleNamespace) -> Callable[[], Answer]:
-    """List the settings of the methods `names` in the suite, by default of all with the role `Role.OURS`."""
+def list_methods(names: list[str]) -> Answer:
+    """List the settings of the methods `names` in the suite, by default of all methods with the role `Role.OURS`."""
+    families = registry.list_families()
+    methods: list[Method] = []
+    for name in names or sorted(name for name, family in families.items() if family.role == Role.OURS):
+        if name in families:
+            methods += _suite_settings(families[name])
+        elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
+            methods.append(registry.method(name))
 
     def describe(method: Method) -> Answer:
         engine = method.label if method.role == Role.ENGINE else ""
         return {"name": method.name, "label": method.label, "order": method.order, "engine": engine}
 
-    return lambda: {"methods": [describe(method) for method in _methods(given.names)]}
-
-
-def _methods(names: list[str]) -> Iterator[Method]:
-    families = registry.list_families()
-    for name in names or sorted(name for name, family in families.items() if family.role == Role.OURS):
-        if name in families:
-            yield from _suite_settings(families[name])
-        elif name.partition(":")[0] in families:  # a method that this version does not have is a missing row, not an error
-            yield registry.method(name)
+    return {"methods": [describe(method) for method in methods]}
 
 
 def _suite_settings(family: Any) -> tuple[Method, ...]:
@@ -50,30 +51,30 @@ def _suite_settings(family: Any) -> tuple[Method, ...]:
     return tuple(getattr(family, "suite_settings", family.variants)())  # versions before cards
 
 
-def describe_scene(given: SimpleNamespace) -> Callable[[], Answer]:
-    """Describe the motion of a `scene`, with its energies, J, at attitudes `probes` (n, 3, 3)."""
-    scene = _scene(given.scene)
-    potential: Any = scene.potential  # a version may be older than the protocols of potentials
+def describe_scene(scene: str, probes: Array) -> Answer:
+    """Describe the motion of a scene, and its energies in J at the attitudes `probes` (n, 3, 3)."""
+    built = _scene(scene)
+    potential: Any = built.potential  # a version may be older than the protocols of potentials
     if potential is None:
         energies = []
     elif getattr(potential, "time_dependent", False):
-        energies = [float(potential.energy_at(R, t)) for t in (0.0, scene.t_end) for R in given.probes]
+        energies = [float(potential.energy_at(R, t)) for t in (0.0, built.t_end) for R in probes]
     else:
-        energies = [float(potential.energy(R)) for R in given.probes]
-    return lambda: {
-        "inertia": scene.body.inertia,
-        "R_WB0": scene.R_WB0,
-        "w_WB_B0": scene.w_WB_B0,
-        "ends": [scene.t_end, scene.dt],
+        energies = [float(potential.energy(R)) for R in probes]
+    return {
+        "inertia": built.body.inertia,
+        "R_WB0": built.R_WB0,
+        "w_WB_B0": built.w_WB_B0,
+        "ends": [built.t_end, built.dt],
         "energies": energies,
-        "invariants": [invariant.name for invariant in scene.invariants],
+        "invariants": [invariant.name for invariant in built.invariants],
     }
 
 
-def describe_pair(given: SimpleNamespace) -> Callable[[], Answer]:
-    """Describe why a `method` does not support a `scene`, empty if it does, and its longest step there, s."""
-    scene, method = _scene(given.scene), registry.method(given.method)
-    return lambda: {"unsupported": method.unsupported(scene) or "", "longest_step": float(method.longest_step(scene))}
+def describe_pair(scene: str, method: str) -> Answer:
+    """Describe why a method does not support a scene (empty if it does), and its longest step there in seconds."""
+    built, chosen = _scene(scene), registry.method(method)
+    return {"unsupported": chosen.unsupported(built) or "", "longest_step": float(chosen.longest_step(built))}
 
 
 def solve(given: SimpleNamespace) -> Callable[[], Answer]:
@@ -83,11 +84,11 @@ def solve(given: SimpleNamespace) -> Callable[[], Answer]:
     run = method.prepare(scene, grid)
 
     def solve_once() -> Answer:
-        found = method.check(scene, grid, run())
-        counts = {name: count for name, count in vars(found.counters).items() if count is not None}
-        outcome = found.outcome
+        trajectory = method.check(scene, grid, run())
+        counts = {name: count for name, count in vars(trajectory.counters).items() if count is not None}
+        outcome = trajectory.outcome
         failure = [outcome.kind.value, outcome.reason, outcome.step, outcome.time, outcome.residual]
-        states = {"t": found.t, "R_WB": found.R_WB, "w_WB_B": found.w_WB_B}
+        states = {"t": trajectory.t, "R_WB": trajectory.R_WB, "w_WB_B": trajectory.w_WB_B}
         return {**states, "counts": counts, "failure": [] if outcome.ok else failure}
 
     return solve_once
@@ -101,6 +102,3 @@ def keep_running(given: SimpleNamespace) -> Callable[[], Any]:
 @lru_cache(maxsize=64)
 def _scene(name: str) -> Scene:
     return registry.scene(name)
-
-
-TASKS = {"list": list_methods, "scene": describe_scene, "pair": describe_pair, "solve": solve, "time": keep_running}

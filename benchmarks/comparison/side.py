@@ -13,9 +13,7 @@ from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.environments.client import Worker
 from conservative.references.environments.engine_method import WorkerRun
-from conservative.references.environments.environment import temporary_folder
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
@@ -23,7 +21,7 @@ from . import inside
 from .version import Version
 
 _COUNTS = tuple(each.name for each in fields(Counters))
-_START: Mapping[str, Any] = {"adapter": str(Path(inside.__file__).resolve()), "settings": {}}
+_ADAPTER = str(Path(inside.__file__).resolve())
 
 
 class FailedThere(IntegrationFailed):
@@ -48,34 +46,29 @@ class Side:
     """A version and its process; each version has its own folder of compiled kernels."""
 
     def __init__(self, version: Version) -> None:
-        self.version, home = version, version.environment.folder / "home"
-        variables = {"NUMBA_CACHE_DIR": str(home / "kernels")}
-        self._worker = Worker(version.environment.interpreter, home, temporary_folder(), variables)
+        self.version, kernels = version, version.environment.folder / "home" / "kernels"
+        self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
 
     def close(self) -> None:
         """End the process; the next call starts another one."""
         self._worker.close()
 
-    def ask(self, task: str, **values: Any) -> dict[str, Any]:
-        """Return the answer to a task of `inside`. Raises `IntegrationFailed` where the version cannot answer."""
-        run = self._worker.ask("prepare", **_START, task=task, **values)["run"]
-        try:
-            return self._worker.ask("run", run=run)
-        finally:
-            self._worker.forget(self._worker.starts, run)
+    def ask(self, function: str, **values: Any) -> dict[str, Any]:
+        """Return the result of a function of `inside`. Raise `IntegrationFailed` if the version cannot answer."""
+        return self._worker.ask("call", adapter=_ADAPTER, function=function, **values)
 
     def settings(self, names: Sequence[str]) -> tuple[Setting, ...]:
         """Return the settings of the suite of some methods, by default of all that are under test."""
-        return tuple(Setting(**each) for each in self.ask("list", names=list(names))["methods"])
+        return tuple(Setting(**each) for each in self.ask("list_methods", names=list(names))["methods"])
 
     def solver(self, states: States, **values: Any) -> WorkerRun[Trajectory]:
         """Return a run that gives a trajectory."""
-        return WorkerRun(self._worker, {**_START, "task": "solve", **values}, states)
+        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, states)
 
     def timed(self, scene: str, method: str, dt: float, n_steps: int) -> TimedRun:
         """Return a run of n_steps steps dt, s, to be timed, prepared."""
-        values = {"task": "time", "scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
-        run = TimedRun(self._worker, {**_START, **values}, States())
+        values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
+        run = TimedRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, States())
         run.prepare()
         return run
 

@@ -10,8 +10,7 @@ from conservative import registry
 from conservative.errors import BadInput, MissingEngine, nearest
 from conservative.grid import Grid
 from conservative.method import Method, Role
-from conservative.references.environments.environment import Environment, list_environments
-from conservative.references.environments.failures import MissingEnvironment
+from conservative.references.environments.environment import Environment, MissingEnvironment, list_environments
 from conservative.references.environments.lock import split_requirement
 from conservative.scene import Scene
 

@@ -15,7 +15,7 @@ import numpy as np
 from conservative.grid import Grid, grid_for
 from conservative.invariants import find_energy
 from conservative.outcome import OK, Outcome
-from conservative.references.environments.client import time_limit
+from conservative.references.worker.client import time_limit
 from conservative.trajectory import Trajectory
 
 from ..measures import errors

@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative.method import Method
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.references.environments.client import time_limit
+from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
 
 from ..measures import errors

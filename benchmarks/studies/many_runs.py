@@ -16,7 +16,7 @@ from conservative.grid import Grid
 from conservative.method import Method, Role
 from conservative.methods.many import Block, RunMany
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.environments.client import time_limit
+from conservative.references.worker.client import time_limit
 
 from ..measures.timing import wall_time
 from .selection import takes_exact_steps

@@ -29,9 +29,9 @@ from conservative.errors import BadInput, IntegrationFailed
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.environments.client import time_limit
 from conservative.references.precise import Precise
 from conservative.references.truth import Truth
+from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 from conservative.trajectory import Trajectory

@@ -12,9 +12,9 @@ from conservative.grid import Grid
 from conservative.integration.pickling import NotTransferable
 from conservative.method import Method, Role
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.environments.client import time_limit
 from conservative.references.environments.engine_method import EngineMethod
-from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
+from conservative.references.worker.calls import run_within
+from conservative.references.worker.client import EngineCrashed, EngineTimeout, time_limit
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
@@ -52,11 +52,11 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
         return known
     try:
         done = run_within(limit, partial(_attempt, case), (case.scene,))
-    except TimeLimitExceeded as late:
+    except EngineTimeout as failure:
         _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
-        return Failure(Outcome(OutcomeKind.TIMEOUT, str(late)))
-    except WorkerDied as death:
-        return Failure(Outcome(OutcomeKind.CRASHED, str(death)))
+        return Failure(failure.outcome)
+    except EngineCrashed as failure:
+        return Failure(failure.outcome)
     except NotTransferable:
         return attempt(case, skip_missing)
     if isinstance(done, Failure) and done.outcome.kind is OutcomeKind.MISSING:

@@ -1,52 +1,86 @@
-"""Basilisk: its integrators on one free spacecraft hub. Source: its documentation, spacecraft and svIntegrators."""
+"""Basilisk's integrators on one free spacecraft hub, in Basilisk's own loop (`ExecuteSimulation`).
 
-from __future__ import annotations
+A simulation cannot be started twice, so each run creates a new one, which is not timed. Attitudes are modified Rodrigues
+parameters.
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "Euler", "RK2", "RK4" (Basilisk's default), "RKF45" or "RKF78"; the last two choose their own steps.
+tol
+    Their absolute and relative tolerance, above 0 and below 1.
 
-from conservative.card import Card
-from conservative.check import finite_number
-from conservative.errors import BadInput
+References
+----------
+Spacecraft and its hub: https://avslab.github.io/basilisk/Documentation/simulation/dynamics/spacecraft/spacecraft.html
+Integrators: https://github.com/AVSLab/basilisk/tree/develop/src/simulation/dynamics/Integrators
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+import numpy as np
+
+ENGINE = {
+    "package": "bsk",
+    "module": "Basilisk.simulation.spacecraft",
+    "oldest": "2.8",
+    "settings": {"integrator": "RK4", "tol": 1e-12},
+    "orders": {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None},
+    "tolerance": "tol",
+    "free_only": "a spacecraft is free: nothing in Basilisk holds a point of its hub",
+    "card": {
+        "variants": ("Euler", "RK2", "RK4", "RKF78"),
+        "suite": ("RK4", "RKF78"),
+        "as_installed": ("RK4",),
+    },
+}
+
+ADAPTIVE = ("RKF45", "RKF78")
 
 
-@dataclass(frozen=True)
-class Basilisk(EngineMethod):
-    """Basilisk with one of its integrators, in its own loop (`ExecuteSimulation`).
+def prepare(given):
+    """Return a run of one spacecraft hub in Basilisk's own loop; a simulation starts once, so that each run has its own."""
+    ready = []
 
-    A simulation cannot be started twice, so that each run has its own; making it is in no time. Attitudes are modified
-    Rodrigues parameters.
+    def run():
+        simulation, craft, recorder = ready.pop() if ready else _build(given)
+        simulation.ExecuteSimulation()
+        end = craft.scStateOutMsg.read()
+        sigma, w = np.array(recorder.sigma_BN), np.array(recorder.omega_BN_B)
+        q = _quaternion(np.vstack([sigma[: len(given.steps) - 1], [end.sigma_BN]]))
+        return {"q": q, "w": np.vstack([w[: len(given.steps) - 1], [end.omega_BN_B]])}
 
-    Parameters
-    ----------
-    integrator
-        "Euler", "RK2", "RK4", which is Basilisk's default, "RKF45" or "RKF78"; the latter two choose their own steps.
-    tol
-        Their absolute and relative tolerance, above 0 and below 1.
+    run.renew = lambda: ready.append(_build(given))
+    return run
 
-    References
-    ----------
-    Spacecraft and its hub: https://avslab.github.io/basilisk/Documentation/simulation/dynamics/spacecraft/spacecraft.html
-    Integrators: https://github.com/AVSLab/basilisk/tree/develop/src/simulation/dynamics/Integrators
-    """
 
-    integrator: str = "RK4"
-    tol: float = 1e-12
+def _build(given):
+    from Basilisk.simulation import spacecraft, svIntegrators
+    from Basilisk.utilities import SimulationBaseClass
 
-    family: ClassVar[str] = "bsk"
-    distribution: ClassVar[Distribution] = Distribution("bsk", "Basilisk.simulation.spacecraft", oldest="2.8")
-    free_only: ClassVar[str] = "a spacecraft is free: nothing in Basilisk holds a point of its hub"
-    orders: ClassVar[Orders] = {"Euler": 1, "RK2": 2, "RK4": 4, "RKF45": None, "RKF78": None}
-    card: ClassVar[Card] = Card(variants=("Euler", "RK2", "RK4", "RKF78"), suite=("RK4", "RKF78"), as_installed=("RK4",))
+    step = round(given.dt * 1e9)  # Basilisk counts nanoseconds
+    if abs(step * 1e-9 / given.dt - 1) > 1e-9:
+        raise NotImplementedError(f"Basilisk's time is in whole nanoseconds, which dt = {given.dt:g} s is not")
+    simulation = SimulationBaseClass.SimBaseClass()
+    simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", step))
+    craft = spacecraft.Spacecraft()
+    craft.ModelTag = "craft"
+    hub = craft.hub
+    hub.mHub, hub.r_BcB_B, hub.IHubPntBc_B = given.mass, [[0.0], [0.0], [0.0]], np.diag(given.moments).tolist()
+    hub.r_CN_NInit = hub.v_CN_NInit = [[0.0], [0.0], [0.0]]
+    hub.sigma_BNInit = (given.q0[1:, None] / (1 + given.q0[0])).tolist()
+    hub.omega_BN_BInit = given.w0[:, None].tolist()
+    simulation.AddModelToTask("task", craft)
+    integrator = getattr(svIntegrators, f"svIntegrator{given.integrator}")(craft)
+    craft.setIntegrator(integrator)
+    if given.integrator in ADAPTIVE:
+        integrator.absTol = integrator.relTol = given.tol
+    recorder = craft.scStateOutMsg.recorder(step * int(given.steps[1]))
+    simulation.AddModelToTask("task", recorder)
+    simulation.InitializeSimulation()
+    simulation.ConfigureStopTime(given.n_steps * step)
+    return simulation, craft, recorder
 
-    def __post_init__(self) -> None:
-        if not 0 < finite_number("tol", self.tol, "a number above 0 and below 1") < 1:
-            raise BadInput("tol", repr(self.tol), "a number above 0 and below 1")
-        super().__post_init__()
 
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"integrator": self.integrator} | ({"tol": f"tol={self.tol:g}"} if self.order is None else {})
+def _quaternion(sigma):
+    """Return quaternions (n, 4), scalar first, of modified Rodrigues parameters (n, 3), of the shadow set or not."""
+    square = np.sum(sigma**2, axis=1, keepdims=True)
+    return np.hstack([1 - square, 2 * sigma]) / (1 + square)

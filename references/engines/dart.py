@@ -1,32 +1,65 @@
-"""DART: its semi-implicit Euler method on one body. Source: its documentation, simulation::World."""
+"""DART on a free joint or a ball joint, stepped from Python (`World.step`), because it has no loop of its own.
 
-from __future__ import annotations
+It has no settings, and nothing was switched off.
 
-from dataclasses import dataclass
-from typing import ClassVar
+References
+----------
+World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://dartsim.github.io/dart/v6.13.2/
+"""
 
-from conservative.card import Card
+import numpy as np
 
-from ..environments.engine_method import EngineMethod
-from ..environments.environment import Distribution
+ENGINE = {
+    "package": "dartpy",
+    "module": "dartpy",
+    "oldest": "6.19",
+    "title": "semi-implicit Euler",
+    "gravity": True,
+    "card": {
+        "as_installed": ("",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Dart(EngineMethod):
-    """DART on a free joint or a ball joint, stepped from Python (`World.step`), as it has no loop of its own.
+def prepare(given):
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point; DART's loop is one step a call."""
+    import dartpy as dart
 
-    It has nothing to set, and nothing was switched off.
+    world, joint, body = _build(dart, given)
+    start = joint.getPositions().copy(), joint.getVelocities().copy()
+    inertial = dart.dynamics.Frame.World()
 
-    References
-    ----------
-    World, whose integrator is semi-implicit Euler: https://dartsim.github.io/dart/v6.13.2/
-    """
+    def run():
+        world.reset()
+        joint.setPositions(start[0])
+        joint.setVelocities(start[1])
+        R, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                world.step()
+            R[sample] = body.getWorldTransform().rotation()
+            w[sample] = body.getAngularVelocity(inertial, body)
+        return {"R": R, "w": w}
 
-    family: ClassVar[str] = "dart"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("dartpy", "dartpy", oldest="6.19")
-    card: ClassVar[Card] = Card(as_installed=("",))
+    return run
 
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"integrator": "semi-implicit Euler"}
+
+def _build(dart, given):
+    world = dart.simulation.World()
+    world.setGravity([0, 0, -given.gravity])
+    world.setTimeStep(given.dt)
+    skeleton = dart.dynamics.Skeleton("skeleton")
+    joint, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
+    body.setInertia(dart.dynamics.Inertia(given.mass, given.com, given.inertia_com))
+    world.addSkeleton(skeleton)
+    joint.setPositions(_positions(dart, given))
+    joint.setVelocities(np.concatenate([given.w0, np.zeros(3 * given.free)]))  # spatial velocity in body axes
+    return world, joint, body
+
+
+def _positions(dart, given):
+    if not given.free:
+        return dart.dynamics.BallJoint.convertToPositions(given.R0)
+    place = dart.math.Isometry3()
+    place.set_rotation(given.R0)
+    return dart.dynamics.FreeJoint.convertToPositions(place)

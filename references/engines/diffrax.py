@@ -1,54 +1,68 @@
-"""Diffrax: solvers in JAX on quaternion and body rates. Source: its documentation, ODE solvers."""
+"""Diffrax on quaternion and body rates, in double precision on the CPU. JAX compiles the whole run; this is not timed.
 
-from __future__ import annotations
+Parameters
+----------
+solver
+    "Euler", "Heun", "Midpoint", "Bosh3", "Tsit5", "Dopri5" or "Dopri8".
+rtol
+    Relative and absolute tolerance of adaptive steps, up to 1; 0 for fixed steps of dt.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+References
+----------
+Solvers: https://docs.kidger.site/diffrax/api/solvers/ode_solvers/
+Choice of steps: https://docs.kidger.site/diffrax/api/stepsize_controller/
+"""
 
-from conservative.card import Card
-from conservative.check import finite_number
-from conservative.errors import BadInput
+import numpy as np
 
-from ..environments.engine_method import EngineMethod, Orders, jax_variables
-from ..environments.environment import Distribution
+ENGINE = {
+    "package": "diffrax",
+    "module": "diffrax",
+    "oldest": "0.7",
+    "settings": {"solver": "Tsit5", "rtol": 0.0},
+    "orders": {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8},
+    "tolerance": "rtol",
+    "gravity": True,
+    "card": {
+        "variants": ("", "Dopri8", "Dopri8,rtol=1e-9"),
+        "suite": ("", "Dopri8,rtol=1e-9"),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Diffrax(EngineMethod):
-    """Diffrax in double precision on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+def prepare(given):
+    """Return a run compiled as a whole, with samples saved at their times. JAX_ENABLE_X64 says in which precision."""
+    import diffrax
+    import jax
+    import jax.numpy as jnp
 
-    Parameters
-    ----------
-    solver
-        "Euler", "Heun", "Midpoint", "Bosh3", "Tsit5", "Dopri5" or "Dopri8".
-    rtol
-        Relative and absolute tolerance, above 0 and below 1, to which it chooses its own steps; 0 for fixed steps of dt.
+    solver = getattr(diffrax, given.solver)()
+    moments, start = jnp.array(given.moments), jnp.concatenate([jnp.array(given.q0), jnp.array(given.w0)])
+    times = jnp.array(given.steps * given.dt)
+    controller = diffrax.PIDController(given.rtol, given.rtol) if given.rtol else diffrax.ConstantStepSize()
 
-    References
-    ----------
-    Solvers: https://docs.kidger.site/diffrax/api/solvers/ode_solvers/
-    Choice of steps: https://docs.kidger.site/diffrax/api/stepsize_controller/
-    """
+    weight, com = given.mass * given.gravity, jnp.array(given.com)
 
-    solver: str = "Tsit5"
-    rtol: float = 0.0
+    def derivative(t, y, _):
+        q, w = y[:4], y[4:]
+        # of the unit quaternion's rotation, the third row: the vertical in body axes
+        up = jnp.array([2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]), 1 - 2 * (q[1] ** 2 + q[2] ** 2)])
+        turn = jnp.concatenate([-jnp.dot(q[1:], w)[None], q[0] * w + jnp.cross(q[1:], w)]) / 2
+        torque = jnp.cross(moments * w, w) - weight * jnp.cross(com, up)
+        return jnp.concatenate([turn, torque / moments])
 
-    family: ClassVar[str] = "diffrax"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("diffrax", "diffrax", oldest="0.7")
-    orders: ClassVar[Orders] = {"Euler": 1, "Heun": 2, "Midpoint": 2, "Bosh3": 3, "Tsit5": 5, "Dopri5": 5, "Dopri8": 8}
-    card: ClassVar[Card] = Card(variants=("", "Dopri8", "Dopri8,rtol=1e-9"), suite=("", "Dopri8,rtol=1e-9"))
+    @jax.jit
+    def solve():
+        options = {"saveat": diffrax.SaveAt(ts=times), "stepsize_controller": controller, "max_steps": None, "throw": False}
+        adjoint = diffrax.ForwardMode() if hasattr(diffrax, "ForwardMode") else diffrax.DirectAdjoint()
+        term = diffrax.ODETerm(derivative)
+        return diffrax.diffeqsolve(term, solver, times[0], times[-1], given.dt, start, adjoint=adjoint, **options)
 
-    def __post_init__(self) -> None:
-        if not 0 <= finite_number("rtol", self.rtol, "a number from 0 to below 1") < 1:
-            raise BadInput("rtol", repr(self.rtol), "a number from 0 to below 1")
-        super().__post_init__()
+    jax.block_until_ready(solve())
 
-    @property
-    def variables(self) -> Mapping[str, str]:
-        return jax_variables(self.precision)
+    def run():
+        found = solve()
+        y = np.asarray(found.ys, float)
+        return {"q": y[:, :4], "w": y[:, 4:], "steps": int(found.stats["num_steps"])}
 
-    @property
-    def order(self) -> int | None:
-        return None if self.rtol else self.orders[self.solver]
+    return run

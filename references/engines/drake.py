@@ -1,69 +1,140 @@
-"""Drake: its discrete plant and its integrators on one body. Source: its documentation, Simulator and IntegratorBase."""
+"""Drake with its discrete plant or one of its integrators, in its own loop (`Simulator.AdvanceTo`).
 
-from __future__ import annotations
+A free body is on Drake's quaternion floating joint. A body about a fixed point is on `BallRpyJoint`, Drake's only ball joint,
+whose coordinates are roll, pitch and yaw: errors grow when the first principal axis comes near the vertical, and a run in which
+it reaches the vertical ends there. Switched off: error control (`set_fixed_step_mode`), unless an accuracy is given or the
+integrator is "default".
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "discrete" (the plant's own update), one of Drake's integrators for a continuous plant, such as "runge_kutta5", or
+    "default": that of `Simulator`, with error control and steps of at most dt.
+accuracy
+    Relative accuracy of adaptive steps of at most dt, up to 1; 0 for fixed steps of dt.
 
-from conservative.card import Card
-from conservative.check import finite_number
-from conservative.errors import BadInput
+References
+----------
+Simulator: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_simulator.html
+Its defaults: https://github.com/RobotLocomotion/drake/blob/master/systems/analysis/simulator_config.h
+Fixed steps: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_integrator_base.html
+BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball_rpy_joint.html
+No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+import numpy as np
 
-
-@dataclass(frozen=True)
-class Drake(EngineMethod):
-    """Drake with its discrete plant, or with one of its integrators, in its own loop (`Simulator.AdvanceTo`).
-
-    A free body is on Drake's quaternion floating joint. A body about a fixed point is on `BallRpyJoint`, Drake's only ball
-    joint, whose coordinates are roll, pitch and yaw: errors grow where the first principal axis comes near the vertical, and a
-    run in which it stands upright ends there. Switched off: error control (`set_fixed_step_mode`), unless an accuracy is given
-    or the integrator is "default".
-
-    Parameters
-    ----------
-    integrator
-        "discrete" (the plant's own update), one that Drake has for a continuous plant, such as "runge_kutta5", or "default":
-        what `Simulator` takes where nobody chooses, with error control and with steps of dt at most.
-    accuracy
-        Relative accuracy, above 0 to 1, to which it chooses its own steps of at most dt; 0 for fixed steps of dt.
-
-    References
-    ----------
-    Simulator: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_simulator.html
-    Its defaults: https://github.com/RobotLocomotion/drake/blob/master/systems/analysis/simulator_config.h
-    Fixed steps: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_integrator_base.html
-    BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball_rpy_joint.html
-    No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
-    """
-
-    integrator: str = "runge_kutta5"
-    accuracy: float = 0.0
-
-    family: ClassVar[str] = "drake"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("drake", "pydrake.all", oldest="1.40")
-    orders: ClassVar[Orders] = {
+ENGINE = {
+    "package": "drake",
+    "module": "pydrake.all",
+    "oldest": "1.40",
+    "settings": {"integrator": "runge_kutta5", "accuracy": 0.0},
+    "orders": {
         **{"default": None, "discrete": 1, "explicit_euler": 1, "semi_explicit_euler": 1, "implicit_euler": 1},
         **{"velocity_implicit_euler": 1, "runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3},
         **{"radau1": 1, "radau3": 3},
-    }
-    card: ClassVar[Card] = Card(
-        variants=("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10"),
-        suite=("discrete", "runge_kutta5"),
-        as_installed=("default",),
-    )
+    },
+    "tolerance": "accuracy",
+    "gravity": True,
+    "card": {
+        "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta3,accuracy=1e-10"),
+        "suite": ("discrete", "runge_kutta5"),
+        "as_installed": ("default",),
+    },
+}
 
-    def __post_init__(self) -> None:
-        allowed = "a number above 0 up to 1, or 0 for fixed steps"
-        if not 0 <= finite_number("accuracy", self.accuracy, allowed) <= 1:
-            raise BadInput("accuracy", repr(self.accuracy), allowed)
-        if self.accuracy and self.integrator in ("default", "discrete"):
-            raise BadInput("accuracy", repr(self.accuracy), f"0 with the integrator {self.integrator!r}")
-        super().__post_init__()
 
-    @property
-    def order(self) -> int | None:
-        return None if self.accuracy else self.orders[self.integrator]
+def prepare(given):
+    """Return a run of one body, advanced from sample to sample by Drake's Simulator.
+
+    A free body is on a quaternion floating joint; a body about a fixed point on Drake's only ball joint, whose coordinates are
+    roll, pitch and yaw. Where its first principal axis comes to stand upright, the run ends.
+    """
+    import pydrake.all as drake
+
+    if given.accuracy and given.integrator in ("default", "discrete"):
+        raise NotImplementedError(f"no accuracy with the integrator {given.integrator}")
+    plant, body, simulator = _build(drake, given)
+    context = simulator.get_mutable_context()
+    inner = plant.GetMyMutableContextFromRoot(context)
+    start = _start(drake, plant, body, inner, given)
+    times = given.steps * given.dt
+
+    def run():
+        R, w = np.full((len(times), 3, 3), np.nan), np.full((len(times), 3), np.nan)
+        reason = ""
+        try:
+            context.SetTime(0.0)
+            start()
+            simulator.Initialize()
+            for sample, time in enumerate(times.tolist()):
+                if sample:  # at its start a discrete plant would be updated
+                    simulator.AdvanceTo(time)
+                R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
+                w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
+        except RuntimeError as error:
+            if "singularity" not in str(error):
+                raise
+            reason = "Drake's BallRpyJoint has reached a singularity"
+        return {"R": R, "w_W": w, "reason": reason}
+
+    return run
+
+
+def _start(drake, plant, body, context, given):
+    """Return what sets the body's attitude and rates to those of the start."""
+    turn = drake.RotationMatrix(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)))
+    if given.free:
+        pose, spin = drake.RigidTransform(turn, np.zeros(3)), drake.SpatialVelocity(given.w0_W, np.zeros(3))
+
+        def start():
+            plant.SetFreeBodyPose(context, body, pose)
+            plant.SetFreeBodySpatialVelocity(context=context, body=body, V_JpJc=spin)
+
+    else:
+        joint, angles = plant.GetJointByName("support"), drake.RollPitchYaw(turn).vector()
+
+        def start():
+            joint.set_angles(context, angles)
+            joint.set_angular_velocity(context, given.w0_W)
+
+    return start
+
+
+def _build(drake, given):
+    discrete = given.integrator == "discrete"
+    builder = drake.DiagramBuilder()
+    plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    inertia = drake.RotationalInertia(xx, yy, zz, xy, xz, yz)
+    body = plant.AddRigidBody("body", drake.SpatialInertia.MakeFromCentralInertia(given.mass, given.com, inertia))
+    plant.mutable_gravity_field().set_gravity_vector([0, 0, -given.gravity])
+    if not given.free:
+        plant.AddJoint(drake.BallRpyJoint("support", plant.world_frame(), body.body_frame()))
+    plant.Finalize()
+    simulator = drake.Simulator(builder.Build())
+    if not discrete:
+        _choose(drake, simulator, given)
+    return plant, body, simulator
+
+
+def _choose(drake, simulator, given):
+    """Choose the integrator: in fixed steps, or in its own to an accuracy."""
+    if given.integrator == "default":
+        simulator.get_mutable_integrator().set_maximum_step_size(given.dt)
+        return
+    if given.integrator not in drake.GetIntegrationSchemes():
+        raise NotImplementedError(f"Drake has no integrator {given.integrator}, but {', '.join(drake.GetIntegrationSchemes())}")
+    drake.ResetIntegratorFromFlags(simulator, given.integrator, given.dt)
+    integrator = simulator.get_mutable_integrator()
+    if given.accuracy:
+        integrator.set_target_accuracy(given.accuracy)
+    else:
+        _fix_steps(integrator)
+
+
+def _fix_steps(integrator):
+    try:
+        integrator.set_fixed_step_mode(True)
+    except RuntimeError:  # one without error estimates, whose steps are fixed
+        return

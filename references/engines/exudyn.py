@@ -1,49 +1,107 @@
-"""Exudyn: its explicit Lie group integrators and its implicit ones on one body. Source: its documentation, Solvers."""
+"""Exudyn with one of its integrators, in its own loop (`mbs.SolveDynamic`), in fixed steps.
 
-from __future__ import annotations
+Explicit integrators work on the Lie group (`useLieGroupIntegration`), with a rotation vector as the node's coordinates; so do
+the implicit ones, with a full Newton iteration to 1e-12. Explicit ones support no joints. A body about a fixed point is
+therefore a free body with the moments about that point as its central ones and two loads: its weight at the centre of mass,
+and the reaction force of the support at the fixed point. Switched off: files of solutions (`writeSolutionToFile`),
+accelerations at the end of a step (`computeEndOfStepAccelerations`), adaptive steps (`automaticStepSize`). Each call includes
+the start of a solver.
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "GeneralizedAlpha", "TrapezoidalIndex2" or "default":
+    Exudyn's default solver, coordinates and settings.
 
-from conservative.card import Card
+References
+----------
+Solvers: https://github.com/jgerstmayr/EXUDYN/blob/master/docs/RST/SolversInExudyn.rst
+The node: https://github.com/jgerstmayr/EXUDYN/blob/master/docs/RST/items/NodeRigidBodyRotVecLG.rst
+Settings: https://exudyn.readthedocs.io/en/latest/docs/RST/structures/StructuresAndSettings.html
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+import numpy as np
 
-
-@dataclass(frozen=True)
-class Exudyn(EngineMethod):
-    """Exudyn with one of its integrators, in its own loop (`mbs.SolveDynamic`), in fixed steps.
-
-    The explicit ones integrate on the Lie group (`useLieGroupIntegration`), with a rotation vector as the node's coordinates;
-    the implicit ones, too, with a full Newton iteration to 1e-12. Explicit ones take no joints, so that a body about a fixed
-    point is one that has its moments about that point as central ones, with two loads: its weight at the centre of mass, and
-    the opposite at the point. Switched off: files of solutions (`writeSolutionToFile`), accelerations at the end of a step
-    (`computeEndOfStepAccelerations`), steps of its own choice (`automaticStepSize`). What Exudyn needs to start a solver is a
-    part of each call.
-
-    Parameters
-    ----------
-    integrator
-        "ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "GeneralizedAlpha", "TrapezoidalIndex2" or
-        "default": the solver, the node's coordinates and all settings that Exudyn takes where nobody chooses.
-
-    References
-    ----------
-    Solvers: https://github.com/jgerstmayr/EXUDYN/blob/master/docs/RST/SolversInExudyn.rst
-    The node: https://github.com/jgerstmayr/EXUDYN/blob/master/docs/RST/items/NodeRigidBodyRotVecLG.rst
-    Settings: https://exudyn.readthedocs.io/en/latest/docs/RST/structures/StructuresAndSettings.html
-    """
-
-    integrator: str = "RK44"
-
-    family: ClassVar[str] = "exudyn"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("exudyn", "exudyn", oldest="1.9")
-    orders: ClassVar[Orders] = {
+ENGINE = {
+    "package": "exudyn",
+    "module": "exudyn",
+    "oldest": "1.9",
+    "settings": {"integrator": "RK44"},
+    "orders": {
         **{"ExplicitEuler": 1, "ExplicitMidpoint": 2, "RK33": 3, "RK44": 4, "RK67": 6, "DOPRI5": 5},
         **{"GeneralizedAlpha": 2, "TrapezoidalIndex2": 2, "default": 2},
-    }
-    card: ClassVar[Card] = Card(
-        variants=("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"), suite=("RK44", "RK67"), as_installed=("default",)
+    },
+    "gravity": True,
+    "card": {
+        "variants": ("ExplicitMidpoint", "RK44", "RK67", "GeneralizedAlpha"),
+        "suite": ("RK44", "RK67"),
+        "as_installed": ("default",),
+    },
+}
+
+EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5", "VelocityVerlet")
+
+
+def prepare(given):
+    """Return a run of one rigid body on the node that Exudyn's Lie group integrators take.
+
+    Explicit integrators take no joints. A body about a fixed point turns as a free one does that has its moments, about the
+    fixed point, as central ones, where weight pulls at the centre of mass and the support's force that is its opposite at the
+    fixed point.
+    """
+    import exudyn as exu
+    from exudyn.utilities import RigidBodyInertia, SensorBody
+
+    mbs, default = exu.SystemContainer().AddSystem(), given.integrator == "default"
+    # With Euler parameters, which are the default, the explicit integrators raise.
+    kind = {} if default else {"nodeType": exu.NodeType.RotationRotationVector}
+    body = mbs.CreateRigidBody(
+        inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
+        referenceRotationMatrix=given.R0,
+        initialAngularVelocity=given.w0_W,
+        **kind,
     )
+    _load(mbs, body, given)
+    outputs = exu.OutputVariableType.RotationMatrix, exu.OutputVariableType.AngularVelocityLocal
+    sampled = len(given.steps) > 2
+    sensors = [mbs.AddSensor(SensorBody(bodyNumber=body, outputVariableType=o, storeInternal=True)) for o in outputs * sampled]
+    mbs.Assemble()
+    settings = _settings(exu, given)
+    solver = {} if default else {"solverType": getattr(exu.DynamicSolverType, given.integrator)}
+    start = given.R0.ravel(), given.w0
+
+    def run():
+        mbs.SolveDynamic(settings, **solver)
+        end = [np.array(mbs.GetObjectOutputBody(body, output, [0, 0, 0])).ravel() for output in outputs]
+        between = [mbs.GetSensorStoredData(sensor)[1:-1, 1:] for sensor in sensors] or [np.empty((0, 9)), np.empty((0, 3))]
+        R, w = (np.vstack(parts) for parts in zip(start, between, end, strict=True))
+        return {"R": R.reshape(-1, 3, 3), "w": w}
+
+    return run
+
+
+def _load(mbs, body, given):
+    from exudyn.itemInterface import LoadForceVector, MarkerBodyRigid
+
+    for place, sign in ((given.com, -1), (np.zeros(3), 1)) if given.gravity else ():
+        marker = mbs.AddMarker(MarkerBodyRigid(bodyNumber=body, localPosition=place.tolist()))
+        mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=[0, 0, sign * given.mass * given.gravity]))
+
+
+def _settings(exu, given):
+    settings = exu.SimulationSettings()
+    settings.solutionSettings.sensorsWritePeriod = given.steps[1] * given.dt
+    time = settings.timeIntegration
+    time.numberOfSteps, time.endTime, time.verboseMode = given.n_steps, given.n_steps * given.dt, 0
+    if given.integrator == "default":
+        return settings
+    settings.solutionSettings.writeSolutionToFile = False
+    time.automaticStepSize = False  # fixed steps with DOPRI5, too
+    if given.integrator in EXPLICIT:
+        time.explicitIntegration.useLieGroupIntegration = True
+        time.explicitIntegration.computeEndOfStepAccelerations = False
+    else:
+        time.newton.useModifiedNewton = False
+        time.newton.relativeTolerance, time.newton.absoluteTolerance = 1e-12, 1e-14
+        time.newton.numericalDifferentiation.minimumCoordinateSize = 1
+    return settings

@@ -1,57 +1,99 @@
-"""Genesis: its rigid solver on one free body. Source: its documentation, https://genesis-world.readthedocs.io."""
+"""Genesis's rigid solver on the CPU, on the free joint of a body from an MJCF file, stepped from Python (`scene.step`).
 
-from __future__ import annotations
+Its kernels are compiled when a run is prepared, once in the life of an environment: with the import, this takes one to four
+minutes. One of its packages, pygltflib, has no wheel: `conservative engines install genesis --allow-build`. The environment
+takes 8 GB, nearly all of it PyTorch for GPUs. Switched off: collisions and constraints (`enable_collision`,
+`disable_constraint`).
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "Euler", "implicitfast" or "approximate_implicitfast", which is Genesis's default.
+precision
+    "f64" or "f32", which is Genesis's default (`gs.init(precision="32")`). A process has one precision.
+as_installed
+    Whether collisions and constraints stay on.
 
-from conservative.card import Card
+References
+----------
+RigidOptions: https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py
+Precision, `gs.init`; RigidEntity: https://genesis-world.readthedocs.io
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+AS_INSTALLED = "approximate_implicitfast,precision=f32,as_installed=true"
+ENGINE = {
+    "package": "genesis-world",
+    "module": "genesis",
+    "requirements": ("torch",),
+    "oldest": "1.4",
+    "settings": {"integrator": "implicitfast", "precision": "f64", "as_installed": False},
+    "orders": {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2},
+    "card": {
+        "variants": ("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32", AS_INSTALLED),
+        "as_installed": (AS_INSTALLED,),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Genesis(EngineMethod):
-    """Genesis's rigid solver on the CPU, on the free joint of a body from an MJCF file, stepped from Python (`scene.step`).
+def prepare(given):
+    """Return a run of one body from an MJCF file; kernels are compiled here, once in the life of an environment."""
+    import genesis as gs
 
-    Its kernels are compiled when a run is prepared, once in the life of an environment: with importing it, that takes one to
-    four minutes. One of the packages that it needs, pygltflib, has no wheel: `conservative engines install genesis
-    --allow-build`; the environment takes 8 GB, nearly all of it PyTorch for GPUs. Switched off: collisions and constraints
-    (`enable_collision`, `disable_constraint`).
+    if not getattr(gs, "_initialized", False):  # once in a process, which has one precision
+        gs.init(backend=gs.cpu, precision=given.precision[1:], logging_level="error")
+    scene = _scene(gs, given)
+    body = scene.add_entity(gs.morphs.MJCF(file=str(_write_model(given))))
+    scene.build()
+    place, rates = np.array([0, 0, 0, *given.q0]), np.array([0, 0, 0, *given.w0])
+    step = partial(scene.step, update_visualizer=False)
+    step()
 
-    Parameters
-    ----------
-    integrator
-        "Euler", "implicitfast" or "approximate_implicitfast", which is Genesis's default.
-    precision
-        "f64" or "f32", which is Genesis's default (`gs.init(precision="32")`).
-    as_installed
-        Whether collisions and constraints stay on.
+    def run():
+        scene.reset()
+        body.set_qpos(place)
+        body.set_dofs_velocity(rates)
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                step()
+            q[sample], w[sample] = body.get_quat().numpy().ravel(), body.get_ang().numpy().ravel()
+        return {"q": q, "w_W": w}
 
-    References
-    ----------
-    RigidOptions: https://github.com/Genesis-Embodied-AI/genesis-world/blob/main/genesis/options/solvers.py
-    Precision, `gs.init`: https://genesis-world.readthedocs.io
-    """
+    return run
 
-    integrator: str = "implicitfast"
-    precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
-    as_installed: bool = False
 
-    family: ClassVar[str] = "genesis"
-    distribution: ClassVar[Distribution] = Distribution("genesis-world", "genesis", ("torch",), oldest="1.4")
-    orders: ClassVar[Orders] = {"Euler": 1, "implicitfast": 2, "approximate_implicitfast": 2}
-    card: ClassVar[Card] = Card(
-        variants=(
-            *("Euler", "implicitfast", "approximate_implicitfast", "implicitfast,precision=f32"),
-            "approximate_implicitfast,precision=f32,as_installed=true",
+def _scene(gs, given):
+    return gs.Scene(
+        sim_options=gs.options.SimOptions(dt=given.dt, gravity=(0, 0, 0)),
+        rigid_options=gs.options.RigidOptions(
+            integrator=getattr(gs.integrator, given.integrator),
+            enable_collision=given.as_installed,
+            disable_constraint=not given.as_installed,
         ),
-        as_installed=("approximate_implicitfast,precision=f32,as_installed=true",),
+        show_viewer=False,
     )
 
-    @property
-    def variables(self) -> Mapping[str, str]:
-        """Variables that no one reads: Genesis has one precision in a process, so that each precision has a process."""
-        return {"CONSERVATIVE_PRECISION": self.precision}
+
+def _write_model(given):
+    """Return the path of a file of the body; Genesis wants a shape, which touches nothing."""
+    moments = " ".join(map(repr, given.moments.tolist()))
+    path = Path("body.xml").resolve()
+    path.write_text(
+        f"""
+        <mujoco>
+          <worldbody>
+            <body>
+              <freejoint/>
+              <inertial mass="{given.mass!r}" pos="0 0 0" diaginertia="{moments}"/>
+              <geom type="sphere" size="0.1" contype="0" conaffinity="0"/>
+            </body>
+          </worldbody>
+        </mujoco>""",
+        encoding="utf-8",
+    )
+    return path

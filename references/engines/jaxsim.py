@@ -1,50 +1,102 @@
-"""JaxSim: its integrators on one free body, in JAX. Source: its documentation, https://jaxsim.readthedocs.io."""
+"""JaxSim on a floating base, on the CPU. JAX compiles the whole run; compilation is not timed.
 
-from __future__ import annotations
+Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none.
+`RungeKutta4Fast` raises if there are no points of contact. One of its packages, pptree, has no wheel:
+`conservative engines install jaxsim --allow-build`.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "SemiImplicitEuler", which is JaxSim's default, or "RungeKutta4".
+precision
+    "f64", which is JaxSim's default, or "f32", which it calls experimental.
 
-from conservative.card import Card
+References
+----------
+Integrators: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py
+Precision: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py
+Models and their joints: https://jaxsim.readthedocs.io/en/latest/modules/api.html
+"""
 
-from ..environments.engine_method import EngineMethod, Orders, jax_variables
-from ..environments.environment import Distribution
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+ENGINE = {
+    "package": "jaxsim",
+    "module": "jaxsim",
+    "oldest": "0.9",
+    "settings": {"integrator": "RungeKutta4", "precision": "f64"},
+    "orders": {"SemiImplicitEuler": 1, "RungeKutta4": 4},
+    "free_only": "JaxSim's joints are revolute, prismatic or fixed",
+    "card": {
+        "variants": ("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32"),
+        "as_installed": ("SemiImplicitEuler",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class JaxSim(EngineMethod):
-    """JaxSim on a floating base, on the CPU, with the whole run compiled by JAX; compiling is no part of a call.
+def prepare(given):
+    """Return a run on a floating base, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
 
-    Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none.
-    `RungeKutta4Fast` raises where there are no points of contact. One of the packages that it needs, pptree, has no wheel:
-    `conservative engines install jaxsim --allow-build`.
-
-    Parameters
-    ----------
-    integrator
-        "SemiImplicitEuler", which is JaxSim's default, or "RungeKutta4".
-    precision
-        "f64", which is JaxSim's default, or "f32", which it calls experimental.
-
-    References
-    ----------
-    Integrators: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/api/integrators.py
-    Precision: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py
-    Models and their joints: https://jaxsim.readthedocs.io/en/latest/modules/api.html
+    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process. What is compiled is kept in
+    the home of the environment.
     """
+    import jax
+    import jaxsim.api as js
 
-    integrator: str = "RungeKutta4"
-    precision: str = "f64"  # type: ignore[misc]  # a setting here, not a fact
-
-    family: ClassVar[str] = "jaxsim"
-    distribution: ClassVar[Distribution] = Distribution("jaxsim", "jaxsim", oldest="0.9")
-    free_only: ClassVar[str] = "JaxSim's joints are revolute, prismatic or fixed"
-    orders: ClassVar[Orders] = {"SemiImplicitEuler": 1, "RungeKutta4": 4}
-    card: ClassVar[Card] = Card(
-        variants=("SemiImplicitEuler", "RungeKutta4", "RungeKutta4,precision=f32"), as_installed=("SemiImplicitEuler",)
+    jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
+    integrator = js.model.IntegratorType[given.integrator]
+    options = {"is_urdf": False, "time_step": given.dt, "gravity": 0.0, "integrator": integrator}
+    model = js.model.JaxSimModel.build_from_model_description(_description(given), **options)
+    start = js.data.JaxSimModelData.build(
+        model,
+        base_quaternion=jax.numpy.array(given.q0),
+        base_angular_velocity=jax.numpy.array(given.w0_W),
+        velocity_representation=js.common.VelRepr.Mixed,  # angular velocity in the world
     )
+    counts = np.diff(given.steps).astype(np.int32)
+    march = _march()
+    jax.block_until_ready(march(model, start, counts))
 
-    @property
-    def variables(self) -> Mapping[str, str]:
-        return jax_variables(self.precision)
+    def run():
+        q, w = march(model, start, counts)
+        return {"q": np.vstack([given.q0, np.asarray(q, float)]), "w_W": np.vstack([given.w0_W, np.asarray(w, float)])}
+
+    return run
+
+
+@lru_cache(maxsize=1)
+def _march():
+    """Return what computes the samples after the start, compiled once for every integrator, step and number of samples."""
+    import jax
+    import jaxsim.api as js
+
+    def march(model, data, counts):
+        def advance(data, n_steps):
+            data = jax.lax.fori_loop(0, n_steps, lambda _, data: js.model.step(model, data), data)
+            return data, (data.base_quaternion, data.base_velocity[3:])
+
+        return jax.lax.scan(advance, data, counts)[1]
+
+    return jax.jit(march)
+
+
+def _description(given):
+    """Return the body as SDF; JaxSim reads URDF by a program of Gazebo's."""
+    ixx, iyy, izz = map(repr, given.moments.tolist())
+    return f"""
+        <?xml version="1.0"?>
+        <sdf version="1.10">
+          <model name="body">
+            <link name="link">
+              <inertial>
+                <mass>{given.mass!r}</mass>
+                <inertia>
+                  <ixx>{ixx}</ixx><iyy>{iyy}</iyy><izz>{izz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>
+                </inertia>
+              </inertial>
+            </link>
+          </model>
+        </sdf>""".strip()

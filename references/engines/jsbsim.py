@@ -1,51 +1,94 @@
-"""JSBSim: its integrators on one aircraft that no force turns. Source: its API documentation, JSBSim::FGPropagate."""
+"""JSBSim on an aircraft without forces except weight, stepped from Python (`FGFDMExec.run`), because it has no loop.
 
-from __future__ import annotations
+Changed: the planet does not turn (`load_planet`), so that the Earth's rate is not in the attitudes, and there is no model of
+aerodynamics (`simulation/models/FGAerodynamics/enabled`). JSBSim also integrates the translation in each step.
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+rate
+    Integrator of the rates (`simulation/integrator/rate/rotational`): "RectEuler" (JSBSim's default), "Trapezoidal", "AB2",
+    "AB3", "AB4" or "AB5" (Adams-Bashforth, all of order 2 here, because the state before the start is taken as constant).
+attitude
+    Integrator of the attitude (`simulation/integrator/position/rotational`): one of these, "Buss1", "Buss2" or
+    "LocalLinearization"; empty for that of the rates.
 
-from conservative.card import Card
-from conservative.check import choice
+References
+----------
+FGPropagate, the integrators; FGInertial, FGMassBalance: https://jsbsim-team.github.io/jsbsim/classJSBSim_1_1FGPropagate.html
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+import tempfile
+from pathlib import Path
 
-RATES = {"RectEuler": 1, "Trapezoidal": 1, "AB2": 2, "AB3": 2, "AB4": 2, "AB5": 2}
-"""Order of each, about: what comes before the start is taken for constant, which leaves an error of second order."""
-ATTITUDES = (*RATES, "Buss1", "Buss2", "LocalLinearization")
+import numpy as np
+
+INTEGRATORS = {  # FGPropagate::eIntegrateType
+    **{"RectEuler": 1, "Trapezoidal": 2, "AB2": 3, "AB3": 4, "AB4": 5, "Buss1": 6, "Buss2": 7, "LocalLinearization": 8},
+    "AB5": 9,
+}
+ENGINE = {
+    "package": "jsbsim",
+    "module": "jsbsim",
+    "oldest": "1.3",
+    "settings": {"rate": "AB2", "attitude": ""},
+    "orders": {"RectEuler": 1, "Trapezoidal": 1, "AB2": 2, "AB3": 2, "AB4": 2, "AB5": 2},
+    "choices": {"attitude": ("", *INTEGRATORS)},
+    "free_only": "an aircraft flies: nothing in JSBSim holds one of its points",
+    "card": {
+        "variants": ("RectEuler", "Trapezoidal", "AB2", "AB5"),
+        "as_installed": ("RectEuler",),
+    },
+}
+
+PLANET = '<planet name="still"><rotation_rate unit="RAD/SEC">0</rotation_rate></planet>'
+AIRCRAFT = """<fdm_config name="body" version="2.0">
+  <metrics><location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location></metrics>
+  <mass_balance>
+    <ixx unit="KG*M2">{0!r}</ixx><iyy unit="KG*M2">{1!r}</iyy><izz unit="KG*M2">{2!r}</izz>
+    <emptywt unit="KG">{3!r}</emptywt><location name="CG" unit="M"><x>0</x><y>0</y><z>0</z></location>
+  </mass_balance>
+  <ground_reactions/><propulsion/><aerodynamics/>
+</fdm_config>"""
+HEIGHT = 1e7
+"""Feet above a planet that the aircraft falls down to."""
 
 
-@dataclass(frozen=True)
-class JSBSim(EngineMethod):
-    """JSBSim on an aircraft without forces but weight, stepped from Python (`FGFDMExec.run`), as it has no loop of its own.
+def prepare(given):
+    """Return a run of one aircraft, far above a planet that does not turn; JSBSim's loop is one step a call."""
+    flight = _build(given)
+    attitude = flight.get_propagate()
 
-    Changed: the planet does not turn (`load_planet`), so that the Earth's rate is not in the attitudes; no model of
-    aerodynamics (`simulation/models/FGAerodynamics/enabled`). The translation is JSBSim's own, and its time in each step.
+    def run():
+        flight.run_ic()
+        T, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                flight.run()
+            T[sample] = attitude.get_Tec2b()
+            w[sample] = [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]
+        # A planet-fixed frame is an inertial one here; how it lies in the world is known from the start.
+        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": w}
 
-    Parameters
-    ----------
-    rate
-        Integrator of the rates (`simulation/integrator/rate/rotational`): "RectEuler", JSBSim's default, "Trapezoidal", "AB2",
-        "AB3", "AB4" or "AB5" (Adams-Bashforth).
-    attitude
-        Integrator of the attitude (`simulation/integrator/position/rotational`): one of these, "Buss1", "Buss2" or
-        "LocalLinearization"; empty for that of the rates.
+    return run
 
-    References
-    ----------
-    FGPropagate, the integrators: https://jsbsim-team.github.io/jsbsim/classJSBSim_1_1FGPropagate.html
-    """
 
-    rate: str = "AB2"
-    attitude: str = ""
+def _build(given):
+    import jsbsim
 
-    family: ClassVar[str] = "jsbsim"
-    distribution: ClassVar[Distribution] = Distribution("jsbsim", "jsbsim", oldest="1.3")
-    free_only: ClassVar[str] = "an aircraft flies: nothing in JSBSim holds one of its points"
-    orders: ClassVar[Orders] = RATES
-    card: ClassVar[Card] = Card(variants=("RectEuler", "Trapezoidal", "AB2", "AB5"), as_installed=("RectEuler",))
-
-    def __post_init__(self) -> None:
-        choice("attitude", self.attitude, ("", *ATTITUDES))
-        super().__post_init__()
+    jsbsim.FGJSBBase().debug_lvl = 0
+    with tempfile.TemporaryDirectory() as folder:
+        aircraft = Path(folder) / "aircraft" / "body"
+        aircraft.mkdir(parents=True)
+        (aircraft / "body.xml").write_text(AIRCRAFT.format(*given.moments.tolist(), given.mass))
+        (aircraft / "still.xml").write_text(PLANET)
+        flight = jsbsim.FGFDMExec(folder)
+        flight.load_planet(str(aircraft / "still.xml"), False)
+        flight.load_model("body")
+    flight["simulation/models/FGAerodynamics/enabled"] = 0
+    flight.set_dt(given.dt)
+    flight["simulation/integrator/rate/rotational"] = INTEGRATORS[given.rate]
+    flight["simulation/integrator/position/rotational"] = INTEGRATORS[given.attitude or given.rate]
+    flight["ic/h-sl-ft"] = HEIGHT
+    for axis, rate in zip("pqr", given.w0.tolist(), strict=True):
+        flight[f"ic/{axis}-rad_sec"] = rate
+    return flight

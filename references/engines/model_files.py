@@ -1,30 +1,39 @@
 """Bodies out of model files, read by the engines' own parsers: MJCF by MuJoCo, URDF by Pinocchio.
 
-A body turns about its joint. What is welded to it moves with it and counts; what hangs on further joints does not. A body that
-is free turns about its centre of mass. Body axes are the file's own: those of the MJCF body or of the URDF link. A file is read
-in a process of its own, which has limits: an MJCF file of one line can ask for 10^5 copies of a body, and of those again.
-Source: the two formats' documentation.
+A body turns about its joint. What is welded to it moves with it and is included; bodies on further joints are not. A free body
+turns about its centre of mass. Body axes are those of the MJCF body or of the URDF link. A file is read in a process of its own
+with limits, because an MJCF file of one line can ask for 10^5 copies of a body, and of those again.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from conservative.attitude import Array
 from conservative.check import describe, printable_text
-from conservative.errors import BadInput, MissingEngine
+from conservative.errors import BadInput, MissingEngine, nearest
 from conservative.shapes import MassDistribution
 
-from ..engine import version
-from ..worker import python_command
-from . import model_reader
-from .model_reader import CPU_SECONDS, ENGINES, MEMORY
+from ..engine import load, version
+from ..worker.calls import python_worker
+from ..worker.client import EngineCrashed, EngineTimeout, time_limit
 
 SECONDS = 60.0
-"""Time, s, after which a reader is ended, whatever it does: three times `CPU_SECONDS`, for busy machines."""
+"""Time in seconds that reading a file may take."""
+MEMORY = 2 * 2**30
+"""Memory in bytes that reading a file may take, including the engine, where the system supports a limit."""
+ENGINES = {"mjcf": ("mujoco", "mujoco", "MuJoCo"), "urdf": ("pinocchio", "pin", "Pinocchio")}
+"""Module, package and name of the engine that reads a kind of file."""
+
+# Anchors of several joints of a body agree to this, relative to their distance from its origin, or the body has no fixed point.
+_SAME_POINT = 1e-9
 
 
 def body_from_mjcf(path: str | PathLike[str], name: str) -> MassDistribution:
@@ -35,8 +44,8 @@ def body_from_mjcf(path: str | PathLike[str], name: str) -> MassDistribution:
     path
         The file.
     name
-        Of a body with a ball joint or hinges through one point, which becomes the fixed point, or with a free joint: then its
-        centre of mass does.
+        A body with a ball joint, or hinges through one point, which becomes the fixed point; or a body with a free joint, whose
+        centre of mass becomes the fixed point.
 
     Raises
     ------
@@ -56,8 +65,8 @@ def body_from_urdf(path: str | PathLike[str], name: str) -> MassDistribution:
     path
         The file.
     name
-        Of a link moved by a revolute, continuous or spherical joint, whose origin becomes the fixed point, or of the root link,
-        which is taken as free: then its centre of mass does.
+        A link moved by a revolute, continuous or spherical joint, whose origin becomes the fixed point; or the root link, which
+        is free, so that its centre of mass becomes the fixed point.
 
     Raises
     ------
@@ -70,16 +79,25 @@ def body_from_urdf(path: str | PathLike[str], name: str) -> MassDistribution:
 
 
 def _read(kind: str, path: object, name: object) -> MassDistribution:
-    """Return the body that a reader in a process of its own finds; raise what it says, here."""
+    """Return the body that another process reads. Raise its errors here, and `BadInput` if it exceeds its limits."""
     _, package, engine = ENGINES[kind]
     version(package, engine)
-    request = {"kind": kind, "path": _text_of(path), "name": printable_text("name", name, "the name of a body, a text")}
-    found = _ask({**request, "cpu_seconds": CPU_SECONDS})
-    if "bad" in found:
-        raise BadInput(*found["bad"])
-    if "missing" in found:
-        raise MissingEngine(*found["missing"])
-    return MassDistribution(found["mass"], found["com_B"], found["inertia_com"])
+    text = _text_of(path)
+    request = {"kind": kind, "path": text, "name": printable_text("name", name, "the name of a body, a text")}
+    worker = python_worker({"OPENBLAS_NUM_THREADS": "1"}, MEMORY)
+    try:
+        with time_limit(SECONDS):
+            answer = worker.ask("call", adapter=__name__, function="read_here", **request)
+    except (EngineCrashed, EngineTimeout) as failure:
+        allowed = f"a file that {engine} reads within {SECONDS:g} s and {MEMORY / 2**30:g} GiB"
+        raise BadInput("path", f"{text!r}, whose reading ended: {failure.outcome}", allowed) from None
+    finally:
+        worker.close()
+    if "bad" in answer:
+        raise BadInput(*answer["bad"])
+    if "missing" in answer:
+        raise MissingEngine(*answer["missing"])
+    return MassDistribution(answer["mass"], answer["com_B"], answer["inertia_com"])
 
 
 def _text_of(path: object) -> str:
@@ -92,24 +110,137 @@ def _text_of(path: object) -> str:
     return text
 
 
-def _ask(request: dict[str, Any]) -> dict[str, Any]:
-    """Return the answer of a reader; raise `BadInput` where its limits end it."""
-    command = python_command(f"from {model_reader.__name__} import main; main()")
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+# ------------------------------------------------------------------------------------------------ in the other process
+
+
+def read_here(kind: str, path: str, name: str) -> dict[str, Any]:
+    """Return mass, kg, centre, m, and inertia about it, kg m^2, of a body, or the arguments of the exception to raise."""
     try:
-        done = subprocess.run(
-            command, input=json.dumps(request).encode(), capture_output=True, timeout=SECONDS, env=environment, check=False
-        )
-    except subprocess.TimeoutExpired:
-        raise _unreadable(request, f"{SECONDS:g} s") from None
-    except OSError as error:  # no memory for a process, or no Python where one is embedded
-        raise _unreadable(request, f"a reader that does not start: {error}") from None
-    if done.returncode != 0:
-        raise _unreadable(request, f"exit status {done.returncode} of the reader")
-    found: dict[str, Any] = json.loads(done.stdout)
-    return found
+        body = {"mjcf": read_mjcf, "urdf": read_urdf}[kind](path, name)
+    except BadInput as error:
+        return {"bad": [error.argument, str(error.got), error.allowed]}
+    except MissingEngine as error:
+        return {"missing": [error.engine, error.package]}
+    except Exception as error:  # of the engine, or out of memory
+        return {"bad": ["path", f"{path!r}: {type(error).__name__}: {error}", f"a file that {ENGINES[kind][2]} reads"]}
+    return {"mass": body.mass, "com_B": body.com_B, "inertia_com": body.inertia_com}
 
 
-def _unreadable(request: dict[str, Any], end: str) -> BadInput:
-    allowed = f"a file that {ENGINES[request['kind']][2]} reads within {CPU_SECONDS} s and {MEMORY / 2**30:g} GiB"
-    return BadInput("path", f"{request['path']!r}, whose reading ended after {end}", allowed)
+def read_mjcf(path: str, name: str) -> MassDistribution:
+    """Return the body of an MJCF file, as `body_from_mjcf`."""
+    mj = load(*ENGINES["mjcf"])
+    _require_xml(path, "mujoco")
+    try:
+        model = mj.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise _unusable(path, error, "an MJCF file that MuJoCo compiles") from None
+    names = [model.body(number).name for number in range(1, model.nbody)]
+    _require_name(path, name, names)
+    data = mj.MjData(model)
+    mj.mj_kinematics(model, data)
+    return _mujoco_body(mj, model, data, model.body(name).id)
+
+
+def _mujoco_body(mj: Any, model: Any, data: Any, body: int) -> MassDistribution:
+    """Return the body with everything welded to it, in the model's reference configuration."""
+    origin, R_WB = data.xpos[body], data.xmat[body].reshape(3, 3)
+    parts = []
+    for part in np.flatnonzero(model.body_weldid == body):
+        R_BI = R_WB.T @ data.ximat[part].reshape(3, 3)
+        inertia = R_BI @ np.diag(model.body_inertia[part]) @ R_BI.T
+        parts.append((float(model.body_mass[part]), R_WB.T @ (data.xipos[part] - origin), inertia))
+    fixed_point = _mujoco_fixed_point(mj, model, data, body)
+    return _combine(parts, None if fixed_point is None else R_WB.T @ (fixed_point - origin))
+
+
+def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | None:
+    """Return the fixed point of the body's joints (3,), m, world axes; None if the body is free."""
+    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+    joints = range(first, first + count)
+    if any(model.jnt_type[joint] == int(mj.mjtJoint.mjJNT_FREE) for joint in joints):
+        return None
+    turning = (int(mj.mjtJoint.mjJNT_BALL), int(mj.mjtJoint.mjJNT_HINGE))  # NumPy's integers never equal the enumeration's
+    anchors = np.array([data.xanchor[joint] for joint in joints if model.jnt_type[joint] in turning])
+    if not len(anchors):
+        others = [
+            model.body(b).name for b in range(1, model.nbody) if np.isin(model.jnt_type[_joints(model, b)], turning).any()
+        ]
+        raise _not_turning(model.body(body).name, others)
+    spread = np.abs(anchors - anchors[0]).max()
+    if spread > _SAME_POINT * max(1.0, float(np.abs(anchors - data.xpos[body]).max())):
+        allowed = "a body whose ball joint or hinges go through one point"
+        raise BadInput("name", f"{model.body(body).name!r}, whose joints turn about points {spread:.3g} m apart", allowed)
+    fixed_point: Array = anchors[0]
+    return fixed_point
+
+
+def _joints(model: Any, body: int) -> slice:
+    first = int(model.body_jntadr[body])
+    return slice(first, first + int(model.body_jntnum[body]))
+
+
+def read_urdf(path: str, name: str) -> MassDistribution:
+    """Return the link of a URDF file, as `body_from_urdf`."""
+    pin = load(*ENGINES["urdf"])
+    _require_xml(path, "robot")
+    try:
+        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+    except ValueError as error:
+        raise _unusable(path, error, "a URDF file that Pinocchio reads") from None
+    return _pinocchio_link(pin, model, path, name)
+
+
+def _pinocchio_link(pin: Any, model: Any, path: str, name: str) -> MassDistribution:
+    """Return the link with everything welded to it, which is one body for Pinocchio; its axes are those of its joint."""
+    links = {frame.name: frame for frame in model.frames if frame.type == pin.FrameType.BODY}
+    _require_name(path, name, links)
+    owners = {link for link, frame in links.items() if model.frames[frame.parentFrame].type == pin.FrameType.JOINT}
+    kinds = {link: model.joints[links[link].parentJoint].shortname() for link in owners}
+    able = {
+        link for link, kind in kinds.items() if kind.startswith(("JointModelR", "JointModelSpherical", "JointModelFreeFlyer"))
+    }
+    if name not in able:
+        raise _not_turning(name, sorted(able))
+    inertia = model.inertias[links[name].parentJoint]
+    if not inertia.mass > 0:
+        raise BadInput("name", f"{name!r}, which has no mass", "a link with mass and inertia")
+    com = np.zeros(3) if kinds[name] == "JointModelFreeFlyer" else inertia.lever
+    return MassDistribution(inertia.mass, com, inertia.inertia)
+
+
+def _require_xml(path: str, root: str) -> None:
+    """Raise `BadInput` unless a file can be read and is XML with the right root. The engines' own messages say less."""
+    allowed = f"a file of XML with the root element <{root}>"
+    try:
+        tag = ElementTree.fromstring(Path(path).read_bytes()).tag
+    except OSError as error:
+        raise _unusable(path, error.strerror or error, allowed) from None
+    except ElementTree.ParseError as error:
+        raise _unusable(path, error, allowed) from None
+    if tag != root:
+        raise _unusable(path, f"root element <{tag}>", allowed)
+
+
+def _unusable(path: str, reason: object, allowed: str) -> BadInput:
+    return BadInput("path", f"{str(path)!r}: {' '.join(str(reason).split())}", allowed)
+
+
+def _require_name(path: str, name: str, known: Iterable[str]) -> None:
+    if name not in known:
+        raise BadInput("name", f"{name!r}, which is not in {str(path)!r}", nearest(name, known))
+
+
+def _not_turning(name: str, others: list[str]) -> BadInput:
+    allowed = "one that a joint turns" + (": " + ", ".join(others) if others else "; this file has none")
+    return BadInput("name", f"{name!r}, which no joint turns", allowed)
+
+
+def _combine(parts: list[tuple[float, Array, Array]], fixed_point: Array | None) -> MassDistribution:
+    """Combine bodies of given mass, centre (3,) and inertia about it (3, 3), without a fixed point about their centre."""
+    mass = sum(m for m, _, _ in parts)
+    com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for m, c, J in parts:
+        d = c - com
+        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
+    return MassDistribution(mass, np.zeros(3) if fixed_point is None else com - fixed_point, inertia)

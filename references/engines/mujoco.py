@@ -1,7 +1,4 @@
-"""MuJoCo: its five integrators on one body, in this process or, in any version, in an environment: `mujoco@3.6.0:RK4`.
-
-Source: its documentation, Computation, Numerical integration.
-"""
+"""MuJoCo's five integrators on one body, in this process. Other versions run in environments: `mujoco@3.6.0:RK4`."""
 
 from __future__ import annotations
 
@@ -24,12 +21,8 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
 from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
-from .inside.mujoco import prepare_many_with, prepare_with
-
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+from .mujoco_versions import INTEGRATORS, prepare_many_with, prepare_with
 
 
 @dataclass(frozen=True)
@@ -121,31 +114,6 @@ class MuJoCo(Method):
                 return samples.trajectory(march())
 
         return run
-
-
-@dataclass(frozen=True)
-class MuJoCoVersion(EngineMethod):
-    """MuJoCo with one of its integrators, in its own loop, with the code that runs it in this process.
-
-    Parameters
-    ----------
-    integrator
-        "Euler", "RK4", "implicit", "implicitfast" or "discrete", which versions before 3.13 do not have.
-
-    References
-    ----------
-    Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
-    """
-
-    integrator: str = "RK4"
-
-    family: ClassVar[str] = "mujoco"
-    distribution: ClassVar[Distribution] = Distribution("mujoco", "mujoco", oldest="3.6")
-    takes_gravity: ClassVar[bool] = True
-    orders: ClassVar[Orders] = {name: 4 if name == "RK4" else 1 for name in INTEGRATORS}
-    card: ClassVar[Card] = Card(
-        variants=INTEGRATORS, suite=("Euler", "RK4"), many=("RK4",), as_installed=("Euler",), colour="vermilion"
-    )
 
 
 class _Quiet:

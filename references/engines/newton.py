@@ -1,63 +1,169 @@
-"""Newton: its solvers on one body, in single precision. Source: its documentation, Solvers."""
+"""Newton's solvers on the CPU, in single precision, on a free joint or a ball joint at the fixed point.
 
-from __future__ import annotations
+Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default, and contacts of
+`SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as in Newton's example `basic_dzhanibekov`: thirty times as
+fast as its default here, with the same motion. Warp records a step once and replays it; from Python a step takes a hundred
+times as long. Only `SolverVBD` is stepped from Python, because a record loses what it keeps from step to step, and with it
+all motion. Kernels are compiled when a run is prepared, once in the life of an environment, which takes one to four minutes
+per solver.
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+solver
+    "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an integrator:
+    "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
+as_installed
+    Whether Newton's own defaults stay: damping, contacts, the solver inside Kamino.
 
-from conservative.card import Card
-from conservative.scene import Scene
+References
+----------
+Solvers: https://newton-physics.github.io/newton/stable/api/newton_solvers.html
+Damping: https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html
+Its own spinning body: https://github.com/newton-physics/newton/blob/main/newton/examples/basic/example_basic_dzhanibekov.py
+Warp, graphs: https://nvidia.github.io/warp/
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+from functools import partial
 
-FREE_ONLY = {
-    "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
-    "XPBD": "no settings of SolverXPBD were found with which its ball joint holds a body right",
+import numpy as np
+
+ORDERS = {
+    **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
+    **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
+}
+ENGINE = {
+    "package": "newton[sim]",  # without the extra it lacks MuJoCo
+    "module": "newton",
+    "oldest": "1.8",  # earlier versions build and step models in other ways
+    "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
+    "orders": ORDERS,
+    "precision": "f32",
+    "gravity": True,
+    "free_only": {
+        "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
+        "XPBD": "no settings of SolverXPBD were found with which its ball joint holds a body right",
+    },
+    "card": {
+        "variants": (*ORDERS, "SemiImplicit,as_installed=true"),
+        "as_installed": ("SemiImplicit,as_installed=true",),
+    },
 }
 
+DAMPED = ("SemiImplicit", "Featherstone")
+WITH_MEMORY = ("VBD", "Kamino")
+"""Solvers that keep something from step to step beside the state, which `reset` clears."""
+NOT_RECORDED = "VBD"
+"""A record of its step takes the pose of each step for the one before it, so that nothing moves."""
 
-@dataclass(frozen=True)
-class Newton(EngineMethod):
-    """Newton on the CPU, in single precision, with one of its solvers, on a free joint, or on a ball joint at the fixed point.
 
-    Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default, and contacts of
-    `SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as Newton's example `basic_dzhanibekov` has it: thirty
-    times as fast as its default here, with the same motion. A step is recorded by Warp once and then replayed; from Python it
-    takes a hundred times as long. `SolverVBD` alone is stepped from Python, as a record loses what it keeps from step to step,
-    and with it all motion. Kernels are
-    compiled when a run is prepared, once in the life of an environment: that takes from one to four minutes for each solver.
+def prepare(given):
+    """Return a run of one body; its kernels are compiled here."""
+    import newton
+    import warp
 
-    Parameters
-    ----------
-    solver
-        "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an
-        integrator: "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
-    as_installed
-        Whether Newton's own defaults stay: damping, contacts, the solver inside Kamino.
+    warp.config.quiet = True
+    warp.set_device("cpu")
+    model = _model(newton, warp, given)
+    solver, contacts = _solver(newton, model, given), _contacts(newton, model, given)
+    states, start, control = (model.state(), model.state()), model.state(), model.control()
+    newton.eval_ik(model, start, start.joint_q, start.joint_qd)
 
-    References
-    ----------
-    Solvers: https://newton-physics.github.io/newton/stable/api/newton_solvers.html
-    Damping: https://newton-physics.github.io/newton/stable/api/_generated/newton.solvers.SolverSemiImplicit.html
-    Its own spinning body: https://github.com/newton-physics/newton/blob/main/newton/examples/basic/example_basic_dzhanibekov.py
-    """
+    def step(before, after):
+        before.clear_forces()
+        solver.step(before, after, control, contacts, given.dt)
 
-    solver: str = "MuJoCo_rk4"
-    as_installed: bool = False
+    def renew():
+        for state in states:
+            _start(state, start)
+        if given.solver in WITH_MEMORY:
+            solver.reset(states[0], flags=0)  # which leaves the state
 
-    family: ClassVar[str] = "newton"
-    precision: ClassVar[str] = "f32"
-    takes_gravity: ClassVar[bool] = True
-    # Versions before 1.8 build and step models in other ways. Bare `newton` lacks MuJoCo.
-    distribution: ClassVar[Distribution] = Distribution("newton[sim]", "newton", oldest="1.8")
-    orders: ClassVar[Orders] = {
-        **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
-        **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
+    steps = [partial(step, *states), partial(step, *reversed(states))]
+    for each in steps:
+        each()
+    steps = steps if given.solver == NOT_RECORDED else [_record(warp, each) for each in steps]
+    return partial(_march, steps, [_views(state) for state in states], renew, given.steps)
+
+
+def _start(state, start):
+    for name in ("body_q", "body_qd", "joint_q", "joint_qd"):
+        getattr(state, name).assign(getattr(start, name))
+
+
+def _march(steps, views, renew, counts):
+    """Return samples of a run. States are written in turns, each from the other."""
+    renew()
+    q, w = np.empty((len(counts), 4)), np.empty((len(counts), 3))
+    done = 0
+    for sample, count in enumerate(counts.tolist()):
+        for number in range(done, count):
+            steps[number % 2]()
+        done = count
+        pose, velocity = views[done % 2]
+        q[sample], w[sample] = pose[[6, 3, 4, 5]], velocity[3:]
+    return {"q": q, "w_W": w}
+
+
+def _views(state):
+    """Return what the engine computes with, as arrays: position and quaternion, scalar last; velocities in the world."""
+    return state.body_q.numpy()[0], state.body_qd.numpy()[0]
+
+
+def _record(warp, step):
+    """Return what replays a step; the step itself, where a version of Warp records none on the CPU."""
+    try:
+        with warp.ScopedCapture() as capture:
+            step()
+    except RuntimeError:
+        return step
+    return partial(warp.capture_launch, capture.graph)
+
+
+def _model(newton, warp, given):
+    builder = newton.ModelBuilder(gravity=(0.0, 0.0, -given.gravity))
+    if given.solver == "Kamino":
+        newton.solvers.SolverKamino.register_custom_attributes(builder)
+    body = _add_body(builder, warp, given)
+    lever = given.R0 @ given.com
+    builder.body_qd[body] = warp.spatial_vector(*np.cross(given.w0_W, lever).tolist(), *given.w0_W.tolist())
+    if given.solver == "VBD":
+        builder.color()
+    return builder.finalize(device="cpu")
+
+
+def _add_body(builder, warp, given):
+    """Return the number of the body, on a free joint, or on a ball joint without armature, friction and damping."""
+    w, x, y, z = given.q_com.tolist()
+    axes = np.array(warp.quat_to_matrix(warp.quat(x, y, z, w)), float).reshape(3, 3)
+    w, x, y, z = given.q0.tolist()
+    inertia = axes @ np.diag(given.moments_com) @ axes.T
+    options = {
+        "xform": warp.transform((0.0, 0.0, 0.0), (x, y, z, w)),
+        "com": warp.vec3(*given.com.tolist()),
+        "inertia": warp.mat33(*inertia.ravel().tolist()),
+        "mass": given.mass,
     }
-    card: ClassVar[Card] = Card(
-        variants=(*orders, "SemiImplicit,as_installed=true"), as_installed=("SemiImplicit,as_installed=true",)
-    )
+    if given.free:
+        return builder.add_body(**options)
+    body = builder.add_link(**options)
+    joint = builder.add_joint_ball(-1, body, armature=0.0, friction=0.0, damping=0.0)
+    builder.add_articulation([joint])
+    return body
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return super().unsupported(scene) or (FREE_ONLY.get(self.solver) if scene.potential is not None else None)
+
+def _solver(newton, model, given):
+    name, _, integrator = given.solver.partition("_")
+    options = {"integrator": integrator} if integrator else {}
+    if not given.as_installed and name in DAMPED:
+        options["angular_damping"] = 0.0
+    if not given.as_installed and name == "MuJoCo":
+        options["disable_contacts"] = True
+    if not given.as_installed and name == "Kamino":
+        sparse = {"dynamics_solver": "dvi", "sparse_dynamics": True, "sparse_jacobian": True}
+        options["config"] = newton.solvers.SolverKamino.Config.from_model(model, **sparse)
+    return getattr(newton.solvers, f"Solver{name}")(model, **options)
+
+
+def _contacts(newton, model, given):
+    """Return a place for contacts, without which VBD does not step."""
+    return newton.CollisionPipeline(model).contacts() if given.solver == "VBD" else None

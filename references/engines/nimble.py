@@ -1,33 +1,64 @@
-"""Nimble: its semi-implicit Euler method on one body, which is DART's. Source: its documentation, World."""
+"""Nimble on a free joint or a ball joint, stepped from Python (`World.step`), because it has no loop of its own.
 
-from __future__ import annotations
+Its method is that of DART. It has no settings, and nothing was switched off. Its environment takes 5.6 GB, most of it PyTorch.
 
-from dataclasses import dataclass
-from typing import ClassVar
+References
+----------
+World, joints: https://nimblephysics.org/docs/
+"""
 
-from conservative.card import Card
+import numpy as np
 
-from ..environments.engine_method import EngineMethod
-from ..environments.environment import Distribution
+ENGINE = {
+    "package": "nimblephysics",
+    "module": "nimblephysics",
+    "requirements": ("numpy<2",),  # it crashes with NumPy 2
+    "oldest": "0.10",
+    "title": "semi-implicit Euler",
+    "gravity": True,
+    "card": {
+        "as_installed": ("",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Nimble(EngineMethod):
-    """Nimble on a free joint or a ball joint, stepped from Python (`World.step`), as it has no loop of its own.
+def prepare(given):
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point; Nimble's loop is one step a call."""
+    import nimblephysics as nimble
 
-    It has nothing to set, and nothing was switched off. Its environment needs 5.6 GB, most of them for PyTorch.
+    world, skeleton, body = _build(nimble, given)
+    still = np.zeros(3 * given.free)
+    place, rates = np.concatenate([_rotation_vector(given.q0), still]), np.concatenate([given.w0, still])
 
-    References
-    ----------
-    World, joints: https://nimblephysics.org/docs/
-    """
+    def run():
+        skeleton.setPositions(place)
+        skeleton.setVelocities(rates)  # in body axes
+        R, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                world.step()
+            R[sample] = body.getWorldTransform().rotation()
+            w[sample] = body.getAngularVelocity()
+        return {"R": R, "w_W": w}
 
-    family: ClassVar[str] = "nimble"
-    takes_gravity: ClassVar[bool] = True
-    # With NumPy 2 it crashes.
-    distribution: ClassVar[Distribution] = Distribution("nimblephysics", "nimblephysics", ("numpy<2",), oldest="0.10")
-    card: ClassVar[Card] = Card(as_installed=("",))
+    return run
 
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"integrator": "semi-implicit Euler"}
+
+def _build(nimble, given):
+    world = nimble.simulation.World()
+    world.setGravity([0, 0, -given.gravity])
+    world.setTimeStep(given.dt)
+    skeleton = nimble.dynamics.Skeleton()
+    _, body = getattr(skeleton, f"create{'Free' if given.free else 'Ball'}JointAndBodyNodePair")()
+    body.setMass(given.mass)
+    body.setLocalCOM(given.com)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    body.setMomentOfInertia(xx, yy, zz, xy, xz, yz)
+    world.addSkeleton(skeleton)
+    return world, skeleton, body
+
+
+def _rotation_vector(q):
+    """Return the rotation vector (3,), rad, of a quaternion, scalar first."""
+    sine = float(np.linalg.norm(q[1:]))
+    return q[1:] * (2 * np.arctan2(sine, q[0]) / sine if sine else 2.0)

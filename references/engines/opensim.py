@@ -1,60 +1,97 @@
-"""OpenSim: Simbody's integrators on one body. Source: its API documentation, Manager; Simbody's, SimTK::Integrator."""
+"""OpenSim, which is Simbody, with one of its integrators, in its own loop (`Manager.integrate`).
 
-from __future__ import annotations
+A free body is on a `FreeJoint`, one about a fixed point on a `BallJoint`. For both, OpenSim selects three angles as Simbody's
+coordinates, and its Python module has nothing to change that: errors grow when the second angle comes near a right angle, and a
+top that spins about its third axis is easier than in other engines. Switched off: storage and analyses of states
+(`setWriteToStorage`, `setPerformAnalyses`).
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+integrator
+    "RungeKuttaMerson", OpenSim's default, "RungeKuttaFeldberg", "RungeKutta3", "RungeKutta2", "ExplicitEuler",
+    "SemiExplicitEuler2" or "Verlet".
+accuracy
+    Accuracy of adaptive steps, up to 1, 1e-3 by OpenSim's default; 0 for fixed steps of dt.
 
-from conservative.card import Card
-from conservative.check import finite_number
-from conservative.errors import BadInput
+References
+----------
+Manager, integrators and their settings: https://simtk.org/api_docs/opensim/api_docs/classOpenSim_1_1Manager.html
+"""
 
-from ..environments.engine_method import EngineMethod, Orders
-from ..environments.environment import Distribution
+import math
 
+import numpy as np
 
-@dataclass(frozen=True)
-class OpenSim(EngineMethod):
-    """OpenSim, which is Simbody, with one of its integrators, in its own loop (`Manager.integrate`).
-
-    A free body is on a `FreeJoint`, one about a fixed point on a `BallJoint`. OpenSim has Simbody use three angles as the
-    coordinates of both, and its Python module has nothing to change that: errors grow where the second angle comes near a right
-    one, and a top that spins about its third axis is easier than elsewhere. Switched off: storage and analyses of states
-    (`setWriteToStorage`, `setPerformAnalyses`).
-
-    Parameters
-    ----------
-    integrator
-        "RungeKuttaMerson", OpenSim's default, "RungeKuttaFeldberg", "RungeKutta3", "RungeKutta2", "ExplicitEuler",
-        "SemiExplicitEuler2" or "Verlet".
-    accuracy
-        Accuracy, above 0 to 1, to which it chooses its own steps; 1e-3 is OpenSim's default. 0 for fixed steps of dt.
-
-    References
-    ----------
-    Manager, integrators and their settings: https://simtk.org/api_docs/opensim/api_docs/classOpenSim_1_1Manager.html
-    """
-
-    integrator: str = "RungeKuttaMerson"
-    accuracy: float = 0.0
-
-    family: ClassVar[str] = "opensim"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("opensim", "opensim", oldest="4.5")
-    orders: ClassVar[Orders] = {
+ENGINE = {
+    "package": "opensim",
+    "module": "opensim",
+    "oldest": "4.5",
+    "settings": {"integrator": "RungeKuttaMerson", "accuracy": 0.0},
+    "orders": {
         **{"RungeKuttaMerson": 4, "RungeKuttaFeldberg": 4, "RungeKutta3": 3, "RungeKutta2": 2},
         **{"ExplicitEuler": 1, "SemiExplicitEuler2": 1, "Verlet": 2},
-    }
-    card: ClassVar[Card] = Card(
-        variants=("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"), as_installed=("RungeKuttaMerson,accuracy=1e-3",)
-    )
+    },
+    "tolerance": "accuracy",
+    "gravity": True,
+    "card": {
+        "variants": ("", "RungeKuttaFeldberg", "Verlet", "accuracy=1e-10"),
+        "as_installed": ("RungeKuttaMerson,accuracy=1e-3",),
+    },
+}
 
-    def __post_init__(self) -> None:
-        allowed = "a number above 0 up to 1, or 0 for fixed steps"
-        if not 0 <= finite_number("accuracy", self.accuracy, allowed) <= 1:
-            raise BadInput("accuracy", repr(self.accuracy), allowed)
-        super().__post_init__()
 
-    @property
-    def order(self) -> int | None:
-        return None if self.accuracy else self.orders[self.integrator]
+def prepare(given):
+    """Return a run of one body on a free joint, or on a ball joint at the fixed point, integrated from sample to sample."""
+    import opensim
+
+    opensim.Logger.setLevelString("off")
+    model, body, state = _build(opensim, given)
+    times = (given.steps * given.dt).tolist()
+
+    def run():
+        manager = _manager(opensim, model, given)
+        manager.initialize(opensim.State(state))
+        R, w = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
+        R[0], w[0] = given.R0, given.w0_W
+        for sample, time in enumerate(times[1:], start=1):
+            now = manager.integrate(time)
+            model.realizeVelocity(now)
+            turn, rate = body.getTransformInGround(now).R(), body.getVelocityInGround(now).get(0)
+            R[sample] = [[turn.get(i, j) for j in range(3)] for i in range(3)]
+            w[sample] = rate.get(0), rate.get(1), rate.get(2)
+        return {"R": R, "w_W": w}
+
+    return run
+
+
+def _build(opensim, given):
+    model = opensim.Model()
+    model.setGravity(opensim.Vec3(0, 0, -given.gravity))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = given.inertia_com.tolist()
+    com = opensim.Vec3(*given.com.tolist())
+    body = opensim.Body("body", given.mass, com, opensim.Inertia(xx, yy, zz, xy, xz, yz))
+    joint = (opensim.FreeJoint if given.free else opensim.BallJoint)("joint", model.getGround(), body)
+    model.addBody(body)
+    model.addJoint(joint)
+    state = model.initSystem()
+    for i, (angle, rate) in enumerate(zip(_angles(given.R0), given.w0_W.tolist(), strict=True)):
+        joint.get_coordinates(i).setValue(state, angle, False)
+        joint.get_coordinates(i).setSpeedValue(state, rate)  # angular velocity in the world
+    return model, body, state
+
+
+def _angles(R):
+    """Return the angles about x, y and z, each turned with the body, of a rotation."""
+    return math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
+
+
+def _manager(opensim, model, given):
+    manager = opensim.Manager(model)
+    manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{given.integrator}"))
+    manager.setWriteToStorage(False)
+    manager.setPerformAnalyses(False)
+    if given.accuracy:
+        manager.setIntegratorAccuracy(given.accuracy)
+    else:
+        manager.setIntegratorFixedStepSize(given.dt)
+    return manager

@@ -1,51 +1,132 @@
-"""PyBullet: one body, in Bullet's reduced or maximal coordinates. Source: its quickstart guide."""
+"""PyBullet in double precision, stepped from Python (`stepSimulation`), because it has no loop of its own.
 
-from __future__ import annotations
+A body about a fixed point is the only link of a base that does not move, on a spherical joint whose motor is off
+(`setJointMotorControlMultiDof`, force 0). Switched off: damping (`linearDamping`, `angularDamping`, `jointDamping`), sleeping
+(`ACTIVATION_STATE_DISABLE_SLEEPING`), the limit of rates (`maxJointVelocity`).
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+body
+    "multibody" (btMultiBody, Bullet's default) or "maximal" (btRigidBody, in maximal coordinates).
+as_installed
+    Whether damping, sleeping and the limit of rates stay on.
 
-from conservative.card import Card
-from conservative.scene import Scene
+References
+----------
+PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControlMultiDof, resetJointStateMultiDof:
+https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartguide.pdf
+"""
 
-from ..environments.engine_method import EngineMethod, Orders, rate_limit_reason
-from ..environments.environment import Distribution
+import numpy as np
 
-RATE_LIMIT = 100.0
-"""Rate, rad/s, that Bullet keeps a body below as installed (`maxJointVelocity`)."""
+ENGINE = {
+    "package": "pybullet",
+    "module": "pybullet",
+    "oldest": "3.2.5",
+    "settings": {"body": "multibody", "as_installed": False},
+    "orders": {"multibody": 1, "maximal": 1},
+    "gravity": True,
+    "free_only": {"maximal": "PyBullet has no joint to the world for a body in maximal coordinates"},
+    "rate_limit": 100.0,  # maxJointVelocity
+    "card": {
+        "variants": ("", "maximal", "as_installed=true"),
+        "as_installed": ("as_installed=true",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class PyBullet(EngineMethod):
-    """PyBullet in double precision, stepped from Python (`stepSimulation`), as it has no loop of its own.
+def prepare(given):
+    """Return a run of one body, free, or on a spherical joint at the fixed point; Bullet's loop is one step a call."""
+    import pybullet as bullet
 
-    A body about a fixed point is the only link of a base that does not move, on a spherical joint, whose motor is off
-    (`setJointMotorControlMultiDof`, force 0). Switched off: damping (`linearDamping`, `angularDamping`, `jointDamping`),
-    sleeping (`ACTIVATION_STATE_DISABLE_SLEEPING`), the limit of rates (`maxJointVelocity`).
+    bullet.connect(bullet.DIRECT)
+    build, look = (_build_free, _look_at_free) if given.free else (_build_held, _look_at_held)
 
-    Parameters
-    ----------
-    body
-        "multibody" (btMultiBody, Bullet's default) or "maximal" (btRigidBody, in maximal coordinates).
-    as_installed
-        Whether damping, sleeping and the limit of rates stay on.
+    def run():
+        bullet.resetSimulation()
+        bullet.setGravity(0, 0, -given.gravity)
+        bullet.setPhysicsEngineParameter(fixedTimeStep=given.dt, numSubSteps=0)
+        body = build(bullet, given)
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                bullet.stepSimulation()
+            (x, y, z, s), w[sample] = look(bullet, body)
+            q[sample] = s, x, y, z
+        return {"q": q, "w_W": w} if given.free else _to_axes(q, w, given)
 
-    References
-    ----------
-    PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControlMultiDof:
-    https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartguide.pdf
+    return run
+
+
+def _build_free(bullet, given):
+    maximal = given.body == "maximal"
+    # A body in maximal coordinates that has no shape never moves.
+    shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
+    body = bullet.createMultiBody(given.mass, shape, baseOrientation=_x_first(given.q0), useMaximalCoordinates=maximal)
+    bullet.changeDynamics(body, -1, localInertiaDiagonal=given.moments.tolist())
+    if not given.as_installed:
+        _switch_off(bullet, body, -1)
+    bullet.resetBaseVelocity(body, [0, 0, 0], given.w0_W.tolist())
+    return body
+
+
+def _look_at_free(bullet, body):
+    return bullet.getBasePositionAndOrientation(body)[1], bullet.getBaseVelocity(body)[1]
+
+
+def _build_held(bullet, given):
+    """Return a body that is the only link of a base that does not move.
+
+    The link's frame is at the fixed point, and its axes are the principal ones about the centre of mass: in other axes
+    what is set of the joint is not the attitude of the link.
     """
+    q0, R = _product(given.q0, given.q_com), _matrix(given.q_com)
+    link = {
+        **{"linkMasses": given.mass, "linkCollisionShapeIndices": -1, "linkVisualShapeIndices": -1, "linkParentIndices": 0},
+        **{"linkPositions": [0, 0, 0], "linkOrientations": [0, 0, 0, 1], "linkInertialFrameOrientations": [0, 0, 0, 1]},
+        **{"linkInertialFramePositions": (given.com @ R).tolist(), "linkJointTypes": bullet.JOINT_SPHERICAL},
+    }
+    body = bullet.createMultiBody(0, -1, linkJointAxis=[[0, 0, 1]], **{name: [value] for name, value in link.items()})
+    bullet.changeDynamics(body, 0, localInertiaDiagonal=given.moments_com.tolist())
+    if not given.as_installed:
+        for part in (-1, 0):
+            _switch_off(bullet, body, part)
+    # The motor that every joint has by default would hold the body.
+    hold = {"targetPosition": [0, 0, 0, 1], "force": [0, 0, 0], "positionGain": 0, "velocityGain": 0}
+    bullet.setJointMotorControlMultiDof(body, 0, bullet.POSITION_CONTROL, **hold)
+    bullet.resetJointStateMultiDof(body, 0, _x_first(q0), (given.w0 @ R).tolist())  # rates in its own axes
+    return body
 
-    body: str = "multibody"
-    as_installed: bool = False
 
-    family: ClassVar[str] = "pybullet"
-    takes_gravity: ClassVar[bool] = True
-    distribution: ClassVar[Distribution] = Distribution("pybullet", "pybullet", oldest="3.2.5")
-    orders: ClassVar[Orders] = {"multibody": 1, "maximal": 1}
-    card: ClassVar[Card] = Card(variants=("", "maximal", "as_installed=true"), as_installed=("as_installed=true",))
+def _look_at_held(bullet, body):
+    return bullet.getJointStateMultiDof(body, 0)[:2]  # a link's state has single precision
 
-    def unsupported(self, scene: Scene) -> str | None:
-        if self.body == "maximal" and scene.potential is not None:
-            return "PyBullet has no joint to the world for a body in maximal coordinates"
-        return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
+
+def _to_axes(q, w, given):
+    """Return attitudes and rates in axes F of those in the principal axes about the centre of mass."""
+    back = given.q_com * (1, -1, -1, -1)
+    return {"q": _product(q, back), "w": w @ _matrix(given.q_com).T}
+
+
+def _switch_off(bullet, body, part):
+    """Switch off what keeps a body from turning on: damping, which is .04 by default, sleeping, and a limit of 100 rad/s."""
+    awake = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
+    nothing = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e6}
+    bullet.changeDynamics(body, part, **nothing, activationState=awake)
+
+
+def _x_first(q):
+    """Return a quaternion, scalar first, as Bullet has it: scalar last."""
+    return [*q[1:].tolist(), float(q[0])]
+
+
+def _product(p, q):
+    """Return the product of quaternions, (..., 4), scalar first, with one (4,)."""
+    s, v = p[..., :1], p[..., 1:]
+    return np.concatenate([s * q[0] - v @ q[1:, None], s * q[1:] + q[0] * v + np.cross(v, q[1:])], axis=-1)
+
+
+def _matrix(q):
+    s, v = q[0], q[1:]
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + 2 * s * cross + 2 * cross @ cross

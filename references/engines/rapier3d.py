@@ -1,52 +1,74 @@
-"""Rapier: its impulse-based integration of one body, in single precision. Source: its user guide, Rigid-bodies."""
+"""Rapier in single precision, stepped from Python, because it has no loop of its own.
 
-from __future__ import annotations
+A body about a fixed point is on a spherical impulse joint. Gyroscopic forces are on (`gyroscopic_forces`), as by default, and
+there is no damping. Switched off: sleeping (`can_sleep`), and the limit of fast rotation (`allow_fast_rotation`), which is an
+eighth of a turn per substep.
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+substeps
+    Substeps of a step, 1 or more (`num_solver_iterations`); 4 by default, as in Rapier.
+as_installed
+    Whether sleeping and the limit of fast rotation stay on.
 
-from conservative.card import Card
-from conservative.check import positive_integer
+References
+----------
+Limit of fast rotation, substeps: https://rapier.rs/docs/user_guides/python/rigid_body_solver_settings
+Sleeping, gyroscopic forces: https://rapier.rs/docs/user_guides/python/rigid_bodies
+Joints: https://rapier.rs/docs/user_guides/python/joints
+"""
 
-from ..environments.engine_method import EngineMethod
-from ..environments.environment import Distribution
+import numpy as np
+
+ENGINE = {
+    "package": "rapier3d",
+    "module": "rapier3d",
+    "oldest": "0.36",
+    "settings": {"substeps": 4, "as_installed": False},
+    "precision": "f32",
+    "gravity": True,
+    "card": {
+        "variants": ("", "substeps=1", "as_installed=true"),
+        "as_installed": ("as_installed=true",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Rapier(EngineMethod):
-    """Rapier in single precision, stepped from Python, as it has no loop of its own.
+def prepare(given):
+    """Return a run of one rigid body without colliders, held at the fixed point by a joint; Rapier has no loop of its own."""
+    import rapier3d as rp
 
-    A body about a fixed point is on a spherical impulse joint. Gyroscopic forces are on (`gyroscopic_forces`), which they are
-    by default, and there is no damping. Switched off: sleeping (`can_sleep`), and the limit of fast rotation
-    (`allow_fast_rotation`), which is an eighth of a turn in a substep.
+    place = rp.Rotation3(*map(float, given.q0)).scaled_axis
+    spin = tuple(map(float, given.w0_W))
+    drift = tuple(map(float, np.cross(given.w0_W, given.R0 @ given.com)))  # velocity of the centre of mass
+    com, moments, axes = ([float(number) for number in numbers] for numbers in (given.com, given.moments_com, given.q_com))
+    mass = rp.MassProperties(tuple(com), float(given.mass), tuple(moments), rp.Rotation3(*axes))
 
-    Parameters
-    ----------
-    substeps
-        Parts of a step, 1 or more (`num_solver_iterations`); 4 by default, as in Rapier.
-    as_installed
-        Whether sleeping and the limit of fast rotation stay on.
+    def build():
+        world = rp.PhysicsWorld(gravity=(0.0, 0.0, -float(given.gravity)))
+        world.integration_parameters.dt = given.dt
+        if given.substeps:
+            world.integration_parameters.num_solver_iterations = given.substeps
+        body = rp.RigidBody.dynamic(translation=(0, 0, 0), rotation=place).additional_mass_properties(mass).angvel(spin)
+        body = body.gyroscopic_forces(True).linvel(drift)
+        if not given.as_installed:
+            body = body.can_sleep(False).allow_fast_rotation(True)
+        handle = world.add_body(body.build())
+        if not given.free:
+            support = world.add_body(rp.RigidBody.fixed().build())
+            world.impulse_joints.insert(support, handle, rp.SphericalJoint.builder().build(), True)
+        return world, world.rigid_bodies[handle]
 
-    References
-    ----------
-    Limit of fast rotation, substeps: https://rapier.rs/docs/user_guides/python/rigid_body_solver_settings
-    Sleeping, gyroscopic forces: https://rapier.rs/docs/user_guides/python/rigid_bodies
-    Joints: https://rapier.rs/docs/user_guides/python/joints
-    """
+    def run():
+        world, body = build()
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        q[0], w[0] = given.q0, given.w0_W
+        for sample, n_steps in enumerate(np.diff(given.steps).tolist(), start=1):
+            for _ in range(n_steps):
+                world.step()
+            turn, rate = body.rotation, body.angvel
+            q[sample] = turn.w, turn.i, turn.j, turn.k
+            w[sample] = rate.x, rate.y, rate.z
+        return {"q": q, "w_W": w}
 
-    substeps: int = 4
-    as_installed: bool = False
-
-    family: ClassVar[str] = "rapier3d"
-    takes_gravity: ClassVar[bool] = True
-    precision: ClassVar[str] = "f32"
-    distribution: ClassVar[Distribution] = Distribution("rapier3d", "rapier3d", oldest="0.36")
-    card: ClassVar[Card] = Card(variants=("", "substeps=1", "as_installed=true"), as_installed=("as_installed=true",))
-
-    def __post_init__(self) -> None:
-        positive_integer("substeps", self.substeps)
-        super().__post_init__()
-
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {**super().setting_parts, "substeps": f"substeps={self.substeps}"}
+    return run

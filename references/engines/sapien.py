@@ -1,50 +1,89 @@
-"""SAPIEN: PhysX on one body, in single precision. Source: its API reference."""
+"""PhysX on the CPU, as in SAPIEN, in single precision and stepped from Python (`system.step`).
 
-from __future__ import annotations
+A body about a fixed point is on a D6 joint (`PhysxDriveComponent`) with its translations locked. Switched off: damping, which
+is 0.05 1/s (`angular_damping`), sleeping (`sleep_threshold`), the limit of 100 rad/s (`max_angular_velocity`).
 
-from dataclasses import dataclass
-from typing import ClassVar
+Parameters
+----------
+as_installed
+    Whether damping, sleeping and the limit stay on.
 
-from conservative.card import Card
-from conservative.scene import Scene
+References
+----------
+PhysX, damping, limit of rates, sleeping: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/RigidBodyDynamics.html
+D6 joint: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/Joints.html
+SAPIEN: https://sapien-sim.github.io/docs/
+"""
 
-from ..environments.engine_method import EngineMethod, rate_limit_reason
-from ..environments.environment import Distribution
+import numpy as np
 
-RATE_LIMIT = 100.0
-"""Rate, rad/s, that PhysX keeps a body below as installed (`max_angular_velocity`)."""
+ENGINE = {
+    "package": "sapien",
+    "module": "sapien",
+    "oldest": "3.0",
+    "settings": {"as_installed": False},
+    "title": "PhysX",
+    "precision": "f32",
+    "gravity": True,
+    "rate_limit": 100.0,  # max_angular_velocity
+    "card": {
+        "variants": ("", "as_installed=true"),
+        "as_installed": ("as_installed=true",),
+    },
+}
 
 
-@dataclass(frozen=True)
-class Sapien(EngineMethod):
-    """PhysX on the CPU, as SAPIEN has it, in single precision and stepped from Python (`system.step`).
+def prepare(given):
+    """Return a run of one rigid body without shapes, held at the fixed point by a D6 joint; PhysX's loop is one step a call."""
+    import sapien
 
-    A body about a fixed point is on a D6 joint (`PhysxDriveComponent`) with its translations locked. Switched off: damping,
-    which is 0.05 1/s (`angular_damping`), sleeping (`sleep_threshold`), the limit of 100 rad/s (`max_angular_velocity`).
+    config = sapien.physx.PhysxSceneConfig()
+    config.gravity = [0, 0, -given.gravity]
+    sapien.physx.set_scene_config(config)
+    system = sapien.physx.PhysxCpuSystem()
+    scene = sapien.Scene([system])
+    system.timestep = given.dt
+    body = sapien.physx.PhysxRigidDynamicComponent()
+    body.set_mass(given.mass)
+    body.set_cmass_local_pose(sapien.Pose(given.com.astype(np.float32), given.q_com.astype(np.float32)))
+    body.set_inertia(given.moments_com.astype(np.float32))
+    if not given.as_installed:
+        _switch_off(body)
+    entity = sapien.Entity()
+    entity.add_component(body)
+    if not given.free:
+        entity.add_component(_hold(sapien, body))
+    scene.add_entity(entity)
+    start, spin = sapien.Pose(q=given.q0.astype(np.float32)), given.w0_W.astype(np.float32)
+    drift = np.cross(given.w0_W, given.R0 @ given.com).astype(np.float32)  # velocity of the centre of mass
 
-    Parameters
-    ----------
-    as_installed
-        Whether damping, sleeping and the limit stay on.
+    def run():
+        entity.set_pose(start)
+        body.set_linear_velocity(drift)
+        body.set_angular_velocity(spin)
+        body.wake_up()
+        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
+        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
+            for _ in range(n_steps):
+                system.step()
+            q[sample], w[sample] = body.get_pose().q, body.get_angular_velocity()
+        return {"q": q, "w_W": w}
 
-    References
-    ----------
-    PhysX, damping, limit of rates, sleeping: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/RigidBodyDynamics.html
-    D6 joint: https://nvidia-omniverse.github.io/PhysX/physx/5.4.1/docs/Joints.html
-    SAPIEN: https://sapien-sim.github.io/docs/
-    """
+    run.scene = scene  # what owns the body
+    return run
 
-    as_installed: bool = False
 
-    family: ClassVar[str] = "sapien"
-    takes_gravity: ClassVar[bool] = True
-    precision: ClassVar[str] = "f32"
-    distribution: ClassVar[Distribution] = Distribution("sapien", "sapien", oldest="3.0")
-    card: ClassVar[Card] = Card(variants=("", "as_installed=true"), as_installed=("as_installed=true",))
+def _hold(sapien, body):
+    """Return a joint between world and body that locks the three translations."""
+    joint = sapien.physx.PhysxDriveComponent(body)
+    for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
+        lock(0, 0)
+    return joint
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return super().unsupported(scene) or (rate_limit_reason(scene, RATE_LIMIT) if self.as_installed else None)
 
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"engine": "PhysX", **super().setting_parts}
+def _switch_off(body):
+    """Switch off damping, the limit of rates, which is 100 rad/s by default, and sleeping."""
+    body.set_angular_damping(0)
+    body.set_linear_damping(0)
+    body.set_max_angular_velocity(1e6)
+    body.set_sleep_threshold(0)

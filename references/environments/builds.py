@@ -14,6 +14,7 @@ from conservative.errors import BadInput
 from .environment import (
     BUILD,
     Environment,
+    MissingEnvironment,
     distribution_of,
     find_environment,
     folder_of_all,
@@ -21,7 +22,6 @@ from .environment import (
     temporary_folder,
     version_key,
 )
-from .failures import MissingEnvironment
 from .install import Installation, check, import_trouble, install, make
 from .lock import Source, list_versions, normal_name, resolve_wheel
 from .uv_command import UvFailed, run_uv

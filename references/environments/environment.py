@@ -1,24 +1,37 @@
-"""Environments that are there: where they lie, what was recorded of each, and which one a name means.
+"""The environments of engines: their folders, their records, and their workers.
 
     FOLDER/exudyn/1.13.6/         a virtual environment
-    FOLDER/exudyn/1.13.6/record.json, lock.txt
-    FOLDER/temporary/             what is being made, and what engines write; `clear_leftovers` removes it
+    FOLDER/exudyn/1.13.6/record.json, lock.txt, home/
+    FOLDER/temporary/             unfinished environments and working directories; `clear_leftovers` removes them
 
-FOLDER is `engines` in the user's cache folder of this package, as platformdirs knows it.
+FOLDER is `engines` in the cache folder that platformdirs returns for this package.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from conservative import registry
-from conservative.errors import require_extra
+from conservative.errors import MissingEngine, require_extra
 from conservative.files import write_text
 
-from .failures import MissingEnvironment
+from ..worker import program
+from ..worker.client import Worker
+
+
+class MissingEnvironment(MissingEngine):
+    """An engine, or a version of it, has no environment. The message contains the command that creates one."""
+
+    def __init__(self, engine: str, version: str = "", installed: tuple[str, ...] = ()) -> None:
+        self.engine, self.package = engine, engine
+        wanted = f"{engine}=={version}" if version else engine
+        has = f" (installed: {', '.join(installed)})" if installed else ""
+        ImportError.__init__(self, f"{wanted} is not installed{has}. Run: conservative engines install {wanted}")
 
 
 @dataclass(frozen=True)
@@ -89,13 +102,13 @@ class Environment:
     Attributes
     ----------
     engine, version
-        Its name here, such as `bsk`, and its version.
+        Name of the engine, such as `bsk`, and its version.
     folder
-        Where it lies.
+        The virtual environment.
     python
         Version of its Python.
     packages
-        All that is installed in it, as `name==version`.
+        All installed packages, as `name==version`.
     """
 
     engine: str
@@ -106,18 +119,56 @@ class Environment:
 
     @property
     def is_build(self) -> bool:
-        """Whether its engine is no release, but somebody's own build."""
+        """Whether the engine is a user's own build, not a release."""
         return BUILD in self.version.partition("+")[2]
 
     @property
-    def interpreter(self) -> Path:
-        """Its Python."""
-        return interpreter_of(self.folder)
+    def command(self) -> tuple[str | Path, ...]:
+        """Command line of the program that runs the engine."""
+        return interpreter_of(self.folder), "-I", program.__file__
+
+    def start_worker(self, variables: Mapping[str, str] | None = None, memory: int = 0) -> Worker:
+        """Return a new worker with its own home directory, where engines keep compiled code, and three quarters of the memory.
+
+        Parameters
+        ----------
+        variables
+            Additional environment variables.
+        memory
+            Another memory limit in bytes.
+        """
+        home = self.folder / "home"
+        home.mkdir(parents=True, exist_ok=True)
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "XDG_"))}
+        memory = memory or os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 4 * 3
+        return Worker(self.command, temporary_folder(), {**kept, "HOME": str(home), **(variables or {})}, memory)
 
     def write(self) -> None:
-        """Write the record, which makes a folder an environment."""
+        """Write the record, which turns a folder into an environment."""
         record = {name: value for name, value in asdict(self).items() if name != "folder"}
         write_text(self.folder / RECORD, json.dumps(record, indent=2), "engines")
+
+
+_workers: dict[tuple[Path, str, int], Worker] = {}
+
+
+def worker_of(environment: Environment, precision: str = "f64") -> Worker:
+    """Return the worker of an environment, one for each precision, because JAX and Genesis have one precision per process.
+
+    A forked process gets workers of its own, since two processes cannot share a pipe.
+    """
+    key = environment.folder, precision, os.getpid()
+    if key not in _workers:
+        jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64"))}
+        _workers.setdefault(key, environment.start_worker(jax))  # another thread may have been faster
+    return _workers[key]
+
+
+def close_environment(folder: Path) -> None:
+    """End the processes that run in an environment. Each starts again with its next request."""
+    for (place, _, process), worker in list(_workers.items()):
+        if place == folder and process == os.getpid():
+            worker.close()
 
 
 def interpreter_of(folder: Path) -> Path:

@@ -14,11 +14,13 @@ from conservative.errors import BadInput, nearest
 from conservative.files import remove as remove_tree
 from conservative.files import remove_leftovers, temporary
 
-from .client import close_workers, worker_of
+from ..worker.client import EngineCrashed, EngineTimeout
 from .environment import (
     LOCK,
     Distribution,
     Environment,
+    MissingEnvironment,
+    close_environment,
     distribution_of,
     find_environment,
     folder_of_all,
@@ -27,8 +29,8 @@ from .environment import (
     list_environments,
     read_environment,
     temporary_folder,
+    worker_of,
 )
-from .failures import EngineCrashed, EngineTimeout, MissingEnvironment
 from .lock import Lock, Source, find_python, resolve, split_requirement
 from .uv_command import UvFailed, run_uv
 
@@ -129,7 +131,7 @@ def _python_of(folder: Path) -> str:
 
 def _replace(folder: Path, scratch: Path) -> None:
     """Give a folder its name; what has that name goes."""
-    close_workers(folder)
+    close_environment(folder)
     with _removed(folder) if folder.exists() else nullcontext():
         try:
             scratch.rename(folder)
@@ -165,7 +167,7 @@ def remove(requirement: str) -> tuple[Environment, ...]:
             f"an installed engine: {nearest(requirement, there)}" if there else "an installed engine (none is installed)",
         )
     for environment in found:
-        close_workers(environment.folder)
+        close_environment(environment.folder)
         drop(environment.folder)
     return found
 

@@ -1,4 +1,4 @@
-"""A scene as plain numbers, which is what engines are given, and a trajectory of what they hand back."""
+"""Scenes as plain numbers, which engines get, and trajectories from the numbers that they return. PROTOCOL.md has both."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import from_quaternion, to_quaternion
+from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.batch import Batch
 from conservative.errors import IntegrationFailed
 from conservative.grid import Grid
@@ -17,23 +17,16 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import Axes, mass_model, principal_axes
-from .failures import EngineCrashed
+from ..worker.client import EngineCrashed
 
 SHARED = ("free", "dt", "n_steps", "every", "steps")
-"""What all of the bodies that run at once have in common."""
+"""Numbers that all bodies of a run have in common."""
 
 
 def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
-    """Return a scene and a grid as the plain numbers that an adapter is given, all in SI units.
-
-    The start: `q0` (4,), scalar first, and `R0` (3, 3), the attitude of the principal axes F in the world; `w0` (3,), rates in
-    F, and `w0_W` (3,), in the world. The body: `moments` (3,) about what stays where it is, the fixed point or a free body's
-    centre of mass; `mass`, `com` (3,) in F; about the latter `inertia_com` (3, 3) in F, which is `moments_com` (3,) in axes
-    `q_com` (4,) in F; downward `gravity`; `free`, whether nothing holds it. The grid: `dt`, `n_steps`, `every`, and `steps`
-    (n,), numbers of steps after which the state is kept.
-    """
+    """Return a scene and a grid as the numbers of a `prepare` request, in SI units."""
     mass = mass_model(axes)
-    assert mass is not None  # `unsupported` has seen to it
+    assert mass is not None  # checked by `unsupported`
     return {
         "moments": axes.J,
         "q0": axes.q0,
@@ -55,7 +48,7 @@ def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
 
 
 def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | None]) -> list[Axes] | None:
-    """Return each body's start in principal axes; None where one is not supported, or not of order one in SI units."""
+    """Return each body's initial state in principal axes; None if one is not supported, or not of order one in SI units."""
     scenes = [bodies.take(i) for i in range(len(bodies))]
     if not scenes or any(unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
         return None
@@ -63,69 +56,53 @@ def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | No
 
 
 def describe_many(axes: Sequence[Axes], grid: Grid) -> dict[str, Any]:
-    """Return the same of n scenes of one kind: what belongs to each is named in `rows`, and has n of them."""
+    """Return the numbers of n scenes of one kind. Those named in `rows` have a row for each scene."""
     every = [describe(each, grid) for each in axes]
     shared = {name: value for name, value in every[0].items() if name in SHARED}
     rows = {name: np.array([each[name] for each in every]) for name in every[0] if name not in SHARED}
     return {**shared, **rows, "rows": list(rows)}
 
 
+def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return attitudes (*shape, 3, 3) and rates (*shape, 3) in F. Raise `EngineCrashed` if an answer has other shapes."""
+    if "q" in answer:
+        q = np.asarray(answer["q"], float)
+        R_WF = from_quaternion(q.reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3)
+    else:
+        R_WF = np.asarray(answer["R"], float)
+    w = np.asarray(answer["w"] if "w" in answer else answer["w_W"], float)
+    if R_WF.shape != (*shape, 3, 3) or w.shape != (*shape, 3):
+        raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {w.shape}, not {shape} samples")
+    return R_WF, w if "w" in answer else (w[..., None, :] @ R_WF)[..., 0, :]
+
+
 class ManySamples:
-    """Makes a block of what an engine hands over of n bodies: what `Samples` takes of one, with n rows."""
+    """Converts the answer of an engine for n bodies into a block of samples in body axes."""
 
     def __init__(self, axes: Sequence[Axes], grid: Grid) -> None:
-        self._R_FB, self._wanted = np.array([each.R_BF.T for each in axes])[:, None], (len(axes), grid.n_samples)
+        self._R_FB, self._shape = np.array([each.R_BF.T for each in axes])[:, None], (len(axes), grid.n_samples)
 
-    def trajectory(self, found: Mapping[str, Any]) -> Block:
-        """Return the samples in body axes.
-
-        Raises
-        ------
-        EngineCrashed
-            They are not what the grid asks for.
-        """
-        R_WF = from_quaternion(np.asarray(found["q"], float).reshape(-1, 4)).reshape(*found["q"].shape[:-1], 3, 3)
-        rates = np.asarray(found["w"] if "w" in found else found["w_W"], float)
-        if R_WF.shape[:2] != self._wanted or rates.shape != (*self._wanted, 3):
-            raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {rates.shape}, not {self._wanted} samples")
-        w = rates if "w" in found else (rates[..., None, :] @ R_WF)[..., 0, :]
+    def trajectory(self, answer: Mapping[str, Any]) -> Block:
+        R_WF, w = _read(answer, self._shape)
         R_WB, w_WB_B = R_WF @ self._R_FB, (w[..., None, :] @ self._R_FB)[..., 0, :]
         return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)) & np.isfinite(w_WB_B).all(axis=(1, 2)))
 
     def failure(self, failure: IntegrationFailed) -> Block:
-        """Raise how the engine failed: it did so for all bodies."""
         raise failure
 
 
 class Samples:
-    """Makes a trajectory of what an engine hands over.
-
-    That is attitudes `q` (n, 4), scalar first, or `R` (n, 3, 3), and rates `w` (n, 3), rad/s, in F, or `w_W` in the world;
-    beside them `reason`, why there are no more samples, `steps` and `evaluations`, which it counted.
-    """
+    """Converts the answer of an engine into a trajectory in body axes."""
 
     def __init__(self, axes: Axes, grid: Grid, label: str) -> None:
         self.axes, self.grid, self.label = axes, grid, label
 
-    def trajectory(self, found: Mapping[str, Any]) -> Trajectory:
-        """Return the samples in body axes.
-
-        Raises
-        ------
-        EngineCrashed
-            They are not what the grid asks for.
-        """
-        R_WF = from_quaternion(found["q"]) if "q" in found else found["R"]
-        rates = found["w"] if "w" in found else found["w_W"]
-        n = self.grid.n_samples
-        if R_WF.shape != (n, 3, 3) or rates.shape != (n, 3):
-            raise EngineCrashed(f"it returned attitudes {R_WF.shape} and rates {rates.shape}, not {n} samples")
-        w = rates if "w" in found else (rates[:, None] @ R_WF)[:, 0]
-        work = Counters(found.get("steps", self.grid.n_steps), evaluations=found.get("evaluations"))
-        reason = found.get("reason") or "the state is not finite"
-        return self.axes.trajectory(self.grid, self.label, np.asarray(R_WF, float), np.asarray(w, float), work, reason)
+    def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
+        R_WF, w = _read(answer, (self.grid.n_samples,))
+        work = Counters(answer.get("steps", self.grid.n_steps), evaluations=answer.get("evaluations"))
+        return self.axes.trajectory(self.grid, self.label, R_WF, w, work, answer.get("reason") or "the state is not finite")
 
     def failure(self, failure: IntegrationFailed) -> Trajectory:
-        """Return the trajectory without samples of a run whose engine did not answer."""
+        """Return a trajectory without samples."""
         nothing = np.empty((0, 3))
         return Trajectory(self.axes.scene, np.empty(0), np.empty((0, 3, 3)), nothing, self.label, Counters(0), failure)

@@ -21,8 +21,16 @@ from conservative.errors import BadInput
 from conservative.files import make_folder, write_bytes
 
 from .builds import build_wheel
-from .client import close_workers
-from .environment import LOCK, RECORD, Distribution, Environment, folder_of_projects, read_environment, temporary_folder
+from .environment import (
+    LOCK,
+    RECORD,
+    Distribution,
+    Environment,
+    close_environment,
+    folder_of_projects,
+    read_environment,
+    temporary_folder,
+)
 from .install import clear_leftovers, drop, import_trouble, make
 from .lock import Source, normal_name, resolve_wheel
 
@@ -60,7 +68,7 @@ def environment_of(wheel: Path, requirements: Sequence[str], source: Source) -> 
     except BadInput as error:
         raise BadInput("against", error.got, error.allowed) from None
     trouble = import_trouble(found, distribution)
-    close_workers(found.folder)
+    close_environment(found.folder)
     if trouble:
         raise BadInput("against", f"{wheel.name}, in whose environment {trouble}", f"a version that needs {US}, which imports")
     os.utime(folder / RECORD)

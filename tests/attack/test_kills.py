@@ -22,7 +22,7 @@ from conservative import registry
 from conservative.benchmarks.studies.case import Case, Failure, attempt
 from conservative.grid import grid_for
 from conservative.references.environments import worker
-from conservative.references.environments.client import worker_of
+from conservative.references.environments.environment import worker_of
 
 from ..environments import ROOT, programs, variables
 from ..references.conftest import trial_cache, trial_home, trial_registered  # noqa: F401
@@ -202,7 +202,7 @@ def test_a_worker_killed_at_random_moments_costs_one_run():
     start = time.monotonic()
     expected = run_all(cases)
     span = time.monotonic() - start
-    process = worker_of(method.environment, method.variables)
+    process = worker_of(method.environment)
     for _ in range(count(20)):
         found = run_all(cases, draw.uniform(0, span), lambda: process.pid and os.kill(process.pid, signal.SIGKILL))
         assert len(check_results(expected, found)) <= 1

@@ -15,8 +15,7 @@ from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
 from conservative.outcome import OutcomeKind
-from conservative.references.environments.environment import Environment
-from conservative.references.environments.failures import MissingEnvironment
+from conservative.references.environments.environment import Environment, MissingEnvironment
 
 from .generic_study import SCENE
 

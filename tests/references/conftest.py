@@ -7,8 +7,9 @@ from conservative import deferred_imports
 from conservative.attitude import rotation_about
 from conservative.references.environments import environment
 
+from . import trial_engine
 from .local_wheels import write_numpy, write_wheel
-from .trial_engine import Trial, make_environment
+from .trial_engine import make_environment
 
 # Nothing special about any of these: turned body and world axes, an inertia with off-diagonal terms, a weight that is not 1.
 R_BP = rotation_about((1, 2, 3), 0.7)
@@ -50,7 +51,7 @@ def trial_registered(tmp_path, monkeypatch):
     info = tmp_path / "trial_engine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: trial_engine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{deferred_imports.ENGINES}]\ntrial = {Trial.__module__}:Trial\n")
+    (info / "entry_points.txt").write_text(f"[{deferred_imports.ENGINES}]\ntrial = {trial_engine.__name__}:Trial\n")
     with monkeypatch.context() as patch:
         patch.syspath_prepend(tmp_path)
         importlib.invalidate_caches()

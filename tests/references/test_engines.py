@@ -20,8 +20,8 @@ from conservative.references import engine
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka
 from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.inside.mujoco import prepare_with
 from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.mujoco_versions import prepare_with
 from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.environments.plain_numbers import describe

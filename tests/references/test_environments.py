@@ -13,10 +13,11 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.errors import MissingEngine
-from conservative.references.environments import client, environment, install, uv_command
+from conservative.references.environments import environment, install, uv_command
 from conservative.references.environments.builds import install_build, install_releases, newest_releases
 from conservative.references.environments.environment import Distribution
 from conservative.references.environments.lock import Source, split_requirement
+from conservative.references.worker.client import close_workers
 
 from ..environments import ROOT, variables
 from .local_wheels import write_numpy, write_sdist, write_wheel
@@ -153,7 +154,7 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
     before = installed(wheels, "trial==1.9").environment
     for module in before.folder.glob("lib/python*/site-packages/numpy*"):
         shutil.rmtree(module) if module.is_dir() else module.unlink()
-    client.close_workers()  # the running one has imported the package
+    close_workers()  # the running one has imported the package
     assert installed(wheels, "trial==1.9").trouble
     rebuilt = install.install("trial", Source(wheels), force=True)  # not 1.10, the newest in the folder of wheels
     assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")

@@ -1,7 +1,5 @@
 """Engines that run many bodies at once: each body moves as it does alone."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,10 +8,10 @@ from conservative.batch import Batch
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.grid import Grid
 from conservative.references.engine import principal_axes
-from conservative.references.engines.inside import mujoco as inside
+from conservative.references.engines import mujoco_versions
 from conservative.references.environments.plain_numbers import ManySamples, describe_many
-from conservative.references.environments.worker import Adapters
 from conservative.references.heyoka_equations import batches
+from conservative.references.worker.program import Runs
 
 GRID = Grid(0.01, 50, 20)
 TOPS, FREE = draw("heavy_tops", 5, seed=3), draw("free_bodies", 5, seed=3)
@@ -68,16 +66,16 @@ def test_a_rollout_that_stands_still_is_not_finished():
 def test_a_rollout_in_pieces_is_the_same(monkeypatch):
     run = registry.method("mujoco:RK4").prepare_many
     whole = run(TOPS, GRID)()
-    monkeypatch.setattr(inside, "ROOM", 7 * 8 * 5)
+    monkeypatch.setattr(mujoco_versions, "ROOM", 7 * 8 * 5)
     assert np.array_equal(run(TOPS, GRID)().R_WB, whole.R_WB)
 
 
 def test_a_worker_takes_bodies_apart_again():
     axes = [principal_axes(TOPS.take(i)) for i in range(5)]
-    adapters = Adapters()
+    runs = Runs()
     numbers = describe_many(axes, GRID)
-    number = adapters.prepare(str(Path(inside.__file__)), {"integrator": "RK4"}, **numbers)["run"]
-    block = ManySamples(axes, GRID).trajectory(adapters.run(number))
+    number = runs.prepare(mujoco_versions.__file__, {"integrator": "RK4"}, **numbers)["run"]
+    block = ManySamples(axes, GRID).trajectory(runs.run(number))
     assert differences(block, registry.method("mujoco:RK4"), TOPS).max() < 1e-14  # measured 9e-16
 
 

@@ -4,7 +4,7 @@ import pytest
 import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.attitude import from_quaternion, rotation_about
-from conservative.references.engines import model_files, model_reader
+from conservative.references.engines import model_files
 from conservative.references.engines.model_files import body_from_mjcf, body_from_urdf
 from conservative.scene_files import scene_file
 
@@ -211,7 +211,7 @@ COPIES = '<replicate count="99999"><replicate count="99999">{}</replicate></repl
 
 
 def test_a_file_that_takes_too_much_is_given_up(written, monkeypatch):
-    monkeypatch.setattr(model_files, "CPU_SECONDS", 2)
+    monkeypatch.setattr(model_files, "SECONDS", 2)
     path = written(mjcf(JOINT + FULL[0] + COPIES.format('<geom size="0.1"/>')))
     with pytest.raises(cv.BadInput) as caught:  # it filled the machine's memory, or took minutes
         body_from_mjcf(path, "arm")
@@ -223,7 +223,7 @@ def test_a_file_that_takes_too_much_is_given_up(written, monkeypatch):
 
 def test_the_reader_hands_over_every_bit(written):
     path = written(mjcf(JOINT + TURNED[0]))
-    found, here = body_from_mjcf(path, "arm"), model_reader.read_mjcf(str(path), "arm")
+    found, here = body_from_mjcf(path, "arm"), model_files.read_mjcf(str(path), "arm")
     assert found.mass == here.mass
     np.testing.assert_array_equal(found.com_B, here.com_B)
     np.testing.assert_array_equal(found.inertia_com, here.inertia_com)

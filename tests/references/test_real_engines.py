@@ -228,7 +228,7 @@ def test_one_that_forgot_weight_or_centre_of_mass_would_be_found(heavy, end):
 @pytest.mark.parametrize("engine", [of(each) for each in FREE_ONLY])
 def test_an_engine_without_fixed_points_says_so(heavy, engine):
     install(engine)
-    assert registry.method(engine).unsupported(heavy) == type(registry.method(engine)).free_only != ""
+    assert registry.method(engine).unsupported(heavy) == registry.engine(engine).data.free_only != ""
 
 
 @pytest.mark.engine("newton")

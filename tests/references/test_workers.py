@@ -22,10 +22,12 @@ from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_he
 from conservative.errors import IntegrationFailed, MissingEngine, Unsupported
 from conservative.grid import grid_for
 from conservative.outcome import OutcomeKind
-from conservative.references.environments import client, environment, worker
-from conservative.references.environments.client import Worker, time_limit
-from conservative.references.environments.failures import EngineCrashed
+from conservative.references.environments import environment
+from conservative.references.environments.environment import worker_of
+from conservative.references.worker import client, program
+from conservative.references.worker.client import EngineCrashed, Worker, time_limit
 
+from . import trial
 from .trial_engine import Trial
 
 SCENE = cv.scenes.brick_flip(t_end=0.5)
@@ -101,13 +103,13 @@ def test_what_it_prints_disturbs_nothing(capfd):
 def test_a_flood_of_output_ends_at_a_limit(folder):
     run("flood")
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
-    assert max(sizes) <= worker.LARGEST_FILE
+    assert max(sizes) <= client.LARGEST_FILE
 
 
 def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
     place = environment.read_environment(folder / "trial" / "1.0")
-    small = Worker(place.interpreter, folder / "home", environment.temporary_folder(), memory=1 << 29)
-    given = {"adapter": str(Path(__file__).parent / "inside" / "trial.py"), "settings": {"at": "prepare", "do": "allocate"}}
+    small = place.start_worker(memory=1 << 29)
+    given = {"adapter": trial.__file__, "settings": {"at": "prepare", "do": "allocate"}}
     with pytest.raises(EngineCrashed, match=r"MemoryError|signal 9"):
         small.ask("prepare", **given)
     small.close()
@@ -140,7 +142,7 @@ def test_integrate_raises_what_failed():
 
 def test_a_process_that_is_killed_while_it_runs_is_a_crash():
     run("integrate")
-    process = client.worker_of(Trial().environment).pid
+    process = worker_of(Trial().environment).pid
     threading.Timer(0.3, os.kill, (process, signal.SIGKILL)).start()
     assert str(run("hang").outcome) == "crashed (signal 9 (SIGKILL))"
     assert run("integrate").ok
@@ -177,12 +179,12 @@ def test_runs_in_threads_do_not_mix():
 
 
 def _in_child(queue):
-    queue.put((client.worker_of(Trial().environment).pid, len(run("integrate"))))
+    queue.put((worker_of(Trial().environment).pid, len(run("integrate"))))
 
 
 def test_a_forked_process_has_a_worker_of_its_own():
     run("integrate")
-    mine = client.worker_of(Trial().environment)
+    mine = worker_of(Trial().environment)
     starts = mine.starts
     context = multiprocessing.get_context("fork")
     queue = context.Queue()
@@ -197,17 +199,16 @@ def test_a_forked_process_has_a_worker_of_its_own():
 def test_a_worker_ends_with_who_started_it(folder):
     code = (
         "import os, sys, threading, time\n"
-        "from pathlib import Path\n"
-        "from conservative.references.environments.client import Worker\n"
-        f"worker = Worker(Path({str(folder / 'trial/1.0/bin/python')!r}), Path(sys.argv[1]), Path(sys.argv[1]))\n"
-        f"given = dict(adapter={str(Path(__file__).parent / 'inside/trial.py')!r}, settings=dict(at='prepare', do='spin'))\n"
+        "from conservative.references.environments.environment import find_environment\n"
+        "worker = find_environment('trial').start_worker()\n"
+        f"given = dict(adapter={trial.__file__!r}, settings=dict(at='prepare', do='spin'))\n"
         "worker.ask('check', module='os')\n"
         "threading.Thread(target=worker.ask, args=('prepare',), kwargs=given, daemon=True).start()\n"
         "time.sleep(0.5); print(worker.pid, flush=True); os._exit(0)\n"
     )
     from ..environments import run_python
 
-    status, out, errors = run_python(code, str(folder / "elsewhere"))
+    status, out, errors = run_python(code)
     assert status == 0 or not errors, errors
     assert _ends(int(out))
 
@@ -226,8 +227,8 @@ def _ends(process):
 
 def test_messages_survive_the_way():
     message = {"a": np.arange(6.0).reshape(2, 3), "b": [1, 2.5, None, "ä"], "c": np.float64(1) / 3, "d": np.empty((0, 3))}
-    data = memoryview(worker.pack(message))
-    found = worker.unpack(iter_bytes(data))
+    data = memoryview(program.pack(message))
+    found = program.unpack(iter_bytes(data))
     assert np.array_equal(found.pop("a"), message["a"])
     assert found.pop("d").shape == (0, 3)
     assert found == {"b": message["b"], "c": 1 / 3}
@@ -264,7 +265,12 @@ def test_a_kill_in_a_preparation_is_an_outcome(trial_cache, first_preparation_is
     assert cv.integrate(SCENE, 0.01, Trial()).ok
 
 
-ENDS = {"segfault": OutcomeKind.CRASHED, "hang": OutcomeKind.TIMEOUT, "shape": OutcomeKind.CRASHED, "nan": OutcomeKind.DIVERGED}
+ENDS = {
+    "segfault": OutcomeKind.CRASHED,
+    "hang": OutcomeKind.TIMEOUT,
+    "shape": OutcomeKind.CRASHED,
+    "diverge": OutcomeKind.DIVERGED,
+}
 
 
 @pytest.fixture

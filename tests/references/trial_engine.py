@@ -2,36 +2,18 @@
 
 import json
 import sys
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy
 
-from conservative.references.environments.engine_method import EngineMethod
-from conservative.references.environments.environment import Distribution
+from conservative.references.environments.engine_method import engine_class
 
 from ..environments import Environment
+from . import trial
 
 VERSION = "1.0"
 
 
-@dataclass(frozen=True)
-class Trial(EngineMethod):
-    """What it does on purpose, and whether in `prepare` or in `run`."""
-
-    do: str = "integrate"
-    at: str = "run"
-
-    family: ClassVar[str] = "trial"
-    distribution: ClassVar[Distribution] = Distribution("trial", "numpy")
-
-    @property
-    def setting_parts(self):
-        return {"do": self.do}
-
-    @property
-    def order(self):
-        return 4
+Trial = engine_class(trial)
 
 
 def make_environment(folder, version=VERSION):

@@ -95,7 +95,7 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path):
 
 def test_work_in_another_process_ends_with_its_command(tmp_path):
     code = (
-        "import os, pathlib\nfrom conservative.references.worker import run_within\n"
+        "import os, pathlib\nfrom conservative.references.worker.calls import run_within\n"
         "pathlib.Path('pid').write_text(str(run_within(60, os.getpid)))\npathlib.Path('.busy').touch()\n"
         "run_within(600, lambda: [None for _ in iter(int, 1)])"
     )

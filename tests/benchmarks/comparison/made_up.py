@@ -9,7 +9,7 @@ from conservative.benchmarks.comparison.version import Version
 from conservative.benchmarks.gate.results import Row, Status
 from conservative.benchmarks.studies.study import Truths
 from conservative.references.environments.environment import Environment
-from conservative.references.environments.failures import EngineCrashed
+from conservative.references.worker.client import EngineCrashed
 from conservative.registry import scene
 
 PLACE = Place("brick_flip", scene("brick_flip"), "definition", Truths())

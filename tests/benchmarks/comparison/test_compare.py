@@ -11,7 +11,7 @@ from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import GatedValue
 from conservative.errors import BadInput
-from conservative.references.environments.failures import EngineCrashed
+from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
 
 from .made_up import BASE, HEAD, PLACE, TIMED, VALUES, found, timed, version
@@ -170,14 +170,16 @@ def definition(scene):
 def test_a_scene_of_another_motion_is_not_compared():
     place = Place.of("brick_flip")
     heavier = definition(place.scene) | {"inertia": place.scene.body.inertia * 2}
-    (each,) = measure_rows(Answers(scene=heavier), place, [SETTING])
+    (each,) = measure_rows(Answers(describe_scene=heavier), place, [SETTING])
     assert each.reason == "another motion"
     assert violations(found(), each) == {"definition"}
 
 
 def test_a_scene_that_a_version_cannot_do_is_skipped():
     place = Place.of("brick_flip")
-    answers = Answers(scene=definition(place.scene), pair={"unsupported": "for tops only", "longest_step": 1.0})
+    answers = Answers(
+        describe_scene=definition(place.scene), describe_pair={"unsupported": "for tops only", "longest_step": 1.0}
+    )
     (each,) = measure_rows(answers, place, [SETTING])
     assert (each.row.status, each.reason) == (Status.SKIPPED, "for tops only")
 

@@ -1,4 +1,4 @@
-"""Work with a limit: it is ended, its end is an outcome, and nothing goes on behind it."""
+"""Functions with a time limit: after the limit they are ended, with an outcome, and nothing is left running."""
 
 import contextlib
 import ctypes
@@ -15,9 +15,10 @@ import pytest
 
 import conservative as cv
 from conservative.integration.pickling import NotTransferable, dump, load
-from conservative.references import worker
-from conservative.references.environments.client import close_workers
-from conservative.references.worker import TimeLimitExceeded, WorkerDied, run_within
+from conservative.references.worker import client
+from conservative.references.worker.calls import run_within
+from conservative.references.worker.client import EngineCrashed, EngineTimeout, close_workers
+from conservative.references.worker.program import MAGIC, PREFIX
 
 from ..environments import run_python
 
@@ -32,7 +33,6 @@ def hang():
 
 @pytest.fixture(autouse=True)
 def no_process_before():
-    worker.end_idle()
     close_workers()
 
 
@@ -42,14 +42,14 @@ def children():
 
 def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running():
     before = threading.enumerate()
-    with pytest.raises(TimeLimitExceeded, match=r"ended after 0\.2 s"):
+    with pytest.raises(EngineTimeout, match=r"did not answer within 0\.2 s"):
         run_within(0.2, hang)
     assert threading.enumerate() == before
     assert children() == []
 
 
 def test_work_that_keeps_the_interpreter_to_itself_is_ended():
-    with pytest.raises(TimeLimitExceeded):
+    with pytest.raises(EngineTimeout):
         run_within(0.2, lambda: ctypes.PyDLL(None).sleep(600))  # PyDLL does not release the interpreter
     assert children() == []
 
@@ -57,16 +57,16 @@ def test_work_that_keeps_the_interpreter_to_itself_is_ended():
 @pytest.mark.parametrize(
     ("work", "said"),
     [
-        (lambda: ctypes.string_at(0), f"signal {signal.SIGSEGV.value}"),
-        (os.abort, f"signal {signal.SIGABRT.value}"),
-        (lambda: os.kill(os.getpid(), signal.SIGKILL), f"signal {signal.SIGKILL.value}"),  # as when memory runs out
-        (lambda: os._exit(3), "its process ended with status 3"),
+        (lambda: ctypes.string_at(0), "signal 11 (SIGSEGV)"),
+        (os.abort, "signal 6 (SIGABRT)"),
+        (lambda: os.kill(os.getpid(), signal.SIGKILL), "signal 9 (SIGKILL)"),  # as when memory runs out
+        (lambda: os._exit(3), "exit code 3"),
     ],
 )
 def test_the_death_of_its_process_is_told(work, said):
-    with pytest.raises(WorkerDied) as caught:
+    with pytest.raises(EngineCrashed) as caught:
         run_within(LONG, work)
-    assert str(caught.value) == said
+    assert caught.value.reason == said
     assert children() == []
     assert run_within(LONG, lambda: 3) == 3
 
@@ -77,17 +77,17 @@ def close_all():
 
 
 def answer_by_half():
-    """The length of an answer, and less than that of it."""
+    """The prefix of an answer, and less than it announces."""
     for descriptor in range(3, 256):
         with contextlib.suppress(OSError):
-            os.write(descriptor, (100).to_bytes(4, "big") + b"half")
+            os.write(descriptor, PREFIX.pack(MAGIC, 100, 0) + b"half")
     os._exit(4)
 
 
-@pytest.mark.parametrize(("work", "said"), [(close_all, "signal 9"), (answer_by_half, "its process ended with status 4")])
+@pytest.mark.parametrize(("work", "said"), [(close_all, "signal 9"), (answer_by_half, "exit code 4")])
 def test_an_answer_that_does_not_come_whole_is_the_end_of_its_process(work, said, monkeypatch):
-    monkeypatch.setattr(worker, "GRACE", 0.5)
-    with pytest.raises(WorkerDied, match=said):
+    monkeypatch.setattr(client, "_PATIENCE", 0.5)
+    with pytest.raises(EngineCrashed, match=said):
         run_within(LONG, work)
     assert children() == []
 
@@ -113,7 +113,7 @@ def test_what_it_returns_or_raises_comes_back():
 def test_one_process_does_one_piece_of_work_after_the_other():
     assert run_within(LONG, os.getpid) == run_within(LONG, os.getpid) != os.getpid()
     (process,) = children()
-    worker.end_idle()
+    close_workers()
     assert not process.is_running()
 
 
@@ -190,7 +190,8 @@ def test_a_module_that_the_process_cannot_import_is_sent(tmp_path, monkeypatch):
 
 SCRIPT = """
 import threading
-from conservative.references.worker import TimeLimitExceeded, run_within
+from conservative.references.worker.calls import run_within
+from conservative.references.worker.client import EngineTimeout
 
 print("main module")
 
@@ -201,8 +202,8 @@ class Local:
 print(run_within(60, lambda: Local().answer()))
 try:
     run_within(0.2, lambda: [None for _ in iter(int, 1)])
-except TimeLimitExceeded as late:
-    print(late)
+except EngineTimeout as late:
+    print(late.outcome)
 """
 
 
@@ -212,17 +213,16 @@ def test_a_script_needs_no_guard_of_its_main_module(tmp_path):
         "import runpy, sys; runpy.run_path(sys.argv[1], run_name='__main__')", str(tmp_path / "script.py")
     )
     assert (code, error) == (0, "")
-    assert out.splitlines() == ["main module", "42", "ended after 0.2 s"]
+    assert out.splitlines() == ["main module", "42", "timeout (after 0.2 s)"]
 
 
 ORPHAN = """
 import sys, threading, time
-from conservative.references import worker
-worker.GRACE = 0.0
-worker.run_within(60, int)
-print(worker._idle[0].process.pid, flush=True)
+from conservative.references.worker.calls import _idle, run_within
+run_within(60, int)
+print(_idle[0].pid, flush=True)
 if sys.argv[1] == "busy":
-    worker.run_within(2.0, lambda: [None for _ in iter(int, 1)])
+    run_within(600, lambda: [None for _ in iter(int, 1)])
 time.sleep(600)
 """
 

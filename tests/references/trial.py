@@ -7,6 +7,13 @@ import time
 
 import numpy as np
 
+ENGINE = {
+    "package": "trial",
+    "module": "numpy",
+    "settings": {"do": "integrate", "at": "run"},  # what it does, and whether in `prepare` or in `run`
+    "order": 4,
+}
+
 
 def prepare(given):
     given.stages = 4
@@ -27,7 +34,7 @@ def prepare(given):
         states = march(derivative, np.concatenate([given.q0, given.w0]), given)
         if given.do == "shape":
             states = states[1:]
-        if given.do == "nan":
+        if given.do == "diverge":
             states[len(states) // 2 :] = np.nan
         return {"q": states[:, :4], "w": states[:, 4:], "steps": given.n_steps, "evaluations": 4 * given.n_steps}
 

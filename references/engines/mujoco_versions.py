@@ -1,9 +1,40 @@
-"""MuJoCo, in this process or in its environment. Source: its documentation, Computation; Programming, mj_step and rollout."""
+"""Any version of MuJoCo, in its own loop; `mujoco.py` runs this file in the process of the user.
+
+The body's principal axes are MuJoCo's body axes, and everything the motion does not need is switched off.
+
+Parameters
+----------
+integrator
+    "Euler", "RK4", "implicit", "implicitfast" or "discrete", which versions before 3.13 do not have.
+
+References
+----------
+Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
+Programming, `mj_step`, rollout: https://mujoco.readthedocs.io/en/stable/python.html
+"""
 
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+
+INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+ENGINE = {
+    "name": "mujoco",
+    "package": "mujoco",
+    "module": "mujoco",
+    "oldest": "3.6",
+    "settings": {"integrator": "RK4"},
+    "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
+    "gravity": True,
+    "card": {
+        "variants": INTEGRATORS,
+        "suite": ("Euler", "RK4"),
+        "many": ("RK4",),
+        "as_installed": ("Euler",),
+        "colour": "vermilion",
+    },
+}
 
 # All that MuJoCo computes in a step and one body without contacts, actuators, springs or sensors has no use for. Bits that a
 # version does not have are skipped. Autoreset would start a diverged run afresh; its warning, which is read, would tell.

@@ -1,0 +1,207 @@
+"""PROTOCOL.md: programs that are not ours are engines, and whatever they send or do not send is an outcome."""
+
+import json
+import math
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conservative as cv
+from conservative import registry
+from conservative.attitude import angle_between
+from conservative.grid import grid_for
+from conservative.outcome import OutcomeKind
+from conservative.references.engine import principal_axes
+from conservative.references.environments.engine_method import WorkerRun
+from conservative.references.environments.plain_numbers import Samples, describe
+from conservative.references.worker import program
+from conservative.references.worker.calls import python_worker
+from conservative.references.worker.client import EngineCrashed, EngineTimeout, Worker, time_limit
+
+PROGRAMS = Path(__file__).parent / "programs"
+NO_NODE = pytest.mark.skipif(not shutil.which("node"), reason="needs node")
+COMMANDS = [
+    pytest.param((sys.executable, "-I", PROGRAMS / "engine.py"), id="python"),
+    pytest.param(("node", PROGRAMS / "engine.js"), id="javascript", marks=NO_NODE),
+]
+BRICK = cv.scenes.brick_flip(t_end=1.0)
+
+
+@pytest.fixture
+def start():
+    """Yield a function that makes a worker of a command line, which ends with the test."""
+    workers = []
+
+    def start_worker(*command, **options):
+        workers.append(Worker(command, **options))
+        return workers[-1]
+
+    yield start_worker
+    for each in workers:
+        each.close()
+
+
+def run_of(worker, dt, scene=BRICK, **settings):
+    grid, axes = grid_for(scene, dt), principal_axes(scene)
+    return WorkerRun(worker, {"adapter": "", "settings": settings, **describe(axes, grid)}, Samples(axes, grid, "theirs"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_program_without_any_package_is_an_engine(command, start):
+    """The method RK4, as SciPy-free code in another process; the truth is the closed form."""
+    truth = cv.integrate(BRICK, 0.01, registry.method("exact"))
+    errors = []
+    for dt in (0.01, 0.005):
+        run = run_of(start(*command), dt)
+        trajectory = run()
+        assert trajectory.ok
+        assert trajectory.counters.evaluations == 4 * round(1 / dt)
+        assert run.wall_time(2) > 0
+        errors.append(float(angle_between(trajectory.R_WB[-1], truth.R_WB[-1])))
+    assert errors[0] < 1e-6  # measured 1.4e-7
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.2)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_programs_in_two_languages_find_the_same(command, start):
+    """The same method in this process: a wrong unit, frame or order of numbers in the protocol would show here."""
+    trajectory, moments = run_of(start(*command), 0.01)(), np.array(BRICK.body.moments)
+
+    def derivative(y):
+        q, w = y[:4], y[4:]
+        turn = np.concatenate([[-q[1:] @ w], q[0] * w + np.cross(q[1:], w)]) / 2
+        return np.concatenate([turn, np.cross(moments * w, w) / moments])
+
+    y = np.concatenate([principal_axes(BRICK).q0, principal_axes(BRICK).w0])
+    for _ in range(100):
+        k1 = derivative(y)
+        k2 = derivative(y + 0.005 * k1)
+        k3 = derivative(y + 0.005 * k2)
+        y = y + 0.01 / 6 * (k1 + 2 * (k2 + k3) + derivative(y + 0.01 * k3))
+    np.testing.assert_allclose(trajectory.w_WB_B[-1], y[4:], rtol=0, atol=1e-13)  # measured 2e-15
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_errors_and_unsupported_scenes_come_back(command, start):
+    worker = start(*command)
+    with pytest.raises(NotImplementedError, match="only free bodies"):
+        run_of(worker, 0.01, cv.scenes.lagrange_top()).prepare()
+    with pytest.raises(EngineCrashed, match="Error: "):
+        worker.ask("run", run=7)
+    assert run_of(worker, 0.01)().ok
+
+
+def test_numbers_that_are_not_finite_travel(start):
+    trajectory = run_of(start(*COMMANDS[0].values[0]), 0.01, lose_samples=True)()
+    assert trajectory.outcome.kind is OutcomeKind.DIVERGED
+    assert len(trajectory) == 50
+
+
+def test_a_run_that_nobody_needs_is_forgotten(start):
+    worker = start(*COMMANDS[0].values[0])
+    runs = [run_of(worker, dt) for dt in (0.01, 0.02)]
+    for run in runs:
+        run.prepare()
+    assert worker.ask("list")["runs"] == [1, 2]
+    del run, runs[0]
+    assert worker.ask("list")["runs"] == [2]
+
+
+SILENT = "import time; time.sleep(600)"
+WRONG = {
+    "print('Welcome to my engine 2.1')": "an answer that cannot be read from .*python.*, which should speak version 1",
+    'print(\'{"protocol": 2, "framing": "lines"}\')': "which should speak version 1 of the protocol",
+    "print('[1, 2]')": "an answer that cannot be read",
+    "raise SystemExit('no licence found')": "exit code 1: no licence found",
+}
+
+
+@pytest.mark.parametrize("code", WRONG)
+def test_a_program_that_does_not_speak_the_protocol_is_named(code, start):
+    with pytest.raises(EngineCrashed, match=WRONG[code]):
+        start(sys.executable, "-c", code).ask("check")
+
+
+def test_a_program_that_cannot_be_started_is_named(start):
+    with pytest.raises(EngineCrashed, match="no_such_program cannot be started: No such file"):
+        start("no_such_program").ask("check")
+
+
+def test_a_program_that_says_nothing_is_ended(start, monkeypatch):
+    monkeypatch.setattr("conservative.references.worker.client.START_LIMIT", 0.5)
+    with pytest.raises(EngineTimeout):
+        start(sys.executable, "-c", SILENT).ask("check")
+
+
+ADAPTER = """
+import time
+calls = []
+def prepare(given):
+    def run():
+        calls.append("run")
+        time.sleep(given.seconds)
+        return {"calls": list(calls)}
+    run.dispose = lambda: calls.append("dispose")
+    return run
+def count():
+    return {"calls": calls}
+"""
+
+
+def test_runs_are_called_before_they_are_measured_and_disposed_of_when_forgotten(tmp_path):
+    (tmp_path / "adapter.py").write_text(ADAPTER)
+    adapter, worker = str(tmp_path / "adapter.py"), python_worker()
+    try:
+        run = worker.ask("prepare", adapter=adapter, settings={"seconds": 0.005})["run"]
+        worker.ask("time", run=run, calls=3)
+        calls = worker.ask("call", adapter=adapter, function="count")["calls"]
+        assert 3 < len(calls) <= 3 + 4  # until 0.02 s have passed
+        worker.ask("time", run=run, calls=3)
+        assert len(worker.ask("call", adapter=adapter, function="count")["calls"]) == len(calls) + 3
+        worker.forget(worker.starts, run)
+        assert worker.ask("call", adapter=adapter, function="count")["calls"][-1] == "dispose"
+    finally:
+        worker.close()
+
+
+MESSAGE = {"a": np.arange(6.0).reshape(2, 3), "b": [1, 2.5, None, "ä", math.inf, {"c": -math.inf}], "d": np.empty((0, 3))}
+
+
+def test_messages_survive_both_framings():
+    data = program.pack({**MESSAGE, "e": np.float64(1) / 3, "f": np.array(math.nan)})
+    place = 0
+
+    def read(count):
+        nonlocal place
+        place += count
+        return data[place - count : place]
+
+    received = program.unpack(read)
+    assert np.array_equal(received["a"], MESSAGE["a"])
+    assert received["d"].shape == (0, 3)
+    assert (received["b"], received["e"], math.isnan(received["f"])) == (MESSAGE["b"], 1 / 3, True)
+    line = program.to_json(MESSAGE)
+    assert line.count(b"\n") == 1
+    assert program.from_json(line) == {**MESSAGE, "a": MESSAGE["a"].tolist(), "d": []}
+
+
+def test_json_is_what_every_parser_reads():
+    """Python's own writer would send NaN and Infinity, which are not JSON."""
+    text = program.to_json({"a": [math.nan], "b": np.array([math.inf])}).decode()
+    assert json.loads(text, parse_constant=pytest.fail) == {"a": ["nan"], "b": ["inf"]}
+
+
+def test_the_page_names_what_is_sent():
+    page = (Path(program.__file__).parents[1] / "PROTOCOL.md").read_text(encoding="utf-8")
+    table = page[page.index("## Numbers of a run") : page.index("## Process")]
+    sent = describe(principal_axes(BRICK), grid_for(BRICK, 0.01))
+    assert {*sent, "rows"} <= set(re.findall(r"`(\w+)`", table))
+
+
+def test_a_limit_may_be_any_number_of_seconds(start):
+    with time_limit(1e100):
+        assert start(*COMMANDS[0].values[0]).ask("check") == {}
