@@ -29,7 +29,7 @@ from .drifts import list_drifts
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support
-from .shared_choice import Goal, choose_for_all, pick_hardest
+from .shared_choice import choose_for_all, pick_hardest
 from .store import Store, write_store
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def _choose(bodies: Batch, error: object, method: object, dt: Any, t_end: Any, s
         raise BadInput("method", describe(method), "None together with error, which chooses the method")
     end = bodies.first.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
     spacing = None if dt is None else grid_for(bodies.first, dt, end).dt
-    return choose_for_all(bodies, Goal(wanted, end, Samples(spacing, positive_integer("sample_every", sample_every))))
+    return choose_for_all(bodies, wanted, end, Samples(spacing, positive_integer("sample_every", sample_every)))
 
 
 def _require_steps(method: Method, bodies: Batch, grid: Grid) -> None:

@@ -1,13 +1,9 @@
-"""From a wanted error to a method and a step: search the cheapest, run it, and say how good it is.
+"""Integrate to a requested error: find the cheapest method and step, run them, and estimate the error of that run.
 
-1. The candidates are tried over a short while (`search`), by trial runs that are remembered (`trials`).
-2. The one that is chosen makes the whole run, once more with twice the step. Their difference, not that of a trial, is the
-   estimate that is reported: a trial cannot see how much a scene amplifies errors later on. Where it is above what was asked
-   for, the step is cut and the run repeated, as long as that is not what rounding the scene causes.
-
-Which families are candidates, and what their work costs, is on their cards: `Method.card`.
-
-Source: step doubling as in Richardson's extrapolation; the rest is our own.
+1. The candidates are tried over a short duration (`search`). Trial runs are remembered (`trials`).
+2. The chosen one makes the whole run, and once more with twice the step (Richardson's step doubling). The difference gives the
+   estimate that is reported. The trials cannot provide it, as they do not see how much a scene amplifies errors later on. If
+   the estimate is above the requested error, the step is cut and the run repeated, unless the cause is rounding of the scene.
 """
 
 from __future__ import annotations
@@ -19,16 +15,17 @@ from dataclasses import replace
 
 from ..errors import AccuracyNotReached, BadInput
 from ..grid import Grid, require_memory
+from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
 from .between import Samples, divide_step, sample_between, spread
-from .search import Attempts, even_grid, find_cheapest, stalls, step_factor
-from .trials import ASYMPTOTIC, trials_of
+from .search import even_grid, find_cheapest, step_factor, stops_falling
+from .trials import ASYMPTOTIC, Estimate, trials_of
 
 ATTEMPTS = 12
 MOST_STEPS = 10**10
-"""Steps that a run may be given: some quarter of an hour by the fastest method."""
+"""Largest number of steps of a run: about a quarter of an hour by the fastest method."""
 
 
 def integrate_to_error(
@@ -38,54 +35,86 @@ def integrate_to_error(
     samples: Samples,
     progress: Callable[[Progress], object] | None = None,
 ) -> Trajectory:
-    """Return the trajectory with the cheapest method and step found for an attitude error, rad; its `choice` says which.
+    """Return the trajectory with the cheapest method and step for an attitude error, rad, up to t_end, s; see its `choice`.
 
-    The run takes t_end, s; `progress` is called as `integrate` says.
+    `progress` is called as `integrate` describes.
 
     Raises
     ------
     BadInput
-        The error asks for more than `MOST_STEPS` steps.
+        The error needs more than `MOST_STEPS` steps.
     """
     trials = trials_of(scene, progress)
     method, dt = find_cheapest(trials, error, t_end)
-    dt = dt if samples.at is None else divide_step(scene, method, dt)
-    grid = grid_of(dt, t_end, samples)
-    attempts: Attempts = ()
-    best: tuple[float, Grid, Trajectory | None] = (math.inf, grid, None)
-    while True:
-        known = trials.known.get((method, grid))
-        made: Trajectory | None = None
+    best: tuple[float, Grid, Trajectory | None] | None = None  # smallest error, its grid, and its trajectory unless remembered
+
+    def estimate(grid: Grid) -> Estimate:
+        nonlocal best
+        known, trajectory = trials.known.get((method, grid)), None
         if known is None or known.sensitivity is None:
-            known, made = trials.make(method, grid, sensitivity=True)
-        attempts = (*attempts, (grid.dt, known.total))
-        if known.total <= best[0]:
-            best = known.total, grid, made
-        moved = known.sensitivity or 0.0
-        within = error - moved if moved < error else moved  # no step helps against what rounding the scene causes
-        if known.error <= within or moved >= ASYMPTOTIC or stalls(attempts) or len(attempts) == ATTEMPTS:
-            break
-        try:
-            grid = grid_of(grid.dt * step_factor(known.error, within, method), t_end, samples)
-        except BadInput:  # more steps or samples than can be: what there is has to do
-            break
-    estimate, grid, trajectory = best
-    choice = Choice(method, grid.dt, error, estimate, attempts)
+            known, trajectory = trials.make(method, grid, sensitivity=True)
+        if best is None or known.total <= best[0]:
+            best = known.total, grid, trajectory
+        return known
+
+    dt = dt if samples.at is None else divide_step(scene, method, dt)
+    attempts = cut_step(method, dt, error, lambda dt: grid_of(dt, t_end, samples), estimate)
+    assert best is not None  # `cut_step` has estimated a run
+    total, grid, trajectory = best
+    choice = Choice(method, grid.dt, error, total, attempts)
     trajectory = method.solve(scene, grid) if trajectory is None else trajectory
     if samples.at is not None:
         trajectory = sample_between(trajectory, method, grid, samples.at)
     if trajectory.ok and not choice.reached:
-        warnings.warn(AccuracyNotReached(error, estimate), stacklevel=4)
+        warnings.warn(AccuracyNotReached(error, total), stacklevel=4)
     return replace(trajectory, choice=choice)
 
 
-def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
-    """Return a grid of an even number of steps of at most dt, s, to t_end, s, with the samples, or steps to reach them from.
+def cut_step(
+    method: Method, dt: float, error: float, grid_with: Callable[[float], Grid], estimate: Callable[[Grid], Estimate]
+) -> tuple[tuple[float, float], ...]:
+    """Cut a step until the estimated error is small enough, or shorter steps do not help.
+
+    Parameters
+    ----------
+    method, dt, error
+        The method, its first step, s, and the requested attitude error, rad.
+    grid_with, estimate
+        Return the grid of the whole run for a step, s, and the estimate of a run, including its sensitivity.
+
+    Returns
+    -------
+    The steps tried, s, and the estimated total error of each, rad.
 
     Raises
     ------
     BadInput
-        They are more than `MOST_STEPS`, or their samples do not fit in memory.
+        The first step makes more steps or samples than are possible.
+    """
+    grid = grid_with(dt)
+    attempts: tuple[tuple[float, float], ...] = ()
+    while True:
+        found = estimate(grid)
+        attempts = (*attempts, (grid.dt, found.total))
+        rounding = found.sensitivity or 0.0
+        within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
+        if found.error <= within or rounding >= ASYMPTOTIC or len(attempts) == ATTEMPTS:
+            return attempts
+        if stops_falling([total for _, total in attempts]):
+            return attempts
+        try:
+            grid = grid_with(grid.dt * step_factor(found.error, within, method))
+        except BadInput:  # too many steps or samples: the best run so far has to do
+            return attempts
+
+
+def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
+    """Return a grid of an even number of steps of at most dt to t_end, both in s, that contains the samples.
+
+    Raises
+    ------
+    BadInput
+        There are more than `MOST_STEPS` steps, or the samples do not fit in memory.
     """
     if t_end / dt > MOST_STEPS:
         raise BadInput("error", f"one that takes {t_end / dt:.3g} steps", f"one that takes at most {MOST_STEPS:g} steps")

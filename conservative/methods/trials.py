@@ -1,13 +1,12 @@
-"""Trial runs: the error of a run, estimated from one more at twice the step, and remembered for the next call.
+"""Trial runs: the error of a run, estimated from one more run at twice the step, and remembered for later calls.
 
-Two runs of one scene cannot show what rounding the scene's own numbers causes: principal moments of a tensor are known to an
-ulp of the largest only, and motions near a separatrix, or chaotic ones, amplify that. So a third run starts from a scene whose
-inertia and start are changed by an ulp; its distance from the second run is added to the estimate.
+Step doubling (Richardson's extrapolation) cannot show what rounding of the scene's own numbers causes: principal moments of a
+tensor are known only to an ulp of the largest, and motions near a separatrix, or chaotic ones, amplify that. So a third run
+starts from a scene whose inertia and initial state are changed by an ulp. Its distance from the second run is added to the
+estimate.
 
-What is remembered belongs to the numbers of a scene and not to the object: a scene that is built anew profits, too. As an
-estimate depends on nothing else, a call is given the same choice whether or not another one went before.
-
-Source: step doubling as in Richardson's extrapolation; the rest is our own.
+Estimates are remembered by the numbers of a scene and not by the object, so a scene that is built again profits as well. They
+depend on nothing else, so the choice is the same whether or not other calls were made before.
 """
 
 from __future__ import annotations
@@ -31,16 +30,16 @@ from ..scene import Scene
 from ..trajectory import Trajectory
 
 LARGEST_FACTOR = 30.0
-"""Largest factor by which halving the step is trusted to shrink the error, whatever the order: round-off does not shrink."""
+"""Largest factor by which halving the step is assumed to reduce the error, whatever the order: round-off is not reduced."""
 ASYMPTOTIC = 0.2
 """Errors above this, rad, are saturated (angles end at pi) and are not used."""
 MOST_SCENES, MOST_ESTIMATES = 64, 1024
-"""Scenes whose trial runs are remembered, those used last, and trial runs of each."""
+"""Number of scenes whose trial runs are remembered (the most recent ones), and of trial runs of each."""
 ROUNDED = float(np.finfo(float).eps)
-"""Relative change of a scene's numbers that stands for rounding them."""
+"""Relative change of a scene's numbers that represents rounding."""
 _SIGNS = np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
 QUIET, PAUSE = 1.0, 0.1
-"""Time, s, before progress is told for the first time, and between two times."""
+"""Time, s, before the first report of progress, and between reports."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,11 @@ class Estimate:
     Attributes
     ----------
     error
-        Attitude error from a run at twice the step, rad; inf where a run failed, or both have nothing in common.
+        Attitude error from a run at twice the step, rad; inf if a run failed or both have nothing in common.
     work
         Work of the run, ns by `Card.cost`.
     sensitivity
-        Attitude error that rounding inertia and start causes, rad; None if it was not asked for.
+        Attitude error caused by rounding inertia and initial state, rad; None if not measured.
     """
 
     error: float
@@ -63,7 +62,7 @@ class Estimate:
 
     @property
     def total(self) -> float:
-        """Attitude error with what rounding causes, rad."""
+        """Attitude error including the effect of rounding, rad."""
         return self.error + (self.sensitivity or 0.0)
 
 
@@ -73,38 +72,29 @@ Observe = Callable[[Method, Grid], None]
 
 @dataclass(frozen=True)
 class Trials:
-    """Trial runs of a scene: those known already are not made again.
+    """Trial runs of a scene.
 
-    Attributes
-    ----------
-    scene
-        What is integrated.
-    known
-        The estimates so far, shared by all scenes of the same content.
-    observe
-        Called before each run.
+    `known` are the estimates so far, shared by all scenes of the same content. `observe` is called before each run.
     """
 
     scene: Scene
     known: Known
     observe: Observe
 
-    def estimate(self, method: Method, grid: Grid) -> Estimate:
-        """Return the estimate of a run."""
-        return self.known.get((method, grid)) or self.make(method, grid)[0]
-
-    def estimate_all(self, method: Method, grid: Grid) -> Estimate:
-        """Return the estimate of a run with its `sensitivity`."""
+    def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> Estimate:
+        """Return the estimate of a run, with its `sensitivity` if requested."""
         known = self.known.get((method, grid))
-        return self.make(method, grid, sensitivity=True)[0] if known is None or known.sensitivity is None else known
+        return (
+            self.make(method, grid, sensitivity)[0] if known is None or (sensitivity and known.sensitivity is None) else known
+        )
 
     def make(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory]:
-        """Return the estimate of a run, if wanted with its `sensitivity`, and the run."""
+        """Make a run and return its estimate, with its `sensitivity` if requested, and its trajectory."""
         self.observe(method, grid)
         error, fine, coarse = run_twice(method, self.scene, grid)
         found = Estimate(error, count_work(method, fine))
         if sensitivity:
-            # Where the run at twice the step failed, shorter steps come first.
+            # If the run at twice the step failed, the step is too long to tell.
             moved = find_sensitivity(method, coarse, coarse_grid(grid)) if coarse is not None else 0.0
             found = replace(found, sensitivity=moved)
         if len(self.known) >= MOST_ESTIMATES:
@@ -114,7 +104,7 @@ class Trials:
 
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
-    """Return the trial runs of a scene with what is known of them; `progress` is called as `integrate` says."""
+    """Return the trial runs of a scene, with the remembered ones; `progress` is called as `integrate` describes."""
     try:
         known = recall(content_of(scene))
     except TypeError:  # a field that cannot be hashed
@@ -124,17 +114,17 @@ def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None
 
 @lru_cache(maxsize=MOST_SCENES)
 def recall(content: object) -> Known:
-    """Return what is known of a scene's content: one and the same dictionary each time."""
+    """Return the estimates for a scene's content: the same dictionary each time."""
     return {}
 
 
 def content_of(scene: Scene) -> tuple[Any, ...]:
-    """Return what trial runs of a scene depend on, as a value that can be compared."""
+    """Return everything that trial runs of a scene depend on, as a hashable value."""
     return tuple(map(plain, (scene.body, scene.R_WB0, scene.w_WB_B0, scene.potential, scene.dt)))
 
 
 def plain(value: Any) -> Any:
-    """Return an array, or a frozen value of fields, as a tuple of numbers; anything else as it is."""
+    """Return an array or a frozen dataclass as a tuple of numbers, and anything else unchanged."""
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()
     if is_dataclass(value) and not isinstance(value, type) and type(value).__dataclass_params__.frozen:  # type: ignore[attr-defined]
@@ -143,7 +133,7 @@ def plain(value: Any) -> Any:
 
 
 def tell(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:
-    """Return what calls `progress` before a run: not in the first `QUIET` seconds, then each `PAUSE` at most."""
+    """Return a function that calls `progress` before a run: not in the first `QUIET` seconds, then at most every `PAUSE`."""
     start, runs, due = clock(), 0, QUIET
 
     def observe(method: Method, grid: Grid) -> None:
@@ -158,9 +148,9 @@ def tell(progress: Callable[[Progress], object], clock: Callable[[], float] = mo
 
 
 def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajectory, Trajectory | None]:
-    """Return the estimated error of a run, rad, the run, and the run at twice the step that the estimate is made from.
+    """Return the estimated error of a run, rad, its trajectory, and that of the run at twice the step.
 
-    Where one of them fails, the estimate is inf and the last None.
+    If one of them fails, the estimate is inf and the last one None.
     """
     fine = method.solve(scene, grid)
     coarse = _solve(method, scene, coarse_grid(grid))
@@ -172,12 +162,11 @@ def run_twice(method: Method, scene: Scene, grid: Grid) -> tuple[float, Trajecto
 
 
 def coarse_grid(grid: Grid) -> Grid:
-    """Return the grid of twice the step. Where samples fall on odd steps, it has every other one."""
+    """Return the grid of twice the step, with every other sample if samples fall on odd steps."""
     return Grid(2 * grid.dt, grid.n_steps // 2, grid.every * (1 + grid.every % 2) // 2)
 
 
 def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
-    """Return a run that is ok, else None."""
     try:
         found = method.solve(scene, grid)
     except (IntegrationFailed, MissingEngine, Unsupported):
@@ -186,9 +175,9 @@ def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
 
 
 def find_sensitivity(method: Method, found: Trajectory, grid: Grid) -> float:
-    """Return how far a run on a grid is from that of `nearby_scene`, rad; inf where that fails."""
+    """Return the distance of a run from that of `nearby_scene`, rad; inf if that fails."""
     scene = nearby_scene(found.scene)
-    if method.unsupported(scene) is not None:  # it needs a symmetry, which the other inertia lacks
+    if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
         scene = scene.rename(scene.name, body=found.scene.body)
     nearby = _solve(method, scene, grid)
     return math.inf if nearby is None else float(angle_between(found.R_WB, nearby.R_WB).max())
@@ -197,8 +186,8 @@ def find_sensitivity(method: Method, found: Trajectory, grid: Grid) -> float:
 def nearby_scene(scene: Scene) -> Scene:
     """Return the scene with inertia, attitude and rates changed by `ROUNDED`, as rounding them may change them.
 
-    What is 0 stays 0 in a body whose tensor is diagonal, where no axes have to be computed: a spin about a principal axis stays
-    one. Moments of any other tensor are known to an ulp of the largest, and rates along its axes to an ulp of the whole rate.
+    If the tensor is diagonal, no axes have to be computed and zeros stay zeros: a spin about a principal axis stays one.
+    Moments of any other tensor are known to an ulp of the largest, and rates along its axes to an ulp of the whole rate.
     """
     body, w = scene.body, scene.w_WB_B0
     plain = np.array_equal(body.R_BP, np.eye(3))
@@ -218,12 +207,12 @@ def _every(stride: int, R_WB: Array) -> Array:
 
 
 def convergence_factor(method: Method) -> float:
-    """Return by which factor the finer of two runs is less off than their difference."""
+    """Return the difference of two runs divided by the error of the finer one."""
     return 1.0 if method.order is None else min(2.0**method.order - 1, LARGEST_FACTOR)
 
 
 def rounding_error(trajectory: Trajectory) -> float:
-    """Return what rounding the scene's own numbers turns the body by, rad: no comparison of two runs can see it."""
+    """Return the rotation by rounding of the angular velocity, rad, which a comparison of two runs cannot show."""
     if not len(trajectory):
         return math.inf
     speed = float(np.linalg.norm(trajectory.w_WB_B, axis=1).max())
@@ -231,6 +220,6 @@ def rounding_error(trajectory: Trajectory) -> float:
 
 
 def count_work(method: Method, trajectory: Trajectory) -> float:
-    """Return the work of a run, in ns: the number of steps and of corrections, each times its cost beside those of others."""
+    """Return the work of a run, ns, from its numbers of steps and corrections."""
     cost, counters = method.card.cost(method), trajectory.counters
     return cost.correction * (counters.iterations or 0) + cost.step * counters.steps

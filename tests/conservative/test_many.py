@@ -23,6 +23,7 @@ from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
 from conservative.method import Method, Role
 from conservative.methods.between import Samples
 from conservative.methods.many import Block, pause
+from conservative.methods.trials import Estimate
 from conservative.trajectory import Trajectory
 
 TURN = rotation_about((3, -1, 2), 1.3)
@@ -211,7 +212,7 @@ def test_one_step_for_all_comes_from_an_error():
 
 
 def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
-    n, goal = 100, shared_choice.Goal(1e-6, 2.0, Samples(None, 1))
+    n, error = 100, 1e-6
     bodies = read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), *starts(n), None, None)
     numbers = shared_choice.pick(bodies)
     sensitive, steps = numbers[-1], []  # one of those that are only verified
@@ -219,11 +220,12 @@ def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
 
     def find_worst(bodies, numbers, method, grid):
         steps.append(grid.dt)
-        truncation = goal.error / 2 * (grid.dt / steps[0]) ** method.order
-        return max((truncation * (1e6 if i == sensitive else 1), i) for i in numbers)
+        truncation = error / 2 * (grid.dt / steps[0]) ** method.order
+        worst, number = max((truncation * (1e6 if i == sensitive else 1), i) for i in numbers)
+        return Estimate(worst, 0.0), number
 
     monkeypatch.setattr(shared_choice, "find_worst", find_worst)
-    choice = shared_choice.choose_for_all(bodies, goal)
+    choice = shared_choice.choose_for_all(bodies, error, 2.0, Samples(None, 1))
     assert choice.reached
     assert choice.grid.dt < steps[0] * 5e5 ** (-1 / choice.method.order)
 

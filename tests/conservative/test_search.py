@@ -112,8 +112,7 @@ def test_factors_by_which_a_finer_run_is_better():
 )
 def test_errors_that_stop_falling(errors, stalls):
     assert search.stops_falling(errors) is stalls
-    attempts = [(0.1, error) for error in errors]
-    assert search.stalls(((0.2, math.inf), *attempts)) is stalls
+    assert search.stops_falling([math.inf, *errors]) is stalls
 
 
 def test_bounds_and_counts():
@@ -205,7 +204,7 @@ def test_an_error_that_cannot_be_reached_is_a_warning(choose):
 
 def drive(method, error, t_end):
     """Return a candidate for the scene that is advanced until it is settled or given up."""
-    candidate = search.begin(method, SCENE, search.goal_for(SCENE, error, t_end))
+    candidate = search.begin(method, SCENE, error, t_end)
     while not (candidate.settled or candidate.hopeless):
         candidate = candidate.advance(trials.Trials(SCENE, {}, lambda method, grid: None))
     return candidate
@@ -277,7 +276,7 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
 
 
 def test_work_is_extrapolated_from_the_order():
-    candidate = search.Candidate(Known(power=2), search.Goal(2e-9, 8.0, 8.0, 1.0), 0.01, ((0.1, 1e-3),), 2.0)
+    candidate = search.Candidate(Known(power=2), 2e-9, 8.0, 1.0, 0.01, ((0.1, 1e-3),), 2.0)
     assert candidate.expected_work(1.0) == pytest.approx(2.0 * 80 * 1e3 / search.LENIENCY)
 
 
@@ -304,7 +303,7 @@ def test_a_search_ends_where_what_is_left_has_cost_enough(choose, monkeypatch):
 
 def test_what_stalls_above_the_error_is_taken_only_where_no_other_gets_there(choose):
     stalled = Known(size=1e-3, power=0)
-    candidate = search.Candidate(Known(), search.Goal(1e-9, 8.0, 8.0, 1.0), 0.1, ((0.4, 1e-5), (0.2, 1e-5), (0.1, 1e-5)), 2.0)
+    candidate = search.Candidate(Known(), 1e-9, 8.0, 1.0, 0.1, ((0.4, 1e-5), (0.2, 1e-5), (0.1, 1e-5)), 2.0)
     assert candidate.settled
     assert not candidate.reached
     assert candidate.expected_work(1.0) == pytest.approx(search.PENALTY * 2.0 * 80)
