@@ -1,7 +1,7 @@
-"""Truth for any scene: Taylor integration in as many bits as asked for, by heyoka on MPFR numbers.
+"""Reference solutions for any scene: multi-precision Taylor integration by heyoka on MPFR numbers (Biscani & Izzo 2021).
 
-Source: heyoka's documentation and Biscani & Izzo (2021); the parts of the equations are those of
-`conservative.references.heyoka_equations.forms`.
+An entry in `FIELDS` adds a potential. The torques here are a copy independent of those that heyoka and SciPy integrate in
+double precision, so that a mistake in one of them shows.
 """
 
 from __future__ import annotations
@@ -24,30 +24,117 @@ from conservative.check import describe, positive_integer
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
-from conservative.potentials.turning import static_part
+from conservative.potentials.gravity_gradient import GravityGradient
+from conservative.potentials.point_to_point import LinearSpring, PointAttraction, PointPotential
+from conservative.potentials.potential import Potential
+from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from .engine import STEP_LIMIT, Axes, limit_reason, pace_reason, version
 from .heyoka_equations import forms
-from .heyoka_equations.torques import FIELDS, Field, Number, find_field
 
 Reals = NDArray[Any]
 """An array of `heyoka.real`."""
+
+Number = Any
+"""A float, an `mpmath.mpf` or a text with any number of digits."""
+
+Expressions = Sequence[forms.Expression]
+
+
+@dataclass(frozen=True)
+class TorqueExpression:
+    """A potential as expressions: the values of its parameters, and its torque in body axes from quaternion and parameters."""
+
+    values: Callable[[Any], Sequence[Number]]
+    torque: Callable[[Expressions, Expressions], list[forms.Expression]]
+
+
+def uniform(q: Expressions, moment: Expressions) -> list[forms.Expression]:
+    """Return g x m for V = m.g, with g the vertical in body axes."""
+    return forms.cross(forms.to_body(q, (0.0, 0.0, 1.0)), moment)
+
+
+def spring(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
+    """Return the torque of V = k/2 (d - d0)^2, parameters b (3), A (3), k, d0."""
+    b, anchor, (stiffness, rest_length) = parameters[:3], forms.to_body(q, parameters[3:6]), parameters[6:]
+    return _pull_torque(b, anchor, stiffness * (1 - rest_length / forms.heyoka().sqrt(_squared_distance(b, anchor))))
+
+
+def attraction(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
+    """Return the torque of V = -c/d, parameters b (3), A (3), c."""
+    b, anchor, strength = parameters[:3], forms.to_body(q, parameters[3:6]), parameters[6]
+    return _pull_torque(b, anchor, strength * _squared_distance(b, anchor) ** -1.5)
+
+
+def gradient(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
+    """Return u x (3 rate^2 J u) for V = 3/2 rate^2 u'J u, parameters 3 rate^2 (1), J (9), direction (3)."""
+    u = forms.to_body(q, parameters[10:])
+    return [parameters[0] * x for x in forms.cross(u, forms.product(parameters[1:10], u))]
+
+
+def _squared_distance(b: Expressions, anchor: Expressions) -> forms.Expression:
+    return sum((x - y) ** 2 for x, y in zip(b, anchor, strict=True))
+
+
+def _pull_torque(b: Expressions, anchor: Expressions, pull: forms.Expression) -> list[forms.Expression]:
+    """Return the torque b x (A - b) pull of a force along the line between the points, body axes."""
+    return [pull * x for x in forms.cross(b, anchor)]
+
+
+def _points(potential: PointPotential) -> list[Number]:
+    return [*potential.point_B.tolist(), *potential.anchor_W.tolist()]
+
+
+FIELDS: dict[type[Potential], TorqueExpression] = {
+    UniformGravity: TorqueExpression(lambda p: p.moment_B.tolist(), uniform),
+    LinearSpring: TorqueExpression(lambda p: [*_points(p), p.stiffness, p.rest_length], spring),
+    PointAttraction: TorqueExpression(lambda p: [*_points(p), p.strength], attraction),
+    GravityGradient: TorqueExpression(lambda p: [p.factor, *p.inertia.ravel().tolist(), *p.direction_W.tolist()], gradient),
+}
+"""Potentials that `Precise` supports, by type."""
+
+
+def find_field(potential: Any) -> TorqueExpression | None:
+    """Return the expressions of a potential, or of the potential that turns; None if there are none."""
+    if not isinstance(potential, Turning):
+        return FIELDS.get(type(potential))
+    field = FIELDS.get(type(potential.potential))
+    return None if field is None else _turn(field)
+
+
+@lru_cache
+def _turn(field: TorqueExpression) -> TorqueExpression:
+    """Return the expressions of a field that turns with an orbit: parameters rate (1), normal (3) and those of the field.
+
+    Cached, so that the compiled integrators of a field are found again.
+    """
+
+    def values(potential: Turning) -> list[Number]:
+        return [potential.orbit.rate, *potential.orbit.normal_W.tolist(), *field.values(potential.potential)]
+
+    def torque(q: Expressions, parameters: Expressions) -> list[forms.Expression]:
+        half = 0.5 * parameters[0] * forms.heyoka().time
+        sine = forms.heyoka().sin(half)
+        back = [forms.heyoka().cos(half), *(x if forms.is_zero(x) else -sine * x for x in parameters[1:4])]
+        return field.torque(forms.quaternion_product(back, q), parameters[4:])
+
+    return TorqueExpression(values, torque)
 
 
 @dataclass(frozen=True)
 class Precise(Method):
     """Quaternion and body rates by heyoka in multi-precision; dt is only the distance of samples.
 
-    The start is the scene's, taken as exact numbers; samples are rounded to double at the end. `states` gives them unrounded.
+    The initial state is taken as exact numbers, and samples are rounded to double. `states` returns them unrounded.
 
     Parameters
     ----------
     bits
-        Precision, 53 to 4096 bits; the tolerance of a step is 2^-(bits - 1). A motion that amplifies errors e-fold N times
-        costs 1.44 N bits of the result.
+        Precision, 53 to 4096 bits; the tolerance of a step is 2^-(bits - 1). A motion that amplifies errors by e^N
+        costs 1.44 N bits.
 
     Raises
     ------
@@ -82,7 +169,7 @@ class Precise(Method):
     def unsupported(self, scene: Scene) -> str | None:
         if scene.potential is None or find_field(scene.potential) is not None:
             return None
-        kind, table = type(static_part(scene.potential)).__name__, "conservative.references.heyoka_equations.torques.FIELDS"
+        kind, table = type(static_part(scene.potential)).__name__, "conservative.references.precise.FIELDS"
         return f"no multi-precision expressions for {kind}; add them to {table}"
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
@@ -93,8 +180,8 @@ class Precise(Method):
         t = _reals(grid.steps.tolist(), self.bits) * _real(grid.dt, self.bits)
 
         def run() -> Trajectory:
-            reason, steps, found = solve(t, scene)
-            doubles = np.array([[float(x) for x in row] for row in found]).reshape(-1, 7)
+            reason, steps, reals = solve(t, scene)
+            doubles = np.array([[float(x) for x in row] for row in reals]).reshape(-1, 7)
             R_WB, work = from_quaternion(doubles[:, :4]), Counters(steps)
             return axes.trajectory(grid, self.label, R_WB, doubles[:, 4:], work, reason)
 
@@ -114,8 +201,8 @@ def states(
     Parameters
     ----------
     inertia
-        Moments (3,) or tensor (3, 3), kg m^2, body axes. As all numbers here: a float (taken as exact), an `mpmath.mpf`, or
-        a text.
+        Moments (3,) or tensor (3, 3), kg m^2, body axes. Every number can be a float (taken as exact), an
+        `mpmath.mpf` or a text.
     q0
         Attitude at t = 0, body to world: quaternion (4,), scalar first; normalised here.
     w0
@@ -142,9 +229,9 @@ def states(
     _check_bits(bits)
     field = None if moment_B is None else FIELDS[UniformGravity]
     solve = _solver(inertia, q0, w0, field, () if moment_B is None else moment_B, bits)
-    _, _, found = solve(_reals([0, *t], bits), None)
+    _, _, reals = solve(_reals([0, *t], bits), None)
     with _digits(bits) as mp:
-        rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in found[1:]]
+        rows = [[mpmath.mp.make_mpf(mp.mpf(str(x))._mpf_) for x in row] for row in reals[1:]]
     return [row[:4] for row in rows], [row[4:] for row in rows]
 
 
@@ -155,16 +242,12 @@ def _check_bits(bits: object) -> None:
 
 
 @dataclass(frozen=True)
-class System:
-    """The equations q' = q w / 2 and w' = J^-1 (J w x w + torque) of a field or none.
+class QuaternionEquations:
+    """The equations q' = q w / 2 and w' = J^-1 (J w x w + torque), state (q, w); parameters J (9), J^-1 (9) and the field's."""
 
-    State (q, w), parameters J (9), J^-1 (9) and the field's.
-    """
-
-    field: Field | None
+    field: TorqueExpression | None
 
     def __call__(self, parameters: Sequence[forms.Expression]) -> forms.Equations:
-        """Return the equations with these parameters."""
         hy = forms.heyoka()
         q, w = hy.make_vars("q0", "q1", "q2", "q3"), hy.make_vars("w1", "w2", "w3")
         J, K, rest = parameters[:9], parameters[9:18], parameters[18:]
@@ -179,37 +262,37 @@ def _compile(form: forms.Form, bits: int) -> forms.Integrators:
     hy = forms.heyoka()
     equations = form.build()
     zeros = _reals([0] * len(equations), bits)
-    # Compact mode: the code of some 90 orders would take minutes to compile written out, and is no faster on these numbers.
+    # Compact mode: unrolled code of some 90 orders takes minutes to compile and is not faster on these numbers.
     return forms.Integrators(hy.taylor_adaptive(equations, zeros, fp_type=hy.real, prec=bits, compact_mode=True))
 
 
 def _solver(
-    inertia: Sequence[Any], q0: Any, w0: Any, field: Field | None, values: Sequence[Number], bits: int
+    inertia: Sequence[Any], q0: Any, w0: Any, field: TorqueExpression | None, values: Sequence[Number], bits: int
 ) -> Callable[[Reals, Scene | None], tuple[str, int, Reals]]:
-    """Return the function of times, the first 0, that gives how it ended, the number of steps and states (n, 7).
+    """Return a function of times, the first 0, that returns the reason of its end, the number of steps and states (n, 7).
 
-    With a scene, what would not get to the end within the limit of steps is not begun.
+    With a scene, a run that would exceed the limit of steps is not started.
     """
     with _digits(bits + 32) as mp:
         J = _tensor(mp, inertia)
         quaternion = [_mpf(mp, x) for x in q0]
         norm = mp.sqrt(mp.fsum(x * x for x in quaternion))
         start = _reals([*(x / norm for x in quaternion), *w0], bits)
-        form, used = forms.form_of(System(field), [*J, *J**-1, *(_mpf(mp, x) for x in values)])
+        form, used = forms.form_of(QuaternionEquations(field), [*J, *J**-1, *(_mpf(mp, x) for x in values)])
         parameters = _reals(used, bits)
     integrators = _compile(form, bits)
 
     def solve(t: Reals, scene: Scene | None) -> tuple[str, int, Reals]:
         with integrators.borrow() as integrator:
-            # Parameters at the end that equations have no use for (a spring's at the pivot, say) are not stored.
+            # heyoka does not store unused parameters at the end, such as those of a spring at the pivot.
             integrator.pars[:] = parameters[: len(integrator.pars)]
             integrator.time, integrator.state[:] = _real(0, bits), start
             reason = pace_reason(scene, integrator, float(t[-1])) if scene else ""
             integrator.time, integrator.state[:] = _real(0, bits), start
             if reason:
                 return reason, 0, start[None]
-            outcome, _, _, steps, _, found = integrator.propagate_grid(t, max_steps=STEP_LIMIT)
-        return limit_reason(int(steps), 1.0) or f"heyoka: {outcome.name}", int(steps), found
+            outcome, _, _, steps, _, reals = integrator.propagate_grid(t, max_steps=STEP_LIMIT)
+        return limit_reason(int(steps), 1.0) or f"heyoka: {outcome.name}", int(steps), reals
 
     return solve
 
@@ -220,7 +303,7 @@ _mp_lock = RLock()
 
 @contextmanager
 def _digits(bits: int) -> Iterator[Any]:
-    """Lend mpmath in as many bits: a context of our own, as that of the user has one precision for all threads."""
+    """Yield a private context of mpmath: the global one has a single precision for all threads."""
     with _mp_lock, _mp.workprec(bits):
         yield _mp
 
@@ -236,7 +319,7 @@ def _mpf(mp: Any, x: Number) -> Any:
 
 
 def _real(x: Number, bits: int) -> Any:
-    """Return a number as `heyoka.real`: floats and integers exactly, others through their digits."""
+    """Return a number as `heyoka.real`: floats and integers exactly, others from their digits."""
     hy = forms.heyoka()
     if isinstance(x, float | int):
         return hy.real(x, bits)

@@ -1,1 +1,1 @@
-"""Equations of motion as heyoka takes them: formulations of the motion, and torques of the potentials."""
+"""Equations of motion as heyoka expressions."""

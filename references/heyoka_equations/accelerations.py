@@ -1,17 +1,16 @@
-"""What each field adds to Euler's equations, in double precision and as cheaply as we found.
+"""Angular accelerations of the fields in double precision, with few products.
 
-All these fields have an axis, so that what they do depends on one unit vector in the body: g, the axis in principal axes. With
-the constant moment m, A the anchor's distance from the fixed point, and d the distance of body point b from the anchor:
+Each field has an axis, so its torque depends on one unit vector: g, the field's axis in principal axes of the body. With the
+constant moment m, A the distance of the anchor from the fixed point, and d the distance of body point b from the anchor:
 
     uniform gravity     J w' = J w x w + g x m                          m = weight com
     spring              J w' = J w x w + (1 - rest / d) g x m           m = -stiffness A b      d^2 = b.b + A^2 - 2 A b.g
     attraction          J w' = J w x w + d^-3 g x m                     m = -strength A b
     gravity gradient    J w' = J w x w + g x (3 rate^2 I g)
 
-The first is linear in g and costs no product. The second and the third are at right angles to m, so that two products give all
-three components. The last has those products of g that Euler's equations have of w. These expressions take heyoka's symbols and
-plain floats alike. Multi-precision truth has its own, in `conservative.references.heyoka_equations.torques`. Source: the
-potentials' own torques.
+The first is linear in g and needs no product of variables. The second and the third are perpendicular to m, so two products
+give all three components. The last has the same products of g as Euler's equations of w. The expressions accept heyoka's
+symbols and floats. `conservative.references.precise` has its own copy of the torques, so that a mistake in one of them shows.
 """
 
 from __future__ import annotations
@@ -35,26 +34,26 @@ from .forms import Expression, is_zero, product
 
 Expressions = Sequence[Expression]
 Acceleration = Callable[[Expressions, Expressions], list[Expression]]
-"""Takes parameters and g to the angular acceleration, without what Euler's equations have."""
+"""Maps parameters and g to the angular acceleration by the field."""
 
 _ROUND_OFF = 4 * np.finfo(float).eps
-"""A component in principal axes below this, relative to the largest, comes from turning there."""
+"""Relative size of a component in principal axes below which it is round-off of the change of axes."""
 
 
 @dataclass(frozen=True, eq=False)
 class FieldInAxes:
-    """A scene's field as heyoka takes it.
+    """A scene's field as expressions in principal axes.
 
     Attributes
     ----------
     axes
-        Principal axes of the body, in an order that suits the field.
+        Principal axes of the body, ordered for the field.
     R_WD
-        Rotation (3, 3) whose third column is the field's axis, world axes.
+        Rotation (3, 3) whose third column is the field's axis in world axes.
     acceleration, parameters
-        Its expressions, and the values of their parameters.
+        Expressions, and the values of their parameters.
     turn_D
-        Rates (3,) at which the axes D turn, with which the field is fixed, rad/s, in D; the first is 0.
+        Rates (3,) of the axes D, rad/s, in D. The first is 0. The field is constant in D.
     """
 
     axes: Axes
@@ -65,19 +64,18 @@ class FieldInAxes:
 
 
 def express_field(scene: Scene) -> FieldInAxes:
-    """Return the field of a scene, whose potential, or what turns of it, is one of `READERS` or None."""
+    """Return the field of a scene whose potential, or the potential that turns, is None or one of `READERS`."""
     potential = static_part(scene.potential)
     line = None if potential is None else potential.axis_W
     if not isinstance(scene.potential, Turning):
         return _express(scene, potential, np.eye(3) if line is None else axes_about(line))
     orbit = scene.potential.orbit
     R_WD = _axes_beside(orbit.normal_W if line is None else line, orbit.normal_W)
-    found = _express(scene, potential, R_WD)
-    return replace(found, turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
+    return replace(_express(scene, potential, R_WD), turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
 
 
 def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInAxes:
-    """Return a potential of the scene, or None, in axes D (3, 3); what has no axis does nothing."""
+    """Return a potential as a field in axes D. A potential without an axis has no torque."""
     axes = principal_axes(scene)
     if potential is None or potential.axis_W is None:
         return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
@@ -85,7 +83,7 @@ def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInA
 
 
 def _axes_beside(third: Array, normal: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is `third` (3,) and whose first is at right angles to `normal` (3,) too."""
+    """Return a rotation (3, 3) whose third column is `third` (3,) and whose first is also perpendicular to `normal` (3,)."""
     first = np.cross(normal, third)
     size = np.linalg.norm(first)
     if size <= _ROUND_OFF:
@@ -99,12 +97,12 @@ def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
 
 
 def spring(parameters: Expressions, g: Expressions) -> list[Expression]:
-    """Return (1 - s^-1/2) M g, with s the square of distance over rest length, as `_pull` has the parameters."""
+    """Return (1 - s^-1/2) M g with s = (distance / rest length)^2; parameters as for `_pull`."""
     return _pull(parameters, g, lambda s: 1.0 - s**-0.5)
 
 
 def attraction(parameters: Expressions, g: Expressions) -> list[Expression]:
-    """Return s^-3/2 M g, with s the squared distance, as `_pull` has the parameters."""
+    """Return s^-3/2 M g with s = distance^2; parameters as for `_pull`."""
     return _pull(parameters, g, lambda s: s**-1.5)
 
 
@@ -116,9 +114,9 @@ def gradient(parameters: Expressions, g: Expressions) -> list[Expression]:
 
 
 def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], Expression]) -> list[Expression]:
-    """Return law(s) M g, parameters M (two rows: 6), what makes the third component of the other two (2), s0 and s1 (3).
+    """Return law(s) M g with s = s0 - s1.g.
 
-    s = s0 - s1.g.
+    Parameters: two rows of M (6), the coefficients of the third component in the two others (2), s0, and s1 (3).
     """
     along = [c * x for c, x in zip(parameters[9:], g, strict=True) if not is_zero(c)]
     factor = law(parameters[8] - sum(along[1:], along[0]))
@@ -143,7 +141,7 @@ def _read_attraction(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
 
 
 def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[Acceleration, float, float]) -> FieldInAxes:
-    """Return the field of a pull along the line between two points: its expressions, its strength, and the unit of length."""
+    """Return the field of a force along the line between two points; `law` has expressions, strength and unit of length."""
     acceleration, strength, unit = law
     if not potential.point_B.any():
         return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
@@ -169,17 +167,17 @@ READERS: dict[type[Potential], Callable[[Axes, Array, Any], FieldInAxes]] = {
     PointAttraction: _read_attraction,
     GravityGradient: _read_gradient,
 }
-"""What reads a potential: the fields that heyoka takes in double precision."""
+"""Functions that express a potential, by its type."""
 
 
 def order_axes(axes: Axes, third: int) -> Axes:
-    """Return principal axes in another order, in which the one of that number is the third."""
+    """Return principal axes in the order in which axis number `third` is the third."""
     turn = np.roll(np.eye(3), 2 - third, axis=1)
     return Axes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
 
 
 def _drop_round_off(components: Array) -> Array:
-    """Return components with zeros for those that are round-off: what is zero is left out of the equations."""
+    """Set components that are round-off to zero, which removes their terms from the equations."""
     return np.where(np.abs(components) <= _ROUND_OFF * np.abs(components).max(), 0.0, components)
 
 

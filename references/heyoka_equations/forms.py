@@ -1,17 +1,17 @@
 """Equations of motion as heyoka expressions: the forms that `Heyoka` and `Precise` integrate.
 
-What belongs to a body or a field is a runtime parameter, so that one compiled integrator does every scene of the same form
-(measured: a parameter costs 2 % more than a constant). Terms that vanish for a scene, as those of equal moments or of a
-centre of mass on an axis, are left out of its form.
+Properties of bodies and fields are runtime parameters, so one compiled integrator serves all scenes of the same form (measured:
+a parameter costs 2 % more than a constant). Terms that vanish for a scene, such as those of equal moments or of a centre of
+mass on an axis, are not in its form.
 
 Source: Euler's and Poisson's equations; the slow frame is that of `conservative.methods.non_spinning`.
 
 Symbols: q quaternion, scalar first, body to world; w rates in body axes; u rates of the slow frame, world axes; n the body's
 axis of symmetry, world axes.
 
-Tried and not kept: rates scaled so that all coefficients are 1 (8 % less a step, more steps); second-order equations in one
-rate (its square roots lose half the digits at every reversal); cross products of five products instead of six (their sums cost
-more); one angle beside the field's axis in place of a second row (4 products fewer, but a pole, and 10 to 20 % more steps).
+Tried and rejected: rates scaled so that all coefficients are 1 (8 % less time per step, but more steps); second-order equations
+in one rate (square roots lose half the digits at every reversal); cross products with five products instead of six (their sums
+cost more); an angle about the field's axis instead of a second row (4 products fewer, but a pole, and 10 to 20 % more steps).
 """
 
 from __future__ import annotations
@@ -26,39 +26,39 @@ from typing import Any
 from ..engine import load
 
 Expression = Any
-"""A `heyoka.expression`, or a float where it is constant."""
+"""A `heyoka.expression`, or a float if constant."""
 
 Equations = list[tuple[Expression, Expression]]
 """Pairs of a state variable and its derivative."""
 
 
 def heyoka() -> Any:
-    """Return the module, imported at the first call."""
+    """Return the module heyoka, imported at the first call."""
     return load("heyoka", "heyoka", "heyoka")
 
 
 @dataclass(frozen=True)
 class Form:
-    """A system up to the values of its parameters: its equations, and which parameters are not zero."""
+    """Equations up to the values of their parameters, and a flag for each parameter that is not zero."""
 
     equations: Callable[[Sequence[Expression]], Equations]
     used: tuple[bool, ...]
 
     def build(self) -> Equations:
-        """Return the equations with runtime parameters, numbered through, in the places that are used and zeros elsewhere."""
+        """Return the equations with numbered runtime parameters, and zeros for unused ones."""
         places = iter(range(len(self.used)))
         return self.equations([heyoka().par[next(places)] if used else 0.0 for used in self.used])
 
 
 def form_of(equations: Callable[[Sequence[Expression]], Equations], parameters: Sequence[Any]) -> tuple[Form, list[Any]]:
-    """Return the form for these parameters, and those of them that are not zero."""
+    """Return the form for these parameters, and the parameters that are not zero."""
     return Form(equations, tuple(bool(p != 0) for p in parameters)), [p for p in parameters if p != 0]
 
 
 class Integrators:
-    """Equal integrators of one form: a run borrows one, so that no two runs at a time write into the same.
+    """A pool of equal integrators of one form, so that concurrent runs do not share one.
 
-    The first is compiled; others are copies of it, made (in a millisecond) when all there are so far are lent out.
+    The first is compiled. Others are copies of it, made in a millisecond when no integrator is idle.
     """
 
     def __init__(self, compiled: Any) -> None:
@@ -66,7 +66,7 @@ class Integrators:
 
     @contextmanager
     def borrow(self) -> Iterator[Any]:
-        """Lend an integrator; whoever borrows it sets state, time and parameters."""
+        """Yield an idle integrator. The caller sets state, time and parameters."""
         try:
             integrator = self._idle.pop()
         except IndexError:
@@ -85,25 +85,24 @@ def compile_double(form: Form, tol: float, fast_math: bool = False) -> Integrato
 
 
 @dataclass(frozen=True)
-class Turning:
-    """Euler's equations in principal axes with those of the attitude, state (attitude, w).
+class EulerEquations:
+    """Euler's equations in principal axes and the equations of the attitude, state (attitude, w).
 
-    Parameters are (J2 - J3)/J1 and its kin (3), the rates at which the world axes of the attitude turn (3), in those axes, then
-    those of the field.
+    Parameters: (J2 - J3)/J1 and its cyclic permutations (3), the rates of the axes to which the attitude refers (3), in those
+    axes, and the parameters of the field.
 
     Attributes
     ----------
     attitude
-        Takes the body's rates and those of the world axes to the attitude's equations and to the field's axis in the body.
+        Maps the rates of the body and of those axes to the equations of the attitude and to the field's axis in the body.
     acceleration
-        Takes the field's parameters and that axis to what the field adds to w'.
+        Maps the field's parameters and its axis to the angular acceleration by the field.
     """
 
     attitude: Callable[[Sequence[Expression], Sequence[Expression]], tuple[Equations, Sequence[Expression]]]
     acceleration: Callable[[Sequence[Expression], Sequence[Expression]], Sequence[Expression]]
 
     def __call__(self, parameters: Sequence[Expression]) -> Equations:
-        """Return the equations with these parameters."""
         w = heyoka().make_vars("w1", "w2", "w3")
         equations, axis = self.attitude(w, parameters[3:6])
         gyroscopic = [parameters[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) for i in range(3)]
@@ -111,19 +110,19 @@ class Turning:
 
 
 def quaternion(w: Sequence[Expression], turn: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
-    """Return the quaternion's equations, 12 products, and the axis in the body: 6 more where all of it is used.
+    """Return the equations of the quaternion and the field's axis in the body: 12 and at most 6 products.
 
-    In axes that turn it loses turn q / 2.
+    In turning axes q' has the additional term -turn q / 2.
     """
     q = heyoka().make_vars("q0", "q1", "q2", "q3")
-    lost = quaternion_product([0.0, *(x if is_zero(x) else -0.5 * x for x in turn)], q)
-    return list(zip(q, _sums(kinematics_in_body(q, w), lost), strict=True)), vertical(q)
+    transport = quaternion_product([0.0, *(x if is_zero(x) else -0.5 * x for x in turn)], q)
+    return list(zip(q, _sums(kinematics_in_body(q, w), transport), strict=True)), vertical(q)
 
 
 def base_vectors(w: Sequence[Expression], turn: Sequence[Expression]) -> tuple[Equations, Sequence[Expression]]:
-    """Return the equations of the third and the first row of the rotation matrix, 12 products; the third is the axis itself.
+    """Return the equations of the third and the first row of the rotation matrix, 12 products; the third is the field's axis.
 
-    In axes that turn, rows lose turn x columns: a term linear in the other row where the axes turn about the second of them.
+    In turning axes the columns have the additional term -turn x column.
     """
     hy = heyoka()
     third, first = hy.make_vars("g1", "g2", "g3"), hy.make_vars("a1", "a2", "a3")
@@ -153,11 +152,11 @@ def non_spinning(parameters: Sequence[Expression]) -> Equations:
 
 
 def free_rates_and_angle(parameters: Sequence[Expression]) -> Equations:
-    """Return a free body with its world momentum given once and for all, state (w, p): four products where `body` has fifteen.
+    """Return a free body as rates and one angle, state (w, p), with four products instead of fifteen.
 
-    The momentum's direction in the body and one angle about it are the attitude. In axes whose third is one about which the
-    momentum circulates, L3 > 0, that angle is l t/J3 + p with p' = c/(l/J3 + w3), c = (2 T - l^2/J3)/J3. Parameters: (J2 -
-    J3)/J1 and its kin (3), l/J3, c.
+    The direction of the constant momentum in the body and an angle about it determine the attitude. If the momentum circulates
+    about the third axis, L3 > 0, that angle is l t/J3 + p with p' = c/(l/J3 + w3), c = (2 T - l^2/J3)/J3. Parameters: (J2 -
+    J3)/J1 and its cyclic permutations (3), l/J3, c.
     """
     hy = heyoka()
     w, p = hy.make_vars("w1", "w2", "w3"), hy.expression("p")
@@ -166,10 +165,10 @@ def free_rates_and_angle(parameters: Sequence[Expression]) -> Equations:
 
 
 def axis_and_angle(parameters: Sequence[Expression]) -> Equations:
-    """Return the slow frame of a symmetric body by its axis and one angle, state (n, u1, u2, p): seven products, not eighteen.
+    """Return the slow frame of a symmetric body as its axis and one angle, state (n, u1, u2, p): seven products, not eighteen.
 
-    The frame is the least rotation from the vertical to n after a turn by p, p' = (u.n + u3)/(1 + n3), whose numerator is
-    constant; n must stay away from -e_z. Parameters: moment of the weight over J1, u3, u.n + u3.
+    The frame is a rotation by p followed by the smallest rotation from the vertical to n. p' = (u.n + u3)/(1 + n3) has a
+    constant numerator; n must stay away from -e_z. Parameters: moment of the weight over J1, u3, u.n + u3.
     """
     hy = heyoka()
     n, u, p = hy.make_vars("n1", "n2", "n3"), hy.make_vars("u1", "u2"), hy.expression("p")
@@ -203,7 +202,7 @@ def kinematics_in_world(q: Sequence[Expression], u: Sequence[Expression]) -> lis
 
 
 def quaternion_product(p: Sequence[Expression], q: Sequence[Expression]) -> list[Expression]:
-    """Return p q, without the products with what is zero."""
+    """Return p q without the products with zeros."""
     pairs = (
         ((0, 0, 1), (1, 1, -1), (2, 2, -1), (3, 3, -1)),
         ((0, 1, 1), (1, 0, 1), (2, 3, 1), (3, 2, -1)),
@@ -219,17 +218,17 @@ def vertical(q: Sequence[Expression]) -> list[Expression]:
 
 
 def to_body(q: Sequence[Expression], vector: Sequence[Expression]) -> list[Expression]:
-    """Return a vector given in world axes in body axes, for a unit q."""
+    """Return the body components of a vector in world axes, for a unit q."""
     rows = (
         [1 - 2 * (q[2] * q[2] + q[3] * q[3]), 2 * (q[1] * q[2] - q[0] * q[3]), 2 * (q[1] * q[3] + q[0] * q[2])],
         [2 * (q[1] * q[2] + q[0] * q[3]), 1 - 2 * (q[1] * q[1] + q[3] * q[3]), 2 * (q[2] * q[3] - q[0] * q[1])],
         vertical(q),
     )
-    found = [0.0, 0.0, 0.0]
+    total = [0.0, 0.0, 0.0]
     for component, row in zip(vector, rows, strict=True):
         if not is_zero(component):
-            found = [x + component * y for x, y in zip(found, row, strict=True)]
-    return found
+            total = [x + component * y for x, y in zip(total, row, strict=True)]
+    return total
 
 
 def product(matrix: Sequence[Expression], vector: Sequence[Expression]) -> list[Expression]:
@@ -243,5 +242,5 @@ def _sums(a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
 
 
 def is_zero(x: Expression) -> bool:
-    """Return whether an expression is left out of a form."""
+    """Return whether an expression is the constant 0, whose terms are not in a form."""
     return isinstance(x, float) and x == 0

@@ -1,12 +1,13 @@
-"""A scene as heyoka integrates it: which axes, which numbers, and how states become attitudes and rates.
+"""Scenes as heyoka integrates them: axes, parameters, initial state, and the conversion of states to attitudes and rates.
 
-The forms are those of `conservative.references.heyoka_equations.forms`. Source: our own, measured against each other.
+The forms are in `conservative.references.heyoka_equations.forms`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from itertools import pairwise
 from typing import Any
 
@@ -21,10 +22,10 @@ from . import forms
 from .accelerations import express_field, order_axes
 
 _SMALLEST_POLE_DISTANCE = 0.7
-"""Least 1 + n_z at which axis and angle are still taken; nearer to the pole they take more steps than they save products."""
+"""Smallest 1 + n_z for axis and angle. Closer to the pole their additional steps cost more than the products they save."""
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
-"""Turns the world over, for tops that swing below the fixed point."""
+"""Turns the world upside down, for tops that swing below the fixed point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +35,15 @@ class Formulation:
     Attributes
     ----------
     axes
-        Axes F in which it is written.
+        Axes F of the equations.
     form, parameters, start
-        Equations, values of their parameters, state at t = 0.
+        Equations, values of their parameters, initial state.
     readout
-        Attitudes (n, 3, 3) and rates (n, 3) in F from times (n,) and states (n, m).
+        Maps times (n,) and states (n, m) to attitudes (n, 3, 3) and rates (n, 3) in F.
     fast_math
-        Whether it is compiled so that sums may be reordered.
+        Whether the compiler may reorder sums.
     attitudes, R_WD
-        Where R_WF is R_WD times what `attitudes` makes of states (n, m) but their last three, which are the rates: both.
+        If R_WF is R_WD attitudes(states without rates), this function and R_WD; otherwise None and the identity.
     """
 
     axes: Axes
@@ -52,31 +53,31 @@ class Formulation:
     readout: Callable[[Array, Array], tuple[Array, Array]]
     fast_math: bool = False
     attitudes: Callable[[Array], Array] | None = None
-    R_WD: Array = field(default_factory=lambda: np.eye(3))
+    R_WD: Array = dataclass_field(default_factory=lambda: np.eye(3))
 
 
 def body(scene: Scene) -> Formulation:
     """Return quaternion and rates in principal axes."""
-    return _turning(scene, forms.quaternion, to_quaternion, from_quaternion)
+    return _with_attitude(scene, forms.quaternion, to_quaternion, from_quaternion)
 
 
 def base_vectors(scene: Scene) -> Formulation:
     """Return third and first row of the rotation matrix, in world axes whose third is the field's axis, and rates.
 
-    The second row is the cross product of the two; none is tidied up, so that lost orthonormality shows in the samples.
+    The second row is their cross product. The rows are not orthonormalised, so their drift shows in the samples.
     """
-    found = _turning(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), _from_rows)
-    return replace(found, fast_math=True)  # measured: 3 to 7 % less time, where the quaternion takes 2 to 5 % more
+    formulation = _with_attitude(scene, forms.base_vectors, lambda R: R[[2, 0]].ravel(), _from_rows)
+    return replace(formulation, fast_math=True)  # measured: 3 to 7 % less time; for the quaternion 2 to 5 % more
 
 
-def _turning(
+def _with_attitude(
     scene: Scene, attitude: Callable[..., Any], write: Callable[[Array], Array], read: Callable[[Array], Array]
 ) -> Formulation:
-    """Return Euler's equations with those of the attitude, whose state is written from a matrix and read as matrices."""
-    found = express_field(scene)
-    axes, R_WD = found.axes, found.R_WD
-    equations = forms.Turning(attitude, found.acceleration)
-    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *found.turn_D.tolist(), *found.parameters])
+    """Return Euler's equations with those of an attitude that `write` and `read` convert from and to matrices."""
+    field = express_field(scene)
+    axes, R_WD = field.axes, field.R_WD
+    equations = forms.EulerEquations(attitude, field.acceleration)
+    form, parameters = forms.form_of(equations, [*_gyroscopic(axes), *field.turn_D.tolist(), *field.parameters])
 
     def readout(t: Array, states: Array) -> tuple[Array, Array]:
         R = R_WD @ read(states[:, :-3])
@@ -92,13 +93,13 @@ def _from_rows(rows: Array) -> Array:
     (g1, g2, g3), (a1, a2, a3) = rows[:, :3].T, rows[:, 3:].T
     out = np.empty((len(rows), 3, 3))
     out[:, 0], out[:, 2] = rows[:, 3:], rows[:, :3]
-    # Written out: `np.cross` takes as long as some hundred steps of an integration.
+    # Not `np.cross`, which takes as long as a hundred steps of an integration.
     out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = g2 * a3 - g3 * a2, g3 * a1 - g1 * a3, g1 * a2 - g2 * a1
     return out
 
 
 def non_spinning(scene: Scene) -> Formulation:
-    """Return quaternion and momentum of the frame that turns with l/J1; the spin of a symmetric body is in closed form."""
+    """Return quaternion and momentum of the frame that turns at l/J1; the spin of a symmetric body has a closed form."""
     axes = _symmetric(scene)
     u0, spin = _slow_rates(axes)
     form, parameters = forms.form_of(forms.non_spinning, [axes.moment[2] / axes.J[0], u0[2]])
@@ -111,7 +112,7 @@ def non_spinning(scene: Scene) -> Formulation:
 
 
 def lean(scene: Scene) -> Formulation:
-    """Return the form with the fewest products that does the scene."""
+    """Return the formulation with the fewest products."""
     axes = symmetric_axes(scene)
     if axes is None:
         if not scene.free:
@@ -166,25 +167,25 @@ def _gyroscopic(axes: Axes) -> list[float]:
 
 def _symmetric(scene: Scene) -> Axes:
     axes = symmetric_axes(scene)
-    assert axes is not None  # `Heyoka.unsupported` has seen to it
+    assert axes is not None  # checked by `Heyoka.unsupported`
     return axes
 
 
 def _slow_rates(axes: Axes) -> tuple[Array, float]:
-    """Return the rates l/J1 of the slow frame, world axes, and the rate of the body in it, about its axis."""
+    """Return the rates l/J1 of the slow frame, world axes, and the spin of the body in it."""
     J1, _, J3 = axes.J.tolist()
     return axes.R_WF0 @ (axes.J * axes.w0) / J1, (1 - J3 / J1) * float(axes.w0[2])
 
 
 def _body_rates(axes: Axes, R_WF: Array, u12: Array, u3: float) -> Array:
-    """Return body rates (n, 3) from u = l/J1, of which the third component is constant."""
+    """Return body rates (n, 3) from u = l/J1, whose third component is constant."""
     u = np.empty((len(u12), 1, 3))
     u[:, 0, :2], u[:, 0, 2] = u12, u3
     return (u @ R_WF)[:, 0] * (axes.J[0] / axes.J)
 
 
 def _heights(axes: Axes) -> tuple[float, float]:
-    """Return the lowest and highest n_z of a symmetric top: the roots, about the start, of the cubic that is J1^2 n_z'^2."""
+    """Return the lowest and highest n_z of a symmetric top: the roots around its initial value of the cubic J1^2 n_z'^2."""
     (J1, _, J3), M = axes.J.tolist(), float(axes.moment[2])
     n = float(axes.R_WF0[2, 2])
     l3, L3 = float(axes.R_WF0[2] @ (axes.J * axes.w0)), J3 * float(axes.w0[2])
@@ -193,7 +194,7 @@ def _heights(axes: Axes) -> tuple[float, float]:
     roots = np.roots(cubic)
     turning = np.sort(roots[(np.abs(roots.imag) < 1e-6) & (np.abs(roots) < 1)].real)
     ends = np.concatenate([[-1.0], turning, [1.0]])
-    # Where the start is a turning point itself, the motion is on the side on which the cubic is positive; on none if it stays.
+    # If the start is a turning point, the motion is on the side where the cubic is positive, or steady if there is none.
     reached = [
         (low, high)
         for low, high in pairwise(ends)
@@ -203,9 +204,9 @@ def _heights(axes: Axes) -> tuple[float, float]:
 
 
 def _order_axes(axes: Axes) -> Axes:
-    """Return principal axes in another order: the third is one about which a free body's momentum circulates, and L3 > 0.
+    """Return principal axes in the order in which a free body's momentum circulates about the third axis, L3 > 0.
 
-    It is the axis of the largest moment where l^2 > 2 T J_middle, that of the smallest otherwise.
+    The third is the axis of the largest moment if l^2 > 2 T J_middle, of the smallest otherwise.
     """
     L0 = axes.J * axes.w0
     order = np.argsort(axes.J)
@@ -215,7 +216,7 @@ def _order_axes(axes: Axes) -> Axes:
 
 
 def _least(n: Array) -> Array:
-    """Return the least rotations (k, 3, 3) that take e_3 to unit vectors (k, 3), none of them -e_3."""
+    """Return the smallest rotations (k, 3, 3) from e_3 to unit vectors (k, 3), none of which is -e_3."""
     x, y, z = n.T
     a, b = x / (1 + z), y / (1 + z)
     out = np.empty((len(n), 3, 3))

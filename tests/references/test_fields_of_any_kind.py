@@ -13,9 +13,10 @@ from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.grid import Grid
 from conservative.potentials.potential import torque_W
+from conservative.references import precise
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.scipy import SciPy
-from conservative.references.heyoka_equations import formulations, torques
+from conservative.references.heyoka_equations import formulations
 from conservative.references.heyoka_equations.accelerations import READERS, express_field
 from conservative.references.precise import Precise
 from conservative.references.truth import reference
@@ -89,7 +90,7 @@ def test_every_parameter_matters(name):
 
 
 def test_truth_and_engines_know_the_same_fields():
-    assert READERS.keys() == torques.FIELDS.keys() == {type(field) for field in FIELDS.values()}
+    assert READERS.keys() == precise.FIELDS.keys() == {type(field) for field in FIELDS.values()}
 
 
 INTEGRATED = ["gravity", "spring", "attraction", "gradient on another inertia"]

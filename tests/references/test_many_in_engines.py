@@ -8,9 +8,8 @@ from conservative.batch import Batch
 from conservative.benchmarks.studies.ensembles import draw
 from conservative.grid import Grid
 from conservative.references.engine import principal_axes
-from conservative.references.engines import mujoco_versions
+from conservative.references.engines import heyoka, mujoco_versions
 from conservative.references.environments.plain_numbers import ManySamples, describe_many
-from conservative.references.heyoka_equations import batches
 from conservative.references.worker.program import Runs
 
 GRID = Grid(0.01, 50, 20)
@@ -47,7 +46,7 @@ def test_a_body_among_many_moves_as_it_does_alone(name, bodies, allowed):
 
 
 def test_a_batch_that_does_not_get_there_says_so(monkeypatch):
-    monkeypatch.setattr(batches, "STEP_LIMIT", 1)
+    monkeypatch.setattr(heyoka, "STEP_LIMIT", 1)
     block = registry.method(HEYOKA).prepare_many(TOPS, GRID)()
     assert not block.finished.any()
     assert np.isnan(block.R_WB[:, -1]).all()
