@@ -1,12 +1,12 @@
-"""The motion that errors are measured against: from one truth, after another one, independent of it, has agreed.
+"""Reference solutions. Each is checked against a second, independent solution.
 
-    scene                                           the trajectory          what it is checked against
+    scene                                           trajectory              checked against
     free body, Lagrange top, compound pendulum      `Exact`                 `Precise`
     any other field that `Precise` knows            `Precise`               `SciPy` (DOP853, the tightest tolerance)
     a user's own field                              `SciPy` (DOP853)        `SciPy` (LSODA)
 
-The checker's own error is in the agreement: a few rounding units in the first line, some 1e-11 rad in the others, more where a
-motion amplifies errors. Source: our own.
+The difference contains the error of the second solution: a few rounding units in the first line, about 1e-11 rad in the others,
+and more if a motion amplifies errors.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from .exact.method import Exact
 from .precise import Precise
 
 CHECKED_RADIANS = 100.0
-"""A closed form is checked this far into the motion, rad turned: multi-precision integration costs seconds per hundred."""
+"""A closed form is checked over this angle only, rad: multi-precision integration takes seconds for it."""
 CHECKED_SAMPLES = 16
 
 TIGHTEST = 2.3e-14
-"""Relative tolerance for SciPy, which has no smaller one."""
+"""Smallest relative tolerance of SciPy."""
 
 
 class Disagreement(ArithmeticError):
-    """Two truths differ by more than they may. Attributes: `scene`, `names`, `agreement_rad` and `allowed_rad`, in rad."""
+    """Two reference solutions differ by too much. Attributes: `scene`, `names`, `agreement_rad`, `allowed_rad`."""
 
     def __init__(self, scene: str, names: tuple[str, str], agreement_rad: float, allowed_rad: float) -> None:
         self.scene, self.names, self.agreement_rad, self.allowed_rad = scene, names, agreement_rad, allowed_rad
@@ -46,20 +46,20 @@ class Disagreement(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A trajectory to measure against.
+    """A reference solution.
 
     Attributes
     ----------
     trajectory
-        The motion at the samples of the grid.
+        The reference solution at the samples of the grid.
     agreement_rad
-        Largest difference of the two truths over the part checked: of attitudes, rad, or of rates relative to the largest rate.
+        Largest difference of the two solutions over the checked part: of attitudes, rad, or of rates relative to the largest.
     names
-        Who made the trajectory, and who checked it.
+        Labels of the two methods.
     checked_until
-        End of the part checked, s.
+        End of the checked part, s.
     approximate
-        Whether the trajectory is neither a closed form nor multi-precision: then it is known no better than the two agree.
+        Whether the trajectory is neither a closed form nor multi-precision, so that `agreement_rad` bounds its accuracy.
     """
 
     trajectory: Trajectory
@@ -70,14 +70,14 @@ class Truth:
 
 
 def reference(scene: Scene, grid: Grid) -> Truth:
-    """Return the motion of a scene at the samples of a grid, once two independent truths agree.
+    """Return the reference solution of a scene at the samples of a grid.
 
     Raises
     ------
     Disagreement
-        The truths differ by more than round-off and their own errors explain.
+        The two solutions differ by more than round-off and their errors explain.
     MissingEngine
-        A package that a truth needs is not installed.
+        A package that a solution needs is not installed.
     """
     first, second, allowed = _pair(scene)
     trajectory = first.solve(scene, grid)
@@ -86,10 +86,10 @@ def reference(scene: Scene, grid: Grid) -> Truth:
     end, fastest = float(grid.t[-1]), float(np.linalg.norm(trajectory.w_WB_B, axis=-1).max())
     if isinstance(first, Exact):
         until = min(end, CHECKED_RADIANS / fastest) if fastest else end
-        agreement = scene.derive(_agreement, first, second, until)  # grids change more often than scenes
+        agreement = scene.derive(_agreement, first, second, until)  # cached: many grids use one scene
     else:
         until, agreement = end, difference(trajectory, second.solve(scene, grid))
-    # Times are products rounded to double in one truth and not in the other.
+    # Times are products that only one of the solutions rounds to double.
     allowed += np.finfo(float).eps * fastest * until
     names = (first.label, second.label)
     if not agreement <= allowed:
@@ -107,7 +107,7 @@ def difference(a: Trajectory, b: Trajectory) -> float:
 
 
 def _pair(scene: Scene) -> tuple[Method, Method, float]:
-    """Return who makes the trajectory, who checks it, and by how much they may differ, rad."""
+    """Return the method, the method that checks it, and their largest allowed difference, rad."""
     if Exact().unsupported(scene) is None:
         return Exact(), Precise(), 1e-12
     if Precise().unsupported(scene) is None:
@@ -116,6 +116,5 @@ def _pair(scene: Scene) -> tuple[Method, Method, float]:
 
 
 def _agreement(scene: Scene, first: Method, second: Method, until: float) -> float:
-    """Return the difference over the first `until` s."""
     grid = Grid(until / CHECKED_SAMPLES, CHECKED_SAMPLES)
     return difference(first.solve(scene, grid), second.solve(scene, grid))

@@ -1,16 +1,16 @@
 """The motion of a free rigid body in closed form (Jacobi 1849; Whittaker, Analytical Dynamics, 69; van Zon & Schofield 2007).
 
-In principal axes, ordered so that 2 is the middle one and the momentum never leaves the side of +3,
+In principal axes, ordered so that 2 is the intermediate one and the momentum stays on the side of +3,
 
     L = (L1max cn v, L2max sn v, L3max dn v),     v = v0 + Omega t.
 
-With m = L/|L| the attitude against the fixed momentum is R = Rz(2 chi) P(m), where P is the smallest rotation that takes m to
-e_z; m3 > 0 keeps it away from its singularity. Then
+With m = L/|L| the attitude relative to the fixed momentum is R = Rz(2 chi) P(m), where P is the smallest rotation from m to
+e_z, which is regular for m3 > 0. Then
 
     2 chi' = |L|/J3 + (2T/|L| - |L|/J3) / (1 + m3),
 
-whose pole at 1 + m3 = 0, dn v = -|L|/L3max, makes exp(i chi) the phase of exp(i mu t) theta_4(v - i y) with quarter periods
-(K, 2 K') and dc(y, 1 - m) = |L|/L3max.
+Because of its pole at 1 + m3 = 0, dn v = -|L|/L3max, exp(i chi) is the phase of exp(i mu t) theta_4(v - i y) with quarter
+periods (K, 2 K') and dc(y, 1 - m) = |L|/L3max.
 """
 
 from __future__ import annotations
@@ -21,17 +21,29 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .clock import Clock, rotation_clock
-from .digits import Number, mp
-from .start import Matrix, Start, Vector, as_array, cross, from_halves, halves_in_double, multiply, norm
+from .digits import (
+    Clock,
+    Matrix,
+    Number,
+    Vector,
+    as_array,
+    cross,
+    from_halves,
+    halves_in_double,
+    mp,
+    multiply,
+    norm,
+    rotation_clock,
+)
+from .start import Start
 from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
 
 
 @dataclass(frozen=True, eq=False)
-class Polhode:
-    """Moments and momentum in axes 1, 2, 3 as above, and what follows from them by sums of terms of one sign.
+class OrderedAxes:
+    """Moments and momentum in axes 1, 2, 3 as above, and quantities that are sums of terms of one sign.
 
-    `R_BP` has the axes as columns, turned so that L1 and L3 are not negative.
+    The columns of `R_BP` are the axes, with L1 and L3 not negative.
     """
 
     J: Vector
@@ -39,7 +51,7 @@ class Polhode:
     R_BP: Matrix
 
     def gap(self, i: int, j: int) -> Number:
-        """Return 1/J_i - 1/J_j; gaps of rising indices have one sign."""
+        """Return 1/J_i - 1/J_j, which has the same sign for all i < j."""
         return (self.J[j] - self.J[i]) / (self.J[i] * self.J[j])
 
     @property
@@ -49,7 +61,7 @@ class Polhode:
 
     @property
     def excess(self) -> Number:
-        """2T - |L|^2/J3, of the sign of the gaps."""
+        """2T - |L|^2/J3, which has the sign of the gaps."""
         return self.L[0] ** 2 * self.gap(0, 2) + self.L[1] ** 2 * self.gap(1, 2)
 
     @property
@@ -60,17 +72,17 @@ class Polhode:
 
     @property
     def lattice(self) -> Lattice:
-        """Periods of L in v; 1 - m = (L3min/L3max)^2 is 0 on the separatrix."""
+        """Periods of L in v. 1 - m = (L3min/L3max)^2 is 0 on the separatrix."""
         L2max, L3max = self.largest[1:]
         m = (L2max / L3max) ** 2 * self.gap(0, 1) / self.gap(0, 2)
-        # L3min^2 is the one difference. Without a division it is exact, so that the separatrix itself gives 0.
+        # L3min^2 is the only difference. Without divisions it is exact, so it is 0 on the separatrix.
         (J1, J2, J3), (L1, _, L3) = self.J, self.L
         least = (J1 * (J3 - J2) * L3**2 - J3 * (J2 - J1) * L1**2) / (J1 * (J3 - J2))
         return Lattice.of(m, max(least / L3max**2, mp.mpf(0)))
 
 
-def polhode(start: Start) -> Polhode:
-    """Return the start in ordered axes. The sign of |L|^2 - 2 T J2 says which of the outer axes the momentum goes around."""
+def order_axes(start: Start) -> OrderedAxes:
+    """Return the initial state in ordered axes. The sign of |L|^2 - 2 T J2 determines the axis that the momentum circles."""
     J, axes = start.principal
     w = start.rates(axes)
     a, b, c = sorted(range(3), key=lambda i: J[i])
@@ -81,12 +93,12 @@ def polhode(start: Start) -> Polhode:
     columns[1] = cross(columns[2], columns[0])
     R_BP = mp.matrix(columns).T
     moments = [J[i] for i in order]
-    return Polhode(moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP)
+    return OrderedAxes(moments, [j * w for j, w in zip(moments, start.rates(R_BP), strict=True)], R_BP)
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """A free motion ready to be evaluated: shape of the polhode, clocks and theta functions."""
+    """A free motion: shape of the polhode, phases and theta functions."""
 
     size: Number
     largest: Array
@@ -114,8 +126,8 @@ class FreeMotion:
 
 
 def free_motion(start: Start) -> FreeMotion:
-    """Return the motion from a start that is not steady."""
-    axes = polhode(start)
+    """Return the motion of an initial state that is not steady."""
+    axes = order_axes(start)
     J, L, size, largest, lattice = axes.J, axes.L, axes.size, axes.largest, axes.lattice
     omega = axes.gap(0, 2) * largest[0] * largest[2] / largest[1]
     cn, sn, dn = (a / b for a, b in zip(L, largest, strict=True))
@@ -140,10 +152,10 @@ def free_motion(start: Start) -> FreeMotion:
     )
 
 
-def pole_phase(axes: Polhode, lattice: Lattice) -> Theta:
+def pole_phase(axes: OrderedAxes, lattice: Lattice) -> Theta:
     """Return theta_4(v - i y) with quarter periods (K, 2 K').
 
-    K' - y = A F(1 - A^2, 1 - A^2 (1 - m), 1) with Carlson's F and A = L3max/|L|, which also holds where K' is infinite.
+    K' - y = A F(1 - A^2, 1 - A^2 (1 - m), 1) with Carlson's F and A = L3max/|L|, also if K' is infinite.
     """
     L1max, L2max, L3max = (x / axes.size for x in axes.largest)
     m_part = L2max**2 * axes.gap(0, 1) / axes.gap(0, 2)  # A^2 m
@@ -153,7 +165,7 @@ def pole_phase(axes: Polhode, lattice: Lattice) -> Theta:
 
 
 def smallest_rotation(m: Vector) -> Matrix:
-    """Return the smallest rotation that takes the unit vector m, m3 > -1, to e_z."""
+    """Return the smallest rotation from the unit vector m, m3 > -1, to e_z."""
     x, y, z = m
     k = 1 / (1 + z)
     return mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])

@@ -1,19 +1,19 @@
 """The Lagrange top in closed form (Klein & Sommerfeld, Theorie des Kreisels, VI; Whittaker, Analytical Dynamics, 72).
 
-Axis 3 is the body's, on the side of the centre of mass; R = Rz(phi) Rx(theta) Rz(psi), u = cos theta. With k = m g l/J1,
+Axis 3 points from the fixed point to the centre of mass; R = Rz(phi) Rx(theta) Rz(psi), u = cos theta. With k = m g l/J1,
 b_z = L_z/J1, b3 = L3/J1, w = w1 + i w2, u_E = u + |w|^2/(2 k) (constant)
 
     u'^2 = 2 k (u_E - u)(1 - u^2) - (b_z - b3 u)^2 = 2 k (u - u1)(u2 - u)(u3 - u)
     u = u1 + (u2 - u1) sn^2 v,     v = v0 + Omega t,     Omega^2 = k (u3 - u1)/2
 
-Euler's angles are singular at the poles u = -1 and 1. The Cayley-Klein parameters and the transverse rate are not. Each of
+Euler angles are singular at the poles u = -1 and 1. The Cayley-Klein parameters and the transverse rate are not. Each of
 
     alpha = cos(theta/2) exp(i (phi + psi)/2)     alpha'/alpha = ( u' + i (b_z + b3)) / (2 (u + 1)) + i (w3 - b3)/2
     beta  = sin(theta/2) exp(i (phi - psi)/2)     beta'/beta   = (-u' + i (b_z - b3)) / (2 (1 - u)) - i (w3 - b3)/2
     w                                             w'/w         = (-u' - i (b_z - b3 u_E)) / (2 (u_E - u)) - i (w3 - b3/2)
 
-is a constant times exp(i mu t) theta_j(v - i y)/theta_4(v), with j = 1 for alpha and 2 for the others: it vanishes where u, as
-a function of complex time, is -1, 1 or u_E. A passage next to a pole, or through it, is a theta function next to its zero.
+is a constant times exp(i mu t) theta_j(v - i y)/theta_4(v), with j = 1 for alpha and 2 for the others, and vanishes where u
+as a function of complex time is -1, 1 or u_E. A passage close to a pole, or through it, is a theta function near its zero.
 """
 
 from __future__ import annotations
@@ -25,21 +25,35 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .clock import Clock, rotation_clock
-from .digits import Number, mp
-from .start import SYMMETRIC, Matrix, Start, as_array, cross, from_halves, halves, halves_in_double, multiply, root, unit
-from .theta import ComplexArray, Lattice, Points, Quotient, jacobi, quotient
+from .digits import (
+    Clock,
+    ComplexArray,
+    Matrix,
+    Number,
+    as_array,
+    cross,
+    from_halves,
+    halves,
+    halves_in_double,
+    mp,
+    multiply,
+    root,
+    rotation_clock,
+    unit,
+)
+from .start import SYMMETRIC, Start
+from .theta import Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
-"""Roots of the cubic closer than this are one: its double roots come out with half of the 150 digits."""
+"""Difference of roots of the cubic that are equal: double roots have half of the 150 digits."""
 
 _UPRIGHT = mp.mpf(10) ** -24
-"""A tilt or a swing, rad, below which the axis is taken as vertical for good; the digits of the cubic end there."""
+"""Tilt or swing, rad, below which the axis stays vertical: the round-off of the cubic is as large."""
 
 
 @dataclass(frozen=True, eq=False)
 class Top:
-    """A top at its start, in many digits; symbols as above, `spin` is w3, `R_BP` has the top's axes as columns."""
+    """The initial state of a top; symbols as above, `spin` is w3, the columns of `R_BP` are the axes of the top."""
 
     k: Number
     b3: Number
@@ -66,7 +80,7 @@ class Top:
 
     @property
     def u_E(self) -> Number:
-        """Where the transverse rate would vanish."""
+        """The value of u at which the transverse rate vanishes."""
         return self.u + abs(self.w) ** 2 / (2 * self.k)
 
     @property
@@ -76,7 +90,7 @@ class Top:
 
     @property
     def upright(self) -> bool:
-        """Whether it stands or hangs without moving its axis."""
+        """Whether the axis stands or hangs at rest."""
         return bool(abs(self.across) < _UPRIGHT and abs(self.w) < _UPRIGHT * mp.sqrt(self.k))
 
     @property
@@ -91,13 +105,13 @@ class Top:
 
 
 def top(start: Start, moment_B: Array, axis_B: Array) -> Top:
-    """Return the top of a body symmetric about `axis_B`, to which the moment m g c is parallel."""
+    """Return the top of a body symmetric about `axis_B`, which is parallel to the moment m g c."""
     moments, axes = start.principal
     moment = mp.matrix([mp.mpf(float(x)) for x in moment_B])
     third = max(range(3), key=lambda i: abs(sum(axes[row, i] * float(axis_B[row]) for row in range(3))))
     J3, J1 = moments[third], (moments[third - 1] + moments[third - 2]) / 2
     axis = axes[:, third]
-    if spherical(start):  # every axis is one of symmetry: take the one through the centre of mass
+    if spherical(start):  # all axes are axes of symmetry: the one through the centre of mass
         J1 = J3 = sum(moments) / 3
         axis = moment / mp.norm(moment)
     lever = (axis.T * moment)[0]
@@ -108,13 +122,13 @@ def top(start: Start, moment_B: Array, axis_B: Array) -> Top:
 
 
 def spherical(start: Start) -> bool:
-    """Whether the three moments differ by no more than rounding."""
+    """Whether the three moments are equal up to round-off."""
     moments = start.principal[0]
     return bool(max(moments) - min(moments) <= SYMMETRIC * max(moments))
 
 
 def frame(axis: Matrix, near: Matrix) -> Matrix:
-    """Return the rotation whose third column is a unit vector and whose first is as `near` another one as can be."""
+    """Return the rotation whose third column is the unit vector `axis` and whose first is as close as possible to `near`."""
     helpers = [near, *(mp.eye(3)[:, i] for i in range(3))]
     first = next(rest for rest in (x - axis * (axis.T * x)[0] for x in helpers) if mp.norm(rest) > 0.5)
     first = first / mp.norm(first)
@@ -124,7 +138,7 @@ def frame(axis: Matrix, near: Matrix) -> Matrix:
 
 @dataclass(frozen=True, eq=False)
 class Nutation:
-    """The roots u1 <= u2 <= 1 <= u3 and what the theta functions need of them."""
+    """The roots u1 <= u2 <= 1 <= u3, and the arguments of the theta functions."""
 
     u1: Number
     u2: Number
@@ -169,7 +183,7 @@ def nutation(start: Top) -> Nutation:
 
 
 def snap_to_marks(u: Number, marks: tuple[Number, ...]) -> Number:
-    """Return the mark that a root equals up to rounding, or the root."""
+    """Return the mark that equals a root up to round-off, or the root."""
     return next((mark for mark in marks if abs(u - mark) < _SAME), u)
 
 
@@ -181,14 +195,14 @@ class Factor:
     shape: Quotient
 
     def at(self, t: Array, points: Points) -> ComplexArray:
-        """Return the factor (n,)."""
+        """Return the factor (n,) at times t."""
         return self.clock.phasor(t) * points.quotient(self.shape)
 
 
 def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, start: Number, slope: Number) -> Factor:
-    """Return the factor whose phase turns at `rate` where the argument is v, and that starts at v0 with a value and a slope.
+    """Return the factor with the phase rate `rate` at v and with the initial value `start` and slope at v0.
 
-    The constant is taken from the larger of the two: a factor may start next to its zero.
+    The larger of the two determines the constant, because the initial value can be near a zero.
     """
     value, derivative = shape.value_and_slope(v)
     mu = rate - omega * (derivative / value).imag
@@ -199,7 +213,7 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
 
 @dataclass(frozen=True, eq=False)
 class TopMotion:
-    """A motion ready to be evaluated."""
+    """The motion of a top: phases and theta functions."""
 
     argument: Clock
     lattice: Lattice
@@ -222,12 +236,12 @@ class TopMotion:
 
 
 def top_motion(start: Top) -> TopMotion:
-    """Return the motion from a start that is not upright."""
+    """Return the motion of an initial state that is not upright."""
     roots = nutation(start)
     lattice, u_E = roots.lattice, max(min(start.u_E, roots.u3), roots.u2)
     omega = mp.sqrt(start.k * (roots.u3 - roots.u1) / 2)
     v0 = roots.start(start.u, start.rising)
-    v = mp.mpf(1)  # anywhere that no factor vanishes, |v| < K
+    v = mp.mpf(1)  # any |v| < K at which no factor vanishes
     u = roots.u1 + (roots.u2 - roots.u1) * jacobi(lattice)[0].value_and_slope(v)[0].real ** 2
     plus, minus, across = start.b_z + start.b3, start.b_z - start.b3, start.b3 * u_E - start.b_z
     slip = (start.spin - start.b3) / 2

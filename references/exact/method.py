@@ -1,9 +1,8 @@
-"""Exact solutions: the free rigid body and the Lagrange top, at any times at once.
+"""Exact solutions of the free rigid body (Jacobi) and the Lagrange top (Klein & Sommerfeld) at any times.
 
-Each time costs the same, however late. What belongs to the motion as a whole is prepared in 500 bits, and the samples are sums
-of a few exponentials in double precision; `conservative.references.exact.theta` says why neither a separatrix nor a pole harms
-them. The inputs are taken as exact numbers: what the functions return is the solution of the problem as handed in, rounded.
-Sources: Jacobi for the free body, Klein & Sommerfeld for the top; see the functions.
+The cost of a sample does not depend on its time. Constants of the motion are prepared in 500 bits, and samples are sums of a
+few exponentials in double precision, accurate also near a separatrix or a pole: see `conservative.references.exact.theta`.
+Arguments are taken as exact numbers, so the result is the rounded solution of exactly this problem.
 """
 
 from __future__ import annotations
@@ -31,26 +30,25 @@ from conservative.trajectory import Bounds, Counters, Trajectory
 from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
-from .motion import ClosedForm, in_blocks, steady_turn
-from .start import Start
+from .start import ClosedForm, Start, in_blocks, steady_turn
 
 
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
     """Return the exact motion of a free rigid body.
 
-    Any body: asymmetric, symmetric or spherical, in principal or other axes. Any start: the separatrix and its neighbourhood
-    too.
+    The body can be asymmetric, symmetric or spherical, in principal or other axes. The initial state can be on or near the
+    separatrix.
 
     Parameters
     ----------
     body
         The body.
     R_WB0
-        Attitude at t = 0: a rotation matrix (3, 3), body to world. Taken as the unit quaternion next to it.
+        Attitude at t = 0: a rotation matrix (3, 3), body to world. The nearest unit quaternion is taken as exact.
     w_WB_B0
         Rates at t = 0 (3,), rad/s, body axes.
     t
-        Times (n,), s, of either sign and in any order; other shapes come back in front of (3, 3) and (3,).
+        Times (n,), s, of either sign and in any order. Other shapes (...) give results (..., 3, 3) and (..., 3).
 
     Returns
     -------
@@ -66,8 +64,8 @@ def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLik
 
     Notes
     -----
-    Jacobi's solution, split as by van Zon & Schofield, J. Comput. Phys. 225 (2007) 145, with a theta function in place of the
-    elliptic integral of the third kind; formulas in `conservative.references.exact.free_body`.
+    Jacobi's solution as in van Zon & Schofield, J. Comput. Phys. 225 (2007) 145, with a theta function instead of the elliptic
+    integral of the third kind; formulas in `conservative.references.exact.free_body`.
     """
     start, times = _start(body, R_WB0, w_WB_B0), _times(t)
     with MP_LOCK:
@@ -79,15 +77,15 @@ def lagrange_top(
 ) -> tuple[Array, Array]:
     """Return the exact motion of a symmetric body in uniform gravity, its centre of mass on the axis of symmetry.
 
-    Any start: nutating, steady, sleeping, without spin, hanging, inverted, next to a pole or through it. A spherical body may
-    have its centre of mass anywhere; without weight or lever any body is a free one.
+    The top can nutate, precess steadily, sleep, hang, stand inverted, have no spin, and pass close to a pole or through it. A
+    spherical body can have its centre of mass anywhere. Without weight or lever arm the body is free.
 
     Parameters
     ----------
     body
-        The body. Two moments are taken as equal, and the centre of mass as on the axis, where they are so to 1e-12.
+        The body. Its moments are equal, and its centre of mass is on the axis, to 1e-12.
     potential
-        The field; weight and lever of either sign.
+        The field; weight and lever arm of either sign.
     R_WB0, w_WB_B0, t
         Attitude (3, 3) and rates (3,), rad/s, at t = 0, and times (n,), s, as in `free_body`.
 
@@ -123,7 +121,7 @@ def lagrange_top(
 class Exact(Method):
     """The closed form of a free body, a Lagrange top or a compound pendulum; dt is only the distance of samples.
 
-    A pendulum is any body that swings about a principal axis, exactly horizontal, with its centre of mass exactly in the plane.
+    A compound pendulum swings about a principal axis that is exactly horizontal, with its centre of mass exactly in the plane.
     """
 
     family: ClassVar[str] = "exact"
@@ -158,7 +156,7 @@ class Exact(Method):
 
 
 def _pendulum(scene: Scene) -> RigidBody | None:
-    """Return the spherical body that moves as a pendulum does: with the moment about its axis all round; None for others."""
+    """Return the spherical body that moves like a pendulum, with the moment about its axis; None for other scenes."""
     field, body = scene.potential, scene.body
     if not isinstance(field, UniformGravity):
         return None
@@ -194,14 +192,13 @@ def _motion(start: Start, potential: AnyPotential | None) -> ClosedForm:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
         return _free_motion(start)
-    begun = top(start, potential.moment_B, axis)
-    return steady_turn(start) if begun.upright else top_motion(begun)
+    initial = top(start, potential.moment_B, axis)
+    return steady_turn(start) if initial.upright else top_motion(initial)
 
 
 def _times(t: ArrayLike) -> Array:
-    found = real_array(t)  # what is no array of numbers is refused below
-    shape = () if found is None else found.shape
-    return finite_array("t", t, (shape,), "finite times (n,), s")
+    array = real_array(t)  # None if t is not an array of numbers, which the next line reports
+    return finite_array("t", t, (() if array is None else array.shape,), "finite times (n,), s")
 
 
 def _evaluate(motion: ClosedForm, times: Array) -> tuple[Array, Array]:

@@ -1,11 +1,11 @@
-"""Quotients of theta functions, prepared in many digits and evaluated in double precision.
+"""Quotients of theta functions, prepared in 500 bits and evaluated in double precision.
 
-The exact motions are made of constants times `exp(i mu t) theta_j(v - i y) / theta_4(v)`, v linear in time. The series of a
-theta function (DLMF 20.2) converges fast where its nome is small; elsewhere Jacobi's imaginary transformation (DLMF
-20.7(viii)) trades the nome for the complementary one, which turns circular functions into hyperbolic ones. One of the two
-nomes never exceeds exp(-pi) = 0.043, so that five terms give double precision, for every modulus from 0 to 1, both included.
+Exact motions consist of constants times `exp(i mu t) theta_j(v - i y) / theta_4(v)`, v linear in time. The series of a theta
+function (DLMF 20.2) converges fast for a small nome. For a large one, Jacobi's imaginary transformation (DLMF 20.7(viii))
+replaces the nome by the complementary one, and circular by hyperbolic functions. The smaller of the two never exceeds
+exp(-pi) = 0.043, so five terms give double precision for every modulus from 0 to 1 inclusive.
 
-No difference of nearly equal numbers is formed on the way: what could cancel is prepared by `mp`, 500 bits wide, once a motion.
+Double precision forms no difference of nearly equal numbers: whatever could cancel is prepared in 500 bits, once per motion.
 """
 
 from __future__ import annotations
@@ -15,22 +15,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from conservative.attitude import Array
 
-from .digits import Number, mp
+from .digits import ComplexArray, Number, mp
 
-ComplexArray = NDArray[np.complex128]
-
-_BITS_KEPT = 600  # of a series, beside its first term: more than `mp` has
+_BITS_KEPT = 600  # of a series, relative to its first term: more than those of `mp`
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Quarter periods K (real) and K' (imaginary) of an elliptic function; either may be infinite.
+    """Quarter periods K (real) and K' (imaginary) of an elliptic function. Either can be infinite.
 
-    With w = s v the series run in exp(2 w). `hyperbolic` says that K' < K, so that s = pi/(2 K') is real and the nome the
+    The series are in powers of exp(2 w), w = s v. If `hyperbolic`, K' < K, s = pi/(2 K') is real and the nome is the
     complementary one; otherwise s = i pi/(2 K).
     """
 
@@ -39,7 +36,7 @@ class Lattice:
 
     @classmethod
     def of(cls, m: Number, m_complement: Number) -> Lattice:
-        """Return the lattice of the parameter m and 1 - m, both given so that neither need be formed by subtraction."""
+        """Return the lattice of the parameter m and 1 - m; both are arguments because a subtraction would lose digits."""
         return cls(_quarter_period(m_complement), _quarter_period(m))
 
     @cached_property
@@ -59,13 +56,13 @@ class Lattice:
 
     @cached_property
     def terms(self) -> int:
-        """How many terms of a series count: their size falls like nome^(n (n - 1))."""
+        """Number of terms of a series that matter: their size decreases like nome^(n (n - 1))."""
         bits = -mp.log(self.nome, 2) if self.nome > 0 else mp.inf
         return 2 + int(mp.ceil(mp.sqrt(_BITS_KEPT / bits)))
 
     @cached_property
     def theta_4(self) -> Theta:
-        """theta_4(v), below every quotient."""
+        """theta_4(v), the denominator of every quotient."""
         return theta(self, 4, mp.mpf(0), self.K_prime)
 
     @cached_property
@@ -98,8 +95,8 @@ def _quarter_period(m_complement: Number) -> Number:
 class Theta:
     """A multiple of exp(i kappa v) theta_j(v - i y), as the series sum rising[n] exp(2 n w) + sum falling[n] exp(-2 n w).
 
-    `half` says that the series has odd exponents, (2 n + 1) w: then exp(w) is divided out. `odd` is the sign c in
-    f(-v - i y) = c conj(f(v - i y)) for real v, by which hyperbolic series are only ever summed for v >= 0.
+    If `half`, the series has odd exponents, (2 n + 1) w, and exp(w) is divided out. `odd` is the sign c in
+    f(-v - i y) = c conj(f(v - i y)) for real v. It lets hyperbolic series be summed for v >= 0 only.
     """
 
     lattice: Lattice
@@ -130,11 +127,10 @@ class Theta:
 
 
 def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
-    """Return a multiple of theta_j(v - i y), j = `number`, 0 <= y <= K', with y_rest = K' - y given beside it.
+    """Return a multiple of theta_j(v - i y), j = `number`, for 0 <= y <= K' and y_rest = K' - y.
 
-    Formula: DLMF 20.2.1 to 20.2.4, transformed by 20.7.30 to 20.7.33 where the lattice is hyperbolic. There theta_1 and theta_3
-    stay, theta_2 and theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), leaves
-    kappa.
+    Formula: DLMF 20.2.1 to 20.2.4, transformed by 20.7.30 to 20.7.33 if the lattice is hyperbolic. There theta_2 and
+    theta_4 change places, and the factor exp(-pi v^2 / (4 K K')), relative to that of theta_4(v), gives kappa.
     """
     hyperbolic = lattice.hyperbolic
     series = {2: 4, 4: 2}.get(number, number) if hyperbolic else number
@@ -154,7 +150,7 @@ def theta(lattice: Lattice, number: int, y: Number, y_rest: Number) -> Theta:
 
 @dataclass(frozen=True, eq=False)
 class Quotient:
-    """scale exp(i kappa v) theta_j(v - i y) / theta_4(v); the conjugate before scaling where `mirrored`, for y < 0."""
+    """scale exp(i kappa v) theta_j(v - i y) / theta_4(v). If `mirrored`, for y < 0, its conjugate before scaling."""
 
     above: Theta
     below: Theta
@@ -177,7 +173,7 @@ class Quotient:
         return self.scale * value, self.scale * slope
 
     def _lift(self, v: Number) -> tuple[Number, Number]:
-        """Return the quotient of the factors exp(w) that the two series leave out, and its derivative."""
+        """Return the quotient of the factors exp(w) that are not in the two series, and its derivative."""
         if self.above.half == self.below.half:
             return mp.mpf(1), mp.mpf(0)
         lattice = self.above.lattice
@@ -189,7 +185,7 @@ class Quotient:
 
 
 def quotient(lattice: Lattice, number: int, y: Number = 0, y_rest: Number | None = None, mirrored: bool = False) -> Quotient:
-    """Return a multiple of theta_j(v - i y) / theta_4(v), with + i y where `mirrored`."""
+    """Return a multiple of theta_j(v - i y) / theta_4(v), with + i y if `mirrored`."""
     rest = lattice.K_prime if y_rest is None else y_rest
     return Quotient(theta(lattice, number, mp.mpf(y), rest), lattice.theta_4, mirrored)
 
@@ -235,7 +231,7 @@ class Points:
 
 
 def _polynomial(coefficients: tuple[Number, ...], x: Any) -> Any:
-    """Return sum c[n] x^n for |x| <= 1, leaving out what is below a rounding unit."""
+    """Return sum c[n] x^n for |x| <= 1, without the terms below a rounding unit."""
     numbers = np.array([complex(c) for c in coefficients])
     used = 1 + int(np.max(np.flatnonzero(np.abs(numbers) > 1e-18), initial=0))
     if not np.any(numbers.imag):

@@ -26,7 +26,7 @@ from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
-from conservative.references.exact.motion import _BLOCK
+from conservative.references.exact.start import _BLOCK
 from conservative.references.precise import Precise
 from conservative.scenes.tops import cone
 from conservative.trajectory import Counters

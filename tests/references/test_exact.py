@@ -16,8 +16,7 @@ from conservative.attitude import angle_between, from_quaternion, orthonormality
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.invariants import energy, momentum_W
-from conservative.references.exact.clock import Clock, rotation_clock
-from conservative.references.exact.digits import mp
+from conservative.references.exact.digits import Clock, mp, rotation_clock
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.references.exact.theta import Lattice, Points, jacobi
 
