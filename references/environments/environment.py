@@ -36,18 +36,18 @@ class MissingEnvironment(MissingEngine):
 
 @dataclass(frozen=True)
 class Distribution:
-    """What is installed for an engine.
+    """The package of an engine.
 
     Attributes
     ----------
     package
-        Its name where packages come from, with extras where it needs some.
+        Name in the package index, with extras.
     module
-        What is imported of it.
+        Module to import.
     requirements
-        What it needs beside NumPy, such as `numpy<2`.
+        Requirements other than NumPy, such as `numpy<2`.
     oldest
-        Oldest version that its adapter is meant for; where no version is asked for, none below it is taken.
+        Oldest version that is installed unless another one is named.
     """
 
     package: str
@@ -57,31 +57,23 @@ class Distribution:
 
 
 def distribution_of(engine: str) -> Distribution:
-    """Return what is installed for an engine.
-
-    Raises
-    ------
-    BadInput
-        The engine is unknown.
-    NotLoadable
-        It is registered, but importing what is registered fails.
-    """
-    found: Distribution = registry.engine(engine).distribution
-    return found
+    """Return the package of an engine. Raise as `conservative.registry.engine`."""
+    distribution: Distribution = registry.engine(engine).distribution
+    return distribution
 
 
 Key = tuple[tuple[int, int, str], ...]
 
 
 def version_key(version: str) -> Key:
-    """Return what sorts versions: numbers by value, and 4.0.0rc1 before 4.0.0."""
+    """Return a key that sorts versions: numbers by value, and 4.0.0rc1 before 4.0.0."""
     parts = re.findall(r"\d+|[a-z]+", version.lower().partition("+")[0])
     keys = [(1, int(part), "") if part.isdigit() else (2 if part == "post" else -1, 0, part) for part in parts]
     return (*keys, (0, 0, ""))
 
 
 def describe_versions(version: str, known: list[str]) -> str:
-    """Return what to say is allowed instead of a version that does not exist: the nearest one first."""
+    """Describe the versions that exist, the nearest one first."""
     if not known:
         return "a version that exists"
     newest = sorted(known, key=version_key, reverse=True)
@@ -90,9 +82,9 @@ def describe_versions(version: str, known: list[str]) -> str:
 
 
 RECORD, LOCK = "record.json", "lock.txt"
-"""What is written last into an environment, and the versions of all that is in it, with their hashes."""
+"""File that is written last into an environment, and file with the versions and hashes of all packages."""
 BUILD = "build."
-"""What the local part of a version has where an environment is that of a build, such as 4.0.1+build.1a2b3c4d."""
+"""Mark of builds in the local part of a version, such as 4.0.1+build.1a2b3c4d."""
 
 
 @dataclass(frozen=True)
@@ -177,13 +169,7 @@ def interpreter_of(folder: Path) -> Path:
 
 
 def folder_of_all() -> Path:
-    """Return the folder of all environments; it need not be there.
-
-    Raises
-    ------
-    MissingExtra
-        platformdirs, of the extra `environments`, is not installed.
-    """
+    """Return the folder of all environments, which may not exist. Raise `MissingExtra` if platformdirs is not installed."""
     require_extra("engines in environments", "environments", "platformdirs")
     from platformdirs import user_cache_path
 
@@ -191,45 +177,39 @@ def folder_of_all() -> Path:
 
 
 def folder_of_projects() -> Path:
-    """Return the folder of the environments of projects (`projects`); it need not be there. Raises `MissingExtra` as above."""
+    """Return the folder of the environments of projects (see `projects`), which may not exist."""
     return folder_of_all().parent / "projects"
 
 
 def temporary_folder() -> Path:
-    """Return the folder of what does not last; it is made where it is not there."""
+    """Return the folder of temporary files, created if it does not exist."""
     folder = folder_of_all() / "temporary"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 def read_environment(folder: Path) -> Environment | None:
-    """Return the environment in a folder; None where there is none, or none that is whole."""
+    """Return the environment in a folder; None if there is no complete one."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        found = Environment(record["engine"], record["version"], folder, record["python"], tuple(record["packages"]))
+        environment = Environment(record["engine"], record["version"], folder, record["python"], tuple(record["packages"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return found if (found.engine, found.version) == (folder.parent.name, folder.name) else None
+    return environment if (environment.engine, environment.version) == (folder.parent.name, folder.name) else None
 
 
 def list_environments(engine: str | None = None) -> tuple[Environment, ...]:
-    """Return the environments of an engine, or all, that are whole: by name, older versions first."""
+    """Return the complete environments of an engine, or of all: by name, older versions first."""
     folders = folder_of_all().glob("*/[!.]*")
-    found = [environment for folder in folders if (environment := read_environment(folder))]
-    mine = [environment for environment in found if engine in (None, environment.engine)]
-    return tuple(sorted(mine, key=lambda each: (each.engine, version_key(each.version))))
+    environments = [environment for folder in folders if (environment := read_environment(folder))]
+    chosen = [environment for environment in environments if engine in (None, environment.engine)]
+    return tuple(sorted(chosen, key=lambda each: (each.engine, version_key(each.version))))
 
 
 def find_environment(engine: str, version: str = "") -> Environment:
-    """Return the environment of a version of an engine, by default of the newest release that is installed.
-
-    Raises
-    ------
-    MissingEnvironment
-        There is none.
-    """
-    found = list_environments(engine)
-    matching = [each for each in found if each.version == version or (not version and not each.is_build)]
+    """Return the environment of a version, by default of the newest installed release. Raise `MissingEnvironment`."""
+    environments = list_environments(engine)
+    matching = [each for each in environments if each.version == version or (not version and not each.is_build)]
     if not matching:
-        raise MissingEnvironment(engine, version, tuple(environment.version for environment in found))
+        raise MissingEnvironment(engine, version, tuple(environment.version for environment in environments))
     return matching[-1]

@@ -1,11 +1,13 @@
-"""Make and remove environments. One that is being made lies elsewhere, and gets its name when it is whole."""
+"""Create and remove environments of releases and of builds. A new environment gets its name only when it is complete."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +18,7 @@ from conservative.files import remove_leftovers, temporary
 
 from ..worker.client import EngineCrashed, EngineTimeout
 from .environment import (
+    BUILD,
     LOCK,
     Distribution,
     Environment,
@@ -29,25 +32,18 @@ from .environment import (
     list_environments,
     read_environment,
     temporary_folder,
+    version_key,
     worker_of,
 )
-from .lock import Lock, Source, find_python, resolve, split_requirement
+from .lock import Lock, Source, find_python, list_versions, normal_name, resolve, resolve_wheel, split_requirement
 from .uv_command import UvFailed, run_uv
+
+_EPOCH = "315532800"  # 1980, the first date in zip files, so that the same sources give the same wheel
 
 
 @dataclass(frozen=True)
 class Installation:
-    """An environment after it was asked for.
-
-    Attributes
-    ----------
-    environment
-        The environment.
-    new
-        Whether it was made now.
-    trouble
-        Why its engine cannot be imported; empty if it can.
-    """
+    """An environment, whether it is new, and why its engine cannot be imported (empty if it can)."""
 
     environment: Environment
     new: bool
@@ -55,47 +51,135 @@ class Installation:
 
 
 def install(requirement: str, source: Source | None = None, force: bool = False) -> Installation:
-    """Return the environment of `NAME` or `NAME==VERSION`, made if it is not there.
+    """Return the environment of `NAME` or `NAME==VERSION`, created if it does not exist.
 
-    With `force` an environment that is there is made again with the same packages, from its lock. It is replaced when the new
-    one is complete.
+    With `force` an existing environment is created again with the same packages, from its lock. The old one is replaced when
+    the new one is complete.
 
     Raises
     ------
     BadInput
-        The engine or the version is unknown, has no wheel for a Python of this machine, or cannot be had here and now.
+        The engine or the version is unknown, has no wheel for a Python on this machine, or is not available here and now.
     """
     source = source or Source()
     engine, version = split_requirement(requirement)
     distribution = distribution_of(engine)
     clear_leftovers()
     try:
-        there = find_environment(engine, version) if force else None
+        old = find_environment(engine, version) if force else None
     except MissingEnvironment:
-        there = None
-    if there is not None:
-        lock = Lock(there.version, find_python(there.python), (there.folder / LOCK).read_text(encoding="utf-8"))
-    else:
-        lock = resolve(distribution, version, source)
-    folder = folder_of_all() / engine / lock.version
-    found = None if force else read_environment(folder)
-    environment = found or make(engine, lock, folder, source)
-    return Installation(environment, found is None, import_trouble(environment, distribution))
+        old = None
+    lock = resolve(distribution, version, source) if old is None else _read_lock(old)
+    return _install(engine, distribution, lock, source, force)
 
 
-def check(requirement: str) -> None:
-    """Check that a requirement can be read and its engine is known. Raise `BadInput` if not."""
-    distribution_of(split_requirement(requirement)[0])
+def _read_lock(environment: Environment) -> Lock:
+    try:
+        text = (environment.folder / LOCK).read_text(encoding="utf-8")
+    except OSError:
+        raise BadInput("engine", f"{environment.engine}=={environment.version} without a lock", "`engines install`") from None
+    return Lock(environment.version, find_python(environment.python), text)
 
 
-def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
-    """Return a new environment in a folder, in place of what is there.
+def install_build(engine: str, path: Path, source: Source) -> Installation:
+    """Return the environment of a build, a wheel or a folder of sources, created if it does not exist.
+
+    Its version is that of the wheel with the beginning of its hash, such as 4.0.1+build.1a2b3c4d, so that a build is never
+    mistaken for a release or for another build.
 
     Raises
     ------
     BadInput
-        A package cannot be had, or there is no room on the disk.
+        The path is neither a wheel of the engine nor a folder of sources, must not be built, or cannot be installed.
     """
+    if path.suffix == ".whl" and path.is_file():
+        distribution = distribution_of(engine)
+        version = _version_of(path, normal_name(distribution.package))
+        if existing := read_environment(folder_of_all() / engine / version):  # without a network
+            return Installation(existing, False, import_trouble(existing, distribution))
+        return _install(engine, distribution, resolve_wheel(distribution, path.resolve(), version, source), source)
+    if not any((path / name).is_file() for name in ("pyproject.toml", "setup.py")):
+        raise BadInput("against", repr(str(path)), "a wheel, or a folder with pyproject.toml or setup.py")
+    if not source.allow_build:
+        raise BadInput("against", f"{str(path)!r}, which has to be built", "a wheel, or --allow-build, which runs its code")
+    with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
+        return install_build(engine, build_wheel(path, Path(folder), source), source)
+
+
+def _version_of(wheel: Path, package: str) -> str:
+    """Return the version of a build. Raise `BadInput` if the file is not a wheel of the package."""
+    name, _, rest = wheel.name.partition("-")
+    if normal_name(name) != package or not re.fullmatch(r"[0-9][^-]*(-[^-]+){3,4}\.whl", rest):
+        raise BadInput("against", repr(wheel.name), f"a wheel of {package}")
+    version = rest.partition("-")[0].lower()
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()[:8]
+    return f"{version}{'.' if '+' in version else '+'}{BUILD}{digest}"
+
+
+def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> Path:
+    """Build a folder of sources into a wheel in another folder, with additional environment variables. Raise `BadInput`."""
+    options = ("--quiet", "--wheel", "--out-dir", folder)
+    try:
+        run_uv("build", *options, *source.options, path.resolve(), SOURCE_DATE_EPOCH=_EPOCH, **variables)
+    except UvFailed as failure:
+        raise BadInput("against", repr(str(path)), f"a folder that uv can build ({failure.summary})") from None
+    return next(folder.glob("*.whl"))
+
+
+def newest_releases(engine: str, count: int, source: Source) -> tuple[str, ...]:
+    """Return the newest versions with wheels that the engine's file supports, oldest first.
+
+    Raises
+    ------
+    BadInput
+        The engine is unknown, or the source does not list its versions.
+    """
+    distribution = distribution_of(engine)
+    known = list_versions(distribution.package, source)
+    if not known:
+        got = f"no list of versions of {distribution.package} from the package index"
+        raise BadInput("last", got, "a network, --find-links FOLDER, or versions that are installed")
+    supported = [each for each in known if version_key(each) >= version_key(distribution.oldest)]
+    return tuple(sorted(supported, key=version_key)[-count:])
+
+
+def install_releases(
+    engine: str, versions: Iterable[str], source: Source, report: Callable[[str], None]
+) -> tuple[Environment, ...]:
+    """Return the environments of versions, in this order. `report` gets a line before each installation.
+
+    Raises
+    ------
+    BadInput
+        The engine or a version is unknown, or is not available here and now.
+    """
+    names = [f"{engine}=={version}" for version in versions]
+    for name in names:
+        check(name)  # all of them, before the first takes minutes
+    environments = []
+    for name in names:
+        try:
+            environments.append(find_environment(engine, name.partition("==")[2]))
+        except MissingEnvironment:
+            report(f"installing {name}")
+            environments.append(install(name, source).environment)
+    return tuple(environments)
+
+
+def check(requirement: str) -> None:
+    """Raise `BadInput` if a requirement cannot be read or its engine is unknown."""
+    distribution_of(split_requirement(requirement)[0])
+
+
+def _install(engine: str, distribution: Distribution, lock: Lock, source: Source, force: bool = False) -> Installation:
+    folder = folder_of_all() / engine / lock.version
+    existing = None if force else read_environment(folder)
+    environment = existing or make(engine, lock, folder, source)
+    return Installation(environment, existing is None, import_trouble(environment, distribution))
+
+
+def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
+    """Create an environment in place of an old one. Raise `BadInput` if a package is missing or the disk is full."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, _make_folder) as (scratch, _):
@@ -107,9 +191,9 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
         raise BadInput("engine", f"{engine}=={lock.version}", f"a package that uv can install ({failure.summary})") from None
     except OSError as error:
         raise BadInput("engines", f"{folder}: {error.strerror}", "a cache folder that can be written, with room") from None
-    found = read_environment(folder)
-    assert found is not None
-    return found
+    environment = read_environment(folder)
+    assert environment is not None
+    return environment
 
 
 def _make_folder(path: Path) -> int:
@@ -130,7 +214,6 @@ def _python_of(folder: Path) -> str:
 
 
 def _replace(folder: Path, scratch: Path) -> None:
-    """Give a folder its name; what has that name goes."""
     close_environment(folder)
     with _removed(folder) if folder.exists() else nullcontext():
         try:
@@ -150,37 +233,28 @@ def import_trouble(environment: Environment, distribution: Distribution) -> str:
 
 
 def remove(requirement: str) -> tuple[Environment, ...]:
-    """Remove the environment of `NAME==VERSION`, or of `NAME` all; return what they were.
-
-    Raises
-    ------
-    BadInput
-        The requirement cannot be read, or there is no such environment.
-    """
+    """Remove the environment of `NAME==VERSION`, or all of `NAME`, and return them. Raise `BadInput` if there is none."""
     engine, version = split_requirement(requirement)
-    there = {f"{each.engine}=={each.version}": each for each in list_environments()}
-    found = tuple(each for each in there.values() if each.engine == engine and version in ("", each.version))
-    if not found:
-        raise BadInput(
-            "engine",
-            repr(requirement),
-            f"an installed engine: {nearest(requirement, there)}" if there else "an installed engine (none is installed)",
-        )
-    for environment in found:
+    installed = {f"{each.engine}=={each.version}": each for each in list_environments()}
+    chosen = tuple(each for each in installed.values() if each.engine == engine and version in ("", each.version))
+    if not chosen:
+        near = f"an installed engine: {nearest(requirement, installed)}"
+        raise BadInput("engine", repr(requirement), near if installed else "an installed engine (none is installed)")
+    for environment in chosen:
         close_environment(environment.folder)
         drop(environment.folder)
-    return found
+    return chosen
 
 
 def drop(folder: Path) -> None:
-    """Remove a folder: under another name first, so that nothing half removed is ever used."""
+    """Remove a folder. It is renamed first, so that a partly removed environment is never used."""
     with _removed(folder):
         pass
 
 
 @contextmanager
 def _removed(folder: Path) -> Iterator[None]:
-    """Rename a folder away, and remove it at the end of the block; it gets its name back if the block raises."""
+    """Rename a folder, and remove it at the end of the block; it gets its name back if the block raises."""
     away = Path(tempfile.mkdtemp(prefix=f"removed-{os.getpid()}-", dir=temporary_folder()))
     folder.rename(away / folder.name)
     try:
@@ -193,21 +267,21 @@ def _removed(folder: Path) -> Iterator[None]:
 
 
 def clear_leftovers() -> None:
-    """Remove what processes have left that were ended in the middle."""
+    """Remove the files of processes that were ended."""
     for path in (*folder_of_all().glob("*/.*-*"), *folder_of_projects().glob("*/.*-*")):
         remove_leftovers(path.with_name(path.name[1:].rpartition("-")[0]))
     for path in temporary_folder().iterdir():
-        if not _alive(path.name):
+        if not _is_alive(path.name):
             remove_tree(path)
 
 
-def _alive(name: str) -> bool:
-    """Return whether the process is there whose number a name such as `work-123-abc` has."""
+def _is_alive(name: str) -> bool:
+    """Return whether the process exists whose number is in a name such as `work-123-abc`."""
     number = name.split("-")[1] if name.count("-") >= 2 else ""
     try:
         os.kill(int(number), 0)
     except (ProcessLookupError, ValueError):
         return False
-    except PermissionError:  # somebody else's process
+    except PermissionError:  # of another user
         return True
     return True

@@ -1,7 +1,7 @@
-"""uv, which makes environments: how it is run, and what its errors mean. Source: uv's reference, environment variables.
+"""Run uv, which creates environments, and interpret its errors.
 
-It takes packages from where pip takes them: what pip's configuration says of indexes and folders is handed on, unless uv has a
-configuration of its own. It downloads no Python and keeps its own cache beside the environments.
+uv uses the indexes and folders of pip's configuration, unless uv is configured itself. It downloads no Python, and its cache is
+next to the environments. Variables: https://docs.astral.sh/uv/reference/environment/
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from conservative.errors import BadInput, require_extra
@@ -28,26 +29,26 @@ _OF_UV = ("UV_DEFAULT_INDEX", "UV_INDEX", "UV_INDEX_URL", "UV_EXTRA_INDEX_URL", 
 
 
 class UvFailed(RuntimeError):
-    """uv ended with an error. Attribute: `words`, what it printed."""
+    """uv ended with an error. Attribute: `words`, its output."""
 
     def __init__(self, words: str) -> None:
         self.words = re.sub(r"(?<=://)[^/@\s]+@", "", words)  # an index may have a password in its address
         super().__init__(self.summary)
 
     def says(self, *texts: str) -> bool:
-        """Return whether one of some texts is in what it printed."""
+        """Return whether its output contains one of the texts."""
         return any(text in self.words for text in texts)
 
     @property
     def no_wheel(self) -> bool:
-        """Whether there are files of that version, but no wheel for this Python and system."""
+        """Whether the version exists, but without a wheel for this Python and system."""
         return self.says("no wheels with a matching", "has no usable wheels", "have no usable wheels", "Requires-Python") or (
             re.search(r"depends on Python|does not satisfy Python", self.words) is not None
         )
 
     @property
     def summary(self) -> str:
-        """What it says, in a line."""
+        """Its error message in one line."""
         lines = [line.strip() for line in self.words.splitlines() if line.strip()]
         errors = [line for line in lines if line.startswith(("error:", "cause:", "×", "╰─▶"))] or lines[-1:]
         return " ".join(errors[-1].split())[:300] if errors else "uv ended with an error"
@@ -62,15 +63,7 @@ def _program() -> str:
 
 
 def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -> str:
-    """Return what a command of uv prints.
-
-    Raises
-    ------
-    UvFailed
-        It ends with an error.
-    BadInput
-        There is no room on the disk.
-    """
+    """Return the output of a command of uv. Raise `UvFailed`, or `BadInput` if the disk is full."""
     done = subprocess.run(
         [_program(), *map(str, arguments)],
         input=stdin,
@@ -90,7 +83,6 @@ def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -
 
 
 def _variables() -> dict[str, str]:
-    """Return the variables that uv runs with."""
     kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     cache = {} if "UV_CACHE_DIR" in kept else {"UV_CACHE_DIR": str(folder_of_all().parent / "uv")}
     always = {"UV_PYTHON_DOWNLOADS": "never", "UV_NO_PROGRESS": "1", "NO_COLOR": "1"}
@@ -99,16 +91,16 @@ def _variables() -> dict[str, str]:
 
 @lru_cache(maxsize=1)
 def _from_pip() -> dict[str, str]:
-    """Return what pip's configuration says, as uv's variables; with several indexes the best version counts, as with pip."""
-    found = {_FROM_PIP[key]: value for key, value in _pip_settings().items() if key in _FROM_PIP}
-    if "UV_FIND_LINKS" in found:
-        found["UV_FIND_LINKS"] = ",".join(found["UV_FIND_LINKS"].split())
-    return found | ({"UV_INDEX_STRATEGY": "unsafe-best-match"} if "UV_INDEX" in found else {})
+    """Return pip's configuration as variables of uv. With several indexes the best version counts, as with pip."""
+    variables = {_FROM_PIP[key]: value for key, value in _pip_settings().items() if key in _FROM_PIP}
+    if "UV_FIND_LINKS" in variables:
+        variables["UV_FIND_LINKS"] = ",".join(variables["UV_FIND_LINKS"].split())
+    return variables | ({"UV_INDEX_STRATEGY": "unsafe-best-match"} if "UV_INDEX" in variables else {})
 
 
 def _pip_settings() -> dict[str, str]:
-    """Return pip's settings by their names; those of variables count more than those of files."""
-    pip = [sys.executable, "-m", "pip"] if _has_pip() else [shutil.which("pip") or ""]
+    """Return pip's settings by name. Environment variables override configuration files."""
+    pip = [sys.executable, "-m", "pip"] if find_spec("pip") else [shutil.which("pip") or ""]
     if not pip[0]:
         return {}
     done = subprocess.run([*pip, "config", "list"], capture_output=True, text=True, check=False, timeout=60)
@@ -116,9 +108,3 @@ def _pip_settings() -> dict[str, str]:
     ranks = {"global": 0, "install": 1, ":env:": 2}
     wanted = sorted((ranks[section], key, value) for section, key, value in lines if section in ranks)
     return {key: value for _, key, value in wanted}
-
-
-def _has_pip() -> bool:
-    from importlib.util import find_spec
-
-    return find_spec("pip") is not None

@@ -124,7 +124,7 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
         The engine, a version, a scene, a setting or the build cannot be used, or there are fewer than two versions.
     """
     from conservative.benchmarks.tracking.track import make_plan, require_several, track
-    from conservative.references.environments.builds import install_build, install_releases, newest_releases
+    from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
 
     from ..run.provenance import describe_origin

@@ -14,8 +14,8 @@ import conservative as cv
 from conservative import registry
 from conservative.errors import MissingEngine
 from conservative.references.environments import environment, install, uv_command
-from conservative.references.environments.builds import install_build, install_releases, newest_releases
 from conservative.references.environments.environment import Distribution
+from conservative.references.environments.install import install_build, install_releases, newest_releases
 from conservative.references.environments.lock import Source, split_requirement
 from conservative.references.worker.client import close_workers
 
@@ -70,7 +70,7 @@ def test_versions_live_side_by_side_and_go_one_by_one(cache, wheels):
     assert len(install.remove("trial")) == 2
     with pytest.raises(MissingEngine, match="conservative engines install trial"):
         registry.method("trial")
-    with pytest.raises(cv.BadInput, match="a name after something is installed"):
+    with pytest.raises(cv.BadInput, match="none is installed"):
         install.remove("trial")
 
 
@@ -133,7 +133,7 @@ def test_no_network_is_said(cache, monkeypatch):
     monkeypatch.setenv("UV_DEFAULT_INDEX", "https://127.0.0.1:9/simple")
     monkeypatch.setenv("UV_HTTP_RETRIES", "0")
     with pytest.raises(
-        cv.BadInput, match="no answer for 'trial' from where packages come from; expected a network, or --find-links FOLDER"
+        cv.BadInput, match="no answer for 'trial' from the package index; expected a network, or --find-links FOLDER"
     ):
         install.install("trial")
 
@@ -160,6 +160,14 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
     assert (rebuilt.environment, rebuilt.new, rebuilt.trouble) == (before, True, "")
     assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=registry.method("trial")).ok
     assert [path.name for path in (cache / "trial").iterdir()] == ["1.9"]
+
+
+def test_an_environment_that_cannot_be_made_again_is_not_lost(cache, wheels):
+    before = installed(wheels).environment
+    (before.folder / environment.LOCK).unlink()  # as of an environment that somebody made by hand
+    with pytest.raises(cv.BadInput, match="without a lock"):
+        install.install("trial", Source(wheels), force=True)
+    assert environment.list_environments() == (before,)
 
 
 @pytest.mark.parametrize("step", ["_fill", "_replace"])
