@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import altair as alt
@@ -10,7 +10,9 @@ import pandas as pd
 
 from conservative.benchmarks.studies.paper_figures import ENERGY, MOMENTUM, PAPER_MAP, RATES, REDUCED_MAP, X1, X2
 
+from ..document.model import LegendEntry
 from ..tables.lines import ANALYTICAL
+from . import vega_embed
 from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, apply_style
 
 _TIME = alt.X("t:Q", title="t, s", axis=alt.Axis(tickCount=7, labelFlush=False))
@@ -24,6 +26,20 @@ class Panel(NamedTuple):
     line: str
     value: tuple[str, str, str]
     lines: Mapping[str, tuple[str, str]]
+
+
+PANEL_HEIGHT = 260
+
+
+def embed(panels: Sequence[Panel]) -> tuple[list[vega_embed.Spec], list[LegendEntry]]:
+    """Return panels and their legend as the page draws them."""
+    charts = []
+    for panel in panels:
+        shown = [(panel.line, "N", "line"), ("t", "Q", "t, s"), panel.value]
+        (chart,) = vega_embed.embed(panel.chart, shown, PANEL_HEIGHT)
+        charts.append(chart | {"usermeta": {"name": panel.title}})
+    lines = {line: look for panel in panels for line, look in panel.lines.items()}
+    return charts, [LegendEntry(line, colour, "", dash) for line, (colour, dash) in lines.items()]
 
 
 def panels_1(rates: pd.DataFrame, errors: pd.DataFrame) -> tuple[Panel, ...]:

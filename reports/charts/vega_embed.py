@@ -10,9 +10,11 @@ import csv
 import io
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from conservative.benchmarks.studies import step_ladder
+
+from ..document.model import LegendEntry
 from .style import DASHES, SHAPES, Families, colours, number_in_family
 
 HIDDEN = "hidden"
@@ -32,39 +34,33 @@ PATHS = {
 """Outlines of the marks in a square of side 2, as Vega draws them."""
 
 Spec = dict[str, Any]
-Tooltip = Sequence[tuple[str, str, str]]
-"""Field, "Q" or "N", and title."""
+Shown = tuple[str, str, str]
+"""What hovering shows: field, "Q" or "N", and title."""
+SHOWN: dict[str, Shown] = {
+    field: (field, kind, title)
+    for field, kind, title in (
+        ("error", "Q", "attitude error, rad"),
+        ("microseconds", "Q", "µs per simulated second"),
+        ("sample", "Q", f"µs a sample, of {step_ladder.SAMPLES}"),
+        ("dt", "Q", "step, s"),
+        ("t", "Q", "t, s"),
+        ("drift", "Q", "largest drift so far"),
+        ("name", "N", "method"),
+        ("setting", "N", "setting"),
+        ("within", "N", "bodies"),
+        ("kind", "N", "taken"),
+        ("size", "Q", "number of bodies"),
+        ("time", "Q", "µs a body and simulated second"),
+    )
+}
+"""What hovering can show in most charts, by field."""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A button of a legend: the line's key in the charts, colour, mark as an outline or dash, whether it is drawn at first."""
-
-    name: str
-    colour: str
-    path: str
-    dash: str
-    shown: bool = True
-
-
-@dataclass(frozen=True)
-class PageFigure:
-    """One or more charts with one legend; `summary` says in words what they show."""
-
-    name: str
-    title: str
-    summary: str
-    charts: tuple[Spec, ...]
-    legend: tuple[Entry, ...]
-    view: str = ""
-    """Class of the figure on the page; the charts of "families" have the parameter `single`."""
-
-
-def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
+def legend(families: Families, marks: bool) -> tuple[LegendEntry, ...]:
     """Return the buttons for lines: with the marks of the pictures, or else with their dashes."""
     colour, number = colours(families), number_in_family(families)
     return tuple(
-        Entry(
+        LegendEntry(
             name,
             colour[name],
             PATHS[SHAPES[number[name] % len(SHAPES)]] if marks else "",
@@ -74,11 +70,21 @@ def legend(families: Families, marks: bool) -> tuple[Entry, ...]:
     )
 
 
-def embed(chart: Any, tooltip: Tooltip, height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
-    """Return a picture's specification as the page embeds it, without the lines that are hidden at first.
+def embed(chart: Any, shown: Sequence[str | Shown], height: int = 420, hidden: Sequence[str] = ()) -> list[Spec]:
+    """Return a picture as the page embeds it: one specification for each of its panels.
 
-    A picture of panels, or of rows of panels, becomes a chart a panel.
+    Parameters
+    ----------
+    chart
+        The picture.
+    shown
+        What hovering shows: keys of `SHOWN`, or fields with kind and title.
+    height
+        Height of a panel.
+    hidden
+        Lines that are hidden at first.
     """
+    tooltip = [SHOWN[each] if isinstance(each, str) else each for each in shown]
     whole: Spec = chart.to_dict()
     if _parts(whole) is None:
         for unit in (whole, *whole.get("layer", ())):
@@ -101,7 +107,7 @@ def _parts(spec: Spec) -> Sequence[Spec] | None:
     return next((spec[way] for way in ("vconcat", "hconcat", "concat") if way in spec), None)
 
 
-def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
+def _panel(panel: Spec, whole: Spec, tooltip: Sequence[Shown], height: int) -> Spec:
     units = [panel, *panel.get("layer", ())]
     for unit in units:
         _prepare(unit, tooltip)
@@ -116,7 +122,7 @@ def _panel(panel: Spec, whole: Spec, tooltip: Tooltip, height: int) -> Spec:
     return rest | {"datasets": values, "width": "container", "height": height}
 
 
-def _prepare(unit: Spec, tooltip: Tooltip) -> None:
+def _prepare(unit: Spec, tooltip: Sequence[Shown]) -> None:
     """Take the legend from a chart or a layer, and give it the filter and what hovering shows."""
     encoding = unit.get("encoding", {})
     for channel in ("color", "shape", "strokeDash"):

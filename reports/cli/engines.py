@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,7 +10,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import allow_build_option, epilog, find_links_option
+from .options import allow_build_option, epilog, find_links_option, show
 
 if TYPE_CHECKING:
     from conservative.references.environments.install import Installation
@@ -55,7 +54,7 @@ def install(
     from conservative.references.environments.install import check, install
     from conservative.references.environments.lock import Source
 
-    from ..tables.engines import installation_line
+    from ..sections.environments import installation_line
 
     for name in names:
         check(name)  # all of them, before the first takes minutes
@@ -74,10 +73,9 @@ def install(
 def list_engines(as_json: bool) -> None:
     """List the engines that can be installed, and the environments with the version of every package."""
     require_extra("conservative engines", "environments")
-    from ..tables.engines import json_text, lines
+    from ..sections.environments import build
 
-    for line in [json_text()] if as_json else lines():
-        click.echo(line)
+    show(build(), as_json)
 
 
 @engines.command(short_help="Remove engines.", epilog=epilog("conservative engines remove mujoco==3.6.0"))
@@ -88,14 +86,14 @@ def remove(names: tuple[str, ...], as_json: bool) -> None:
     require_extra("conservative engines", "environments")
     from conservative.references.environments.install import remove
 
-    from ..tables.engines import removal_line
+    from ..sections.environments import removal_line
 
     _show((environment for name in names for environment in remove(name)), removal_line, as_json)
 
 
 def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:
     """Return values after each is shown in a line as soon as it is there, or all as JSON."""
-    from ..tables.engines import as_plain
+    from ..document import json
 
     found = []
     for value in values:
@@ -103,5 +101,5 @@ def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) ->
         if not as_json:
             click.echo(line(value))
     if as_json:
-        click.echo(json.dumps([as_plain(value) for value in found], indent=2))  # type: ignore[arg-type]
+        click.echo(json.render(found))
     return found

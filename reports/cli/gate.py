@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +14,7 @@ from . import completion
 from .options import FilePath, OutputCommand, OutputFile, allow_build_option, epilog, find_links_option, split_names
 
 if TYPE_CHECKING:
-    from ..tables.comparison import Answer
+    from ..document.model import Document
 
 FILES = ("junit", "markdown", "html")
 OF_BASELINE = ("results", "baseline", "update")
@@ -77,7 +74,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
 @click.option("--junit", type=OutputFile('name="conservative gate"'), help="With --against: write a JUnit report.")
 @click.option("--markdown", type=OutputFile("**gate: "), help="With --against: write verdict and table as Markdown.")
 @click.option(
-    "--html", type=OutputFile("<title>conservative gate: "), help="With --against: write a page with rows, ratios and filters."
+    "--html", type=OutputFile("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print violations and notes, or the new entry of the history, as JSON.")
 @click.pass_context
@@ -89,25 +86,26 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
 
     The exit code is 1, with a line for each violation, or 2 if the comparison cannot be made.
     """
+    from .. import document
+    from ..document import terminal
+
     two_versions = options["against"] is not None
     for name in OF_BASELINE if two_versions else OF_VERSIONS:
         if options[name]:
             parameter = next(each for each in context.command.params if each.name == name)
             problem = "cannot be used with --against" if two_versions else "needs --against"
             raise click.UsageError(f"{parameter.get_error_hint(context)} {problem}")
-    if two_versions:
-        answer = _compare_and_write(options)
-        passed, text, json_text = answer.passed, str(answer), answer.json_text
+    answer = _compare_and_write(options) if two_versions else _judge(options)
+    if as_json:
+        click.echo(document.text(answer, "json"))
     else:
-        passed, text, content = _judge(options)
-        json_text = lambda: json.dumps({"passed": passed, **content}, indent=2, ensure_ascii=False)  # noqa: E731
-    click.echo(json_text() if as_json else text)
-    if not passed:
+        terminal.show(answer)
+    if answer.failures:
         raise click.exceptions.Exit(1)
 
 
-def _judge(options: dict[str, Any]) -> tuple[bool, str, dict[str, Any]]:
-    """Compare results with the baseline, or accept them; return whether they pass, and the answer as text and for JSON.
+def _judge(options: dict[str, Any]) -> Document:
+    """Compare results with the baseline, or accept them.
 
     Raises
     ------
@@ -117,49 +115,46 @@ def _judge(options: dict[str, Any]) -> tuple[bool, str, dict[str, Any]]:
     from conservative.benchmarks.gate import baseline, results
     from conservative.benchmarks.gate.compare import judge
 
+    from ..document.model import Document, Paragraph
+
     path = options["baseline"] or baseline.PATH
     runs = [results.read(each) for each in options["results"] or [results.FOLDER / results.FILE]]
     if options["update"] is None:
         before = baseline.read(path)
         verdicts = [judge(before, run) for run in runs]
-        records = [{"passed": each.passed, **asdict(each)} for each in verdicts]
-        return all(each.passed for each in verdicts), "\n".join(map(str, verdicts)), {"verdicts": records}
+        failed = [str(each) for each in verdicts if not each.passed]
+        data = {"passed": not failed, "verdicts": [{"passed": each.passed, **vars(each)} for each in verdicts]}
+        texts = [Paragraph(str(each)) for each in verdicts]
+        return Document("conservative gate", "Results against the baseline", texts, data=data, failures=failed)
     old = baseline.read(path, also_with_times=True) if path.exists() else None
     new = baseline.update_baseline(old, runs, options["update"])
     baseline.write(new, path)
     entry = new.history[-1]
     changes = ", ".join(f"{len(entry[kind])} {kind}" for kind in ("added", "changed", "removed"))
     text = f"{path}: {len(new.rows)} rows from {entry['runs']} runs; {changes}"
-    return True, text, {"baseline": str(path), "rows": len(new.rows), "entry": dict(entry)}
+    data = {"passed": True, "baseline": path, "rows": len(new.rows), "entry": entry}
+    return Document("conservative gate", "A new baseline", [Paragraph(text)], data=data)
 
 
-def _compare_and_write(options: dict[str, Any]) -> Answer:
+def _compare_and_write(options: dict[str, Any]) -> Document:
     """Compare two versions and write the files that are asked for; missing packages and bad paths end it before any work."""
     from conservative.files import text_file
+
+    from .. import document
 
     require_extra("conservative gate --against", "environments")
     require_extra("conservative gate --against", "gate", "heyoka")
     if options["html"]:
-        require_extra("conservative gate --html", "report", "jinja2")
+        require_extra("conservative gate --html", "report", "jinja2", "itables")
     with ExitStack() as files:
         streams = {name: files.enter_context(text_file(options[name], name)) for name in FILES if options[name] is not None}
         answer = _compare(options)
         for name, stream in streams.items():
-            stream.write(_text_of(answer, name))
+            stream.write(document.text(answer, name))
     return answer
 
 
-def _text_of(answer: Answer, name: str) -> str:
-    """Return the answer as `FILES` names it."""
-    if name == "html":  # which needs jinja2, the others do not
-        from ..page.versions import render_comparison
-
-        return render_comparison(answer)
-    texts: dict[str, Callable[[], str]] = {"junit": answer.junit_text, "markdown": answer.markdown_text}
-    return texts[name]()
-
-
-def _compare(options: dict[str, Any]) -> Answer:
+def _compare(options: dict[str, Any]) -> Document:
     """Install both versions and compare them.
 
     Raises
@@ -172,7 +167,7 @@ def _compare(options: dict[str, Any]) -> Answer:
     from conservative.references.environments.lock import Source
 
     from ..run.provenance import describe_origin
-    from ..tables.comparison import Answer
+    from ..sections.comparison import build
     from ..terminal.progress import progress
 
     made = describe_origin()
@@ -186,4 +181,4 @@ def _compare(options: dict[str, Any]) -> Answer:
         click.echo(f"preparing {name}", err=True)
         versions.append(install_version(name, project, source, options["requirements"]))
     with progress() as step:
-        return Answer(compare_versions(versions[0], versions[1], tell=step, **asked), made)
+        return build(compare_versions(versions[0], versions[1], tell=step, **asked), made)

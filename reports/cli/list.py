@@ -6,7 +6,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import epilog
+from .options import epilog, show
 
 
 @click.command(
@@ -21,10 +21,6 @@ from .options import epilog
 def list_all(as_json: bool) -> None:
     """List the scenes, our methods and the installed engines, with the invariants that they conserve."""
     require_extra("conservative list", "report", "rich")
-    from ..tables.catalogue import json_text, tables
-    from ..terminal.tables import print_tables
+    from ..sections.catalogue import build
 
-    if as_json:
-        click.echo(json_text())
-    else:
-        print_tables(tables())
+    show(build(), as_json)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from conservative.errors import BadInput
+
+if TYPE_CHECKING:
+    from ..document.model import Document
 
 EXIT_CODES = """Exit codes:
     0    done
@@ -165,6 +168,18 @@ find_links_option = click.option(
 allow_build_option = click.option(
     "--allow-build", is_flag=True, help="Build packages that have no wheel, which runs their code."
 )
+
+
+def show(document: Document, as_json: bool) -> None:
+    """Print a document, or its data as JSON. If it has failures, end the command with these as the message and exit code 1."""
+    from ..document import terminal, text
+
+    if as_json:
+        click.echo(text(document, "json"))
+    else:
+        terminal.show(document)
+    if document.failures:
+        raise click.ClickException("; ".join(document.failures))
 
 
 def epilog(*examples: str) -> str:

@@ -10,7 +10,7 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFolder, epilog, split_names
+from .options import OutputCommand, OutputFolder, epilog, show, split_names
 
 FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Written by conservative -->"}
 """The files of `--out`, and how each is recognized."""
@@ -64,9 +64,9 @@ def recommend(
     from conservative.benchmarks.recommendation.recommend import recommend as answer
     from conservative.files import make_folder, text_file
 
-    from ..tables.recommendation import json_text, notes, question_text, tables
+    from .. import document
+    from ..sections.recommendation import build
     from ..terminal.progress import progress
-    from ..terminal.tables import print_tables, print_text
 
     with progress() as step, ExitStack() as files:
         names = split_names("engine", engine) or None
@@ -76,14 +76,10 @@ def recommend(
             make_folder(out, "out")
             streams = [files.enter_context(text_file(out / name, "out")) for name in FILES]
         recommendation = answer(question, step)
+        shown = build(recommendation)
         if streams:
             from ..charts.recommendation import svg  # not needed without --out, and slow to import
 
-            for stream, content in zip(streams, (json_text, svg), strict=True):
-                stream.write(content(recommendation))
-    if as_json:
-        click.echo(json_text(recommendation))
-    else:
-        print_text(question_text(recommendation), style="bold")
-        print_tables(tables(recommendation))
-        print_text("\n".join(notes(recommendation)))
+            for stream, content in zip(streams, (document.text(shown, "json"), svg(recommendation)), strict=True):
+                stream.write(content)
+    show(shown, as_json)

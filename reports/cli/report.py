@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -11,9 +10,6 @@ from conservative.errors import require_extra
 
 from . import completion
 from .options import FilePath, epilog, split_list, split_names
-
-if TYPE_CHECKING:
-    from ..view import View
 
 
 @click.command(
@@ -35,7 +31,8 @@ if TYPE_CHECKING:
     multiple=True,
     metavar="M,N",
     shell_complete=completion.methods,
-    help="Methods. A name without settings, such as mujoco, selects all its variants.  [default: a selection; with --full all]",
+    help="Methods. A name without settings, such as mujoco, selects all its variants (`run --method` runs the default one).  "
+    "[default: a selection; with --full all]",
 )
 @click.option(
     "--engines",
@@ -98,7 +95,8 @@ def report(
     OUT.partial.json.
     """
     require_extra("conservative report", "report")
-    from .. import document
+    from .. import report as work
+    from ..document import terminal
     from ..run.checkpoint import find_unfinished
     from ..run.plan import plan_report
     from ..terminal.progress import progress
@@ -119,21 +117,11 @@ def report(
     if not resume and (unfinished := find_unfinished(out)):
         click.echo(f"{unfinished}: replacing an unfinished report. With --resume its studies are not measured again.", err=True)
     with progress() as step:
-        view = document.write(plan, out, step, resume)
+        document = work.write(plan, out, step, resume)
     if as_json:
         click.echo((out / MANIFEST).read_text(encoding="utf-8"))
     else:
-        _show(view)
+        terminal.show(document)
         click.echo(out / "index.html")
-    if view.failed:
-        raise click.ClickException("; ".join(view.failed))
-
-
-def _show(view: View) -> None:
-    """Print a table per scene, and the verdict."""
-    from ..tables.closing import LEGEND
-    from ..terminal.tables import TerminalTable, print_tables, print_text
-
-    print_tables(TerminalTable(name, header, [list(map(str, row)) for row in rows]) for name, (header, rows) in view.closing)
-    print_text(LEGEND + "\n")
-    print_text(view.verdict)
+    if document.failures:
+        raise click.ClickException("; ".join(document.failures))

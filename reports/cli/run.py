@@ -10,7 +10,7 @@ from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFile, epilog
+from .options import OutputCommand, OutputFile, epilog, show
 
 
 @click.command(
@@ -30,7 +30,8 @@ from .options import OutputCommand, OutputFile, epilog
     "methods",
     multiple=True,
     shell_complete=completion.methods,
-    help="Method, or method:settings, such as taylor:order=12 (see `conservative list`). Repeat the option for a table.  "
+    help="Method, or method:settings, such as taylor:order=12 (see `conservative list`). A name alone stands for the "
+    "default variant; `report --methods` runs all variants. Repeat the option for a table.  "
     f"[default: {DEFAULT_METHOD}, or the first method that supports the scene's potential]",
 )
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
@@ -44,9 +45,9 @@ def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | N
     before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")
-    from ..run.single_run import compare, comparison_table, json_text, run_once, summary_text
+    from ..run.single_run import compare, run_once
+    from ..sections.run import build
     from ..terminal.progress import progress, show_waiting
-    from ..terminal.tables import print_tables
 
     if len(methods) > 1:
         if csv is not None:
@@ -56,12 +57,4 @@ def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | N
     else:
         with show_waiting(": ".join([scene, *methods])):
             summaries = [run_once(scene, methods[0] if methods else None, dt, t_end, csv)]
-    if as_json:
-        click.echo(json_text(summaries))
-    elif len(methods) > 1:
-        print_tables([comparison_table(summaries)])
-    else:
-        click.echo(summary_text(summaries[0]))
-    failed = [f"{each['label']} on {each['scene']}: {each['outcome']}" for each in summaries if not each["outcome"].ok]
-    if failed:
-        raise click.ClickException("; ".join(failed))
+    show(build(summaries), as_json)

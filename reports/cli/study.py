@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFile, OutputFolder, epilog, split_list, split_names
-
-if TYPE_CHECKING:
-    from ..tables.study_rows import StudyRows
+from .options import OutputCommand, OutputFile, OutputFolder, epilog, show, split_list, split_names
 
 FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": '}
 """The files of `--out`, and how each begins."""
-COLUMNS = 7
-"""Columns that a terminal has room for: of ratios all but the winners, which the files have."""
 
 
 @click.command(
@@ -90,9 +85,10 @@ def study(
     require_extra("conservative study", "report")
     from conservative.files import make_folder, text_file
 
+    from .. import document
     from ..run.provenance import provenance
     from ..run.single_study import measure_study, plan_study
-    from ..tables.study_rows import StudyRows
+    from ..sections.study import build
     from ..terminal.progress import announce, progress
 
     wanted = [("csv", csv, "study.csv"), ("markdown", markdown, "study.md")]
@@ -115,20 +111,10 @@ def study(
         announce(f"study {name.replace('_', ' ')}")
         with progress() as step:
             measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
-        found = StudyRows(name, measured.table, measured.samples, made)
-        contents = {"study.md": found.markdown_text, "study.csv": found.csv_text, "study.json": found.json_text}
+        shown = build(name, measured, made)
         for stream, content in streams:
-            stream.write(contents[content]())
-    if as_json:
-        click.echo(found.json_text())
-    else:
-        _show(found)
-
-
-def _show(found: StudyRows) -> None:
-    from ..terminal.tables import TerminalTable, print_tables, print_text
-
-    print_tables(
-        TerminalTable(caption, header, [list(map(str, row)) for row in rows]) for caption, (header, rows) in found.tables
-    )
-    print_text("\n".join(found.statements))
+            if content == "study.csv":
+                stream.write(measured.table.to_csv(index=False, lineterminator="\n"))
+            else:
+                stream.write(document.text(shown, "markdown" if content == "study.md" else "json"))
+    show(shown, as_json)

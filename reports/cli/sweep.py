@@ -11,7 +11,7 @@ import click
 from conservative.errors import BadInput, require_extra
 
 from . import completion
-from .options import Count, FilePath, OutputCommand, OutputFile, epilog, split_list
+from .options import Count, FilePath, OutputCommand, OutputFile, epilog, show, split_list
 
 SVG_MARK = "<!-- Written by conservative -->"
 """The first line of pictures (`reports.charts.style.SVG_MARK`, which --help has no time to import)."""
@@ -94,6 +94,7 @@ def sweep(
 
     from ..charts.style import apply_style, svg_text
     from ..run import sweep as work
+    from ..sections.sweep import build
     from ..terminal.progress import progress
 
     if picture is not None and picture == out:
@@ -113,8 +114,4 @@ def sweep(
                 drawing.write(svg_text(apply_style(result.ensemble.plot())))
             summary = work.summarize(planned, result)
     summary |= {"out": str(out) if out else None, "picture": str(picture) if picture else None}
-    click.echo(work.json_text(summary) if as_json else work.summary_text(summary))
-    if summary["failures"]:
-        n, first = summary["bodies"] - summary["outcomes"]["ok"], summary["failures"][0]
-        failed = f"{n:,} of {summary['bodies']:,} bodies failed, the first of them number {first['body']}: {first['text']}"
-        raise click.ClickException(f"{summary['label']} on {summary['scene']}: {failed}")
+    show(build(summary), as_json)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -24,20 +22,10 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..tables.cells import Row
-    from ..tables.track import Answer
+    from ..document.model import Document
 
-PAGE = {"track.html": "<title>conservative track: ", "track.md": "## Versions of ", "track.json": '{\n  "made": {'}
+PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ", "track.json": '{\n  "made": {'}
 """The files of `--out`, and how each is recognized."""
-SHORT = {
-    "order of rates": "rates",
-    " drift": "",
-    "attitude error, rad": "error, rad",
-    "outcome": "end",
-    "✓ done": "✓",
-    "time ratio": "time",
-}
-"""Words of the tables, and their short forms on a terminal."""
 
 
 @click.command(
@@ -88,6 +76,9 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     require_extra("conservative track", "environments")
     from conservative.files import make_folder, text_file
 
+    from .. import document
+    from ..document import terminal
+
     scenes, settings = (split_names(name, options.pop(name)) for name in ("scenes", "settings"))
     paths = {name: (options[name], name) for name in ("junit", "markdown") if options[name] is not None}
     if (out := options["out"]) is not None:
@@ -96,26 +87,20 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     with ExitStack() as files:  # a place that cannot be written is an error before any work
         streams = {name: files.enter_context(text_file(*place)) for name, place in paths.items()}
         answer = _answer(engine, versions, scenes, settings, options)
-        from ..page.versions import render_track
-
-        contents: dict[str, Callable[[], str]] = {
-            "junit": answer.junit_text,
-            "markdown": answer.markdown_text,
-            "track.html": lambda: render_track(answer),
-            "track.md": answer.markdown_text,
-            "track.json": answer.json_text,
-        }
+        kinds = {"track.html": "html", "track.md": "markdown", "track.json": "json"}
         for name, stream in streams.items():
-            stream.write(contents[name]())
+            stream.write(document.text(answer, kinds.get(name, name)))
     if as_json:
-        click.echo(answer.json_text())
+        click.echo(document.text(answer, "json"))
     else:
-        _show(answer)
-    if not answer.passed:
+        terminal.show(answer)
+    if answer.failures:
         raise click.exceptions.Exit(1)
 
 
-def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]) -> Answer:
+def _answer(
+    engine: str, versions: tuple[str, ...], scenes: list[str], settings: list[str], options: dict[str, Any]
+) -> Document:
     """Install the versions that are missing, and compare all of them.
 
     Raises
@@ -128,7 +113,7 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
     from conservative.references.environments.lock import Source
 
     from ..run.provenance import describe_origin
-    from ..tables.track import Answer
+    from ..sections.track import build
     from ..terminal.progress import progress
 
     def tell(what: str) -> None:
@@ -147,24 +132,4 @@ def _answer(engine: str, versions: tuple[str, ...], scenes: list[str], settings:
     plan = make_plan(environments, settings, scenes)
     with progress() as step:
         history = track(plan, lambda done, total, what: step(done / total, what))
-    return Answer(history, against is not None, made)
-
-
-def _show(answer: Answer) -> None:
-    """Print tables, changes, and the verdict."""
-    from ..tables.track import NOTHING_CHANGED, UNFINISHED
-    from ..terminal.tables import TerminalTable, print_tables
-
-    for caption, (header, rows) in answer.tables:
-        print_tables([TerminalTable(caption, _narrow(header), [_narrow(row) for row in rows])])
-    sections = [("What changed", answer.sentences or (NOTHING_CHANGED,)), (UNFINISHED, answer.unfinished)]
-    for title, texts in [*sections, *([(answer.verdict, tuple(answer.failures))] if answer.gated else [])]:
-        if texts or title == answer.verdict:
-            click.echo("\n".join([title, *(f"  {text}" for text in texts), ""]))
-
-
-def _narrow(row: Row) -> list[str]:
-    """Return a row, or the header, for the width of a terminal: without the time in seconds, and in short words."""
-    setting, version, *others, _, ratio = map(str, row)
-    texts = [f"{setting} {version}", *others, ratio.partition(" (")[0]]
-    return [re.sub("|".join(SHORT), lambda found: SHORT[found[0]], text) for text in texts]
+    return build(history, against is not None, made)

@@ -1,11 +1,10 @@
-"""One run of one method on one scene: its summary and its samples; and a table of several methods."""
+"""Single runs: one method on one scene, with its samples, or several methods on one scene."""
 
 from __future__ import annotations
 
 import csv
-import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -26,9 +25,7 @@ from conservative.references.exact.method import Exact
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..tables.cells import DASH, outcome_record
 from ..terminal.progress import Step
-from ..terminal.tables import TerminalTable
 
 SAMPLES = 1_000_000
 """Largest number of samples; every step is one in runs of no more steps."""
@@ -154,57 +151,3 @@ def write_samples(trajectory: Trajectory, stream: IO[str]) -> None:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows(samples_of(trajectory).tolist())
-
-
-def json_text(summaries: list[dict[str, Any]]) -> str:
-    """Return the summary as JSON; of several a list."""
-    every = [summary | {"outcome": outcome_record(summary["outcome"])} for summary in summaries]
-    content = every if len(every) > 1 else every[0]
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def summary_text(summary: dict[str, Any]) -> str:
-    """Return the summary for a person."""
-    counters = ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
-    lines = [
-        ("scene", summary["scene"]),
-        ("method", summary["label"]),
-        ("status", str(summary["outcome"])),
-        ("run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"),
-        ("work", counters),
-        *((f"drift of {name}", f"{value:.2e} (relative)") for name, value in summary["drift"].items()),
-        ("orthonormality", f"{summary['orthonormality']:.2e}"),
-        *_last_lines(summary["last"]),
-    ]
-    width = max(len(name) for name, _ in lines)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
-
-
-def comparison_table(summaries: list[dict[str, Any]]) -> TerminalTable:
-    """Return a table with a row for each method on a scene."""
-    first = summaries[0]
-    drifts = list(first["drift"])
-    header = ["method", "outcome", *(f"drift of {name}" for name in drifts), "attitude error, rad", "steps", "wall time, s"]
-    rows = [
-        [
-            summary["method"],
-            str(summary["outcome"]),
-            *(f"{summary['drift'][name]:.1e}" for name in drifts),
-            DASH if summary["attitude_error"] is None else f"{summary['attitude_error']:.1e}",
-            f"{summary['counters']['steps']:,}",
-            f"{summary['wall_time']:.2g}",
-        ]
-        for summary in summaries
-    ]
-    return TerminalTable(f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s", header, rows)
-
-
-def _last_lines(last: dict[str, Any] | None) -> list[tuple[str, str]]:
-    if last is None:
-        return []
-    rows = [(f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1)]
-    return [(f"at t = {last['t']:g} s", ""), *rows, ("w_WB_B, rad/s", _numbers(last["w_WB_B"]))]
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:+.12g}" for value in values)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -25,8 +24,6 @@ from conservative.integration.spread import spread
 from conservative.integration.store import find_ensemble
 from conservative.outcome import ProgressOfMany
 from conservative.scene import Scene
-
-from ..tables.cells import finite_or_none, outcome_record
 
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
@@ -220,58 +217,17 @@ def summarize(sweep: Sweep, result: Result) -> Summary:
         "samples": len(found.t),
         "outcomes": {"ok": len(found) - len(failed), **kinds},
         "failures": [
-            {"body": i, "text": str(failure.outcome), **outcome_record(failure.outcome)}
-            for i, failure in failed[:MOST_FAILURES]
+            {"body": i, "text": str(failure.outcome), **vars(failure.outcome)} for i, failure in failed[:MOST_FAILURES]
         ],
         "drift": drifts,
         "angle_from_mean": [
-            {"t": float(found.t[i]), **dict(zip(names, map(finite_or_none, row), strict=True))}
-            for i, row in zip(samples, quantiles, strict=True)
+            {"t": float(found.t[i]), **dict(zip(names, row, strict=True))} for i, row in zip(samples, quantiles, strict=True)
         ],
         "wall_time": result.wall,
         "found_before": last.found if last else len(found),
         "bodies_per_second": rate,
         "body_steps_per_second": rate * found.grid.n_steps,
     }
-
-
-def json_text(summary: Summary) -> str:
-    """Return the summary as JSON."""
-    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def summary_text(summary: Summary) -> str:
-    """Return the summary for a person."""
-    lines = list(_lines(summary))
-    width = max(len(name) for name, _ in lines)
-    return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in lines)
-
-
-def _lines(summary: Summary) -> Iterator[tuple[str, str]]:
-    yield "scene", summary["scene"]
-    yield "method", summary["label"]
-    yield "bodies", f"{summary['bodies']:,}: " + ", ".join(f"{count:,} {kind}" for kind, count in summary["outcomes"].items())
-    yield "spread", ", ".join(f"{name}={value}" for name, value in summary["spread"].items()) + f"; seed {summary['seed']}"
-    run = f"{summary['t_end']:g} s in {summary['steps']:,} steps of {summary['dt']:.3g} s, {summary['samples']} samples each"
-    yield "run", run
-    if error := summary["error"]:
-        reached = "" if error["reached"] else ", so the target is not reached"
-        estimate = f"{error['estimate']:.2g} rad at most, estimated on {error['bodies']:,} bodies"
-        yield "error", f"{estimate}; target: {error['asked']:g} rad{reached}"
-    bodies, steps = (rate_text(summary[key]) for key in ("bodies_per_second", "body_steps_per_second"))
-    before = f"; {summary['found_before']:,} bodies were finished before" if summary["found_before"] else ""
-    yield "time", f"{summary['wall_time']:.3g} s in all; while integrating {bodies} bodies/s, {steps} body-steps/s{before}"
-    for name, drift in summary["drift"].items():
-        text = "none: no body has this invariant, or all bodies failed"
-        if drift is not None:
-            text = f"{drift['largest']:.2e} at most (body {drift['body']}), median {drift['median']:.1e} (relative)"
-        yield f"drift of {name}", text
-    yield "angle from the mean attitude", "median, and 5th to 95th percentile of the bodies"
-    for row in summary["angle_from_mean"]:
-        low, middle, high = ("-" if value is None else f"{math.degrees(value):.3g}°" for value in list(row.values())[1:])
-        yield f"  at t = {row['t']:.4g} s", f"{middle}, {low} to {high}"
-    yield from ((name, summary[name]) for name in ("out", "picture") if summary[name])
-    yield from ((f"body {failure['body']}", failure["text"]) for failure in summary["failures"])
 
 
 def rate_text(value: float) -> str:

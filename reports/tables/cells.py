@@ -3,41 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, is_dataclass
-from enum import Enum, StrEnum
+from dataclasses import asdict
 from typing import Any
 
 from conservative.benchmarks.measures.drift_class import CONSERVED as CONSERVED
 from conservative.benchmarks.measures.drift_class import SMALL as SMALL
 from conservative.outcome import Outcome, OutcomeKind
 
+from ..document.model import Cell as Cell
+from ..document.model import Grade as Grade
+from ..document.model import Row as Row
+from ..document.model import Table as Table
+
 DASH = "–"
 
-
-class Grade(StrEnum):
-    """How good a cell is, which the page shows by symbol, word and colour."""
-
-    GOOD = "good"
-    FAIR = "fair"
-    BAD = "bad"
-    NONE = "none"
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A cell with a grade."""
-
-    text: str
-    grade: Grade
-
-    def __str__(self) -> str:
-        return self.text
-
-
-Row = Sequence[str | Cell]
-Table = tuple[Sequence[str], Sequence[Row]]
-"""Header and rows."""
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
 _DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED, OutcomeKind.NOT_CONSERVED)
@@ -89,19 +68,6 @@ def finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def plain(value: Any) -> Any:
-    """Return a value for JSON: dataclasses as dictionaries, enums as their values, NaN and infinite numbers as null."""
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(each) for each in value]
-    if isinstance(value, Enum):
-        return value.value
-    return finite_or_none(value) if isinstance(value, float) else value
-
-
 def outcome_record(outcome: Outcome) -> dict[str, Any]:
     """Return the fields of an outcome as JSON has them."""
     residual = None if outcome.residual is None else finite_or_none(outcome.residual)
@@ -114,10 +80,3 @@ def outcome_cell(outcome: Outcome) -> Cell:
         return Cell("✓ done", Grade.GOOD)
     absent = outcome.kind in _ABSENT
     return Cell(f"{DASH if absent else '✗'} {outcome_text(outcome)}", Grade.NONE if absent else Grade.BAD)
-
-
-def markdown(table: Table) -> str:
-    """Return a table in Markdown; cells are not padded, as no reader of the page would see that."""
-    header, body = table
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *body]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -9,7 +9,8 @@ import pandas as pd
 from conservative.benchmarks.measures.measure import Measure
 from conservative.outcome import OutcomeKind
 
-from .cells import Row, Table, grade_drift, outcome_cell
+from ..document.model import Row, Style, Table
+from .cells import grade_drift, outcome_cell
 from .rows import of_study, outcomes, with_outcome, without_outcome
 
 
@@ -38,7 +39,8 @@ def conservation(table: pd.DataFrame, scene: str) -> Table:
     rows = rows[rows["scene"] == scene]
     quantities = list(rows["quantity"].unique())
     members = sorted((group for _, group in rows.groupby("method", sort=False)), key=_worst)
-    return ["method", *quantities, "run"], [_conservation(group, quantities) for group in members]
+    body = [_conservation(group, quantities) for group in members]
+    return Table(["method", *quantities, "run"], body, f"{scene}: largest drift in long runs", Style.FILTERED)
 
 
 def _worst(rows: pd.DataFrame) -> tuple[bool, float]:

@@ -76,7 +76,7 @@ def as_table(points: pd.DataFrame, interval: float, each: EachStep = NO_STEPS) -
     for label, found in zip(each.labels, (each.kept, each.alone), strict=True):
         if len(found):
             body += [[label, *row] for _, row in _rows(found, each.interval, (ERROR,))]
-    return HEADER, body
+    return Table(HEADER, body)
 
 
 def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> Iterator[tuple[float, Row]]:

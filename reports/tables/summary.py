@@ -14,7 +14,8 @@ from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind
 
-from .cells import DASH, Table, factor, number, tolerance
+from ..document.model import Cell, Row, Style, Table
+from .cells import DASH, factor, number, tolerance
 from .classes import OF_ENGINES, MethodClass, of_classes
 from .families import first_names, picture
 from .rows import without_outcome
@@ -81,25 +82,25 @@ def of_scene(
     sentence = _sentence(scene, reached[reached["error"] == MIDDLE], integrable)
     engine = cheapest(of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES))
     budget = engine.time if engine else math.nan
-    rows = []
+    rows: list[Row] = []
     for kind in MethodClass:
         members = of_classes(points, kind)
-        row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not take it, or was not measured"]
+        row: Row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not take it, or was not measured"]
         if len(members):
             families = members["family"].unique()
             best = [cheapest(of_classes(reached[reached["error"] == error], kind)) for error in ERRORS]
             row = [
-                f"{kind.value}: {', '.join(families)}",
+                Cell(kind.value, note=", ".join(families)),
                 keeps(drifts[drifts["family"].isin(families)]),
                 _error_at(of_classes(fine, kind), budget),
-                *(f"{microseconds(each.time)} {each.name}" if each else DASH for each in best),
+                *(Cell(microseconds(found.time), note=found.name) if found else DASH for found in best),
                 "; ".join(_failures(troubles[troubles["family"].isin(families)])) or "nowhere here",
             ]
         rows.append(row)
     if each is None or each.kept.empty:  # the report has no study of samples at each step
-        return Summary(sentence, data, first_names(data), (HEADER, rows))
+        return Summary(sentence, data, first_names(data), Table(HEADER, rows, style=Style.CARDS))
     rows = [[*row[:-1], _sample(kind, each), row[-1]] for kind, row in zip(MethodClass, rows, strict=True)]
-    return Summary(sentence, data, first_names(data), (SCENE_HEADER, rows))
+    return Summary(sentence, data, first_names(data), Table(SCENE_HEADER, rows, style=Style.CARDS))
 
 
 def _sample(kind: MethodClass, each: EachStep) -> str:

@@ -173,7 +173,7 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
     def broken():
         raise ValueError("not the user's mistake")
 
-    monkeypatch.setattr("conservative.reports.tables.catalogue.tables", broken)
+    monkeypatch.setattr("conservative.reports.sections.catalogue.scenes", broken)
     assert isinstance(conservative("list").exception, ValueError)
 
 

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.gate.results import Status
 from conservative.reports.cli.main import main
-from conservative.reports.page.versions import render_comparison
-from conservative.reports.tables.comparison import EXPLANATION, Answer, Standing
+from conservative.reports.document import text as text_of
+from conservative.reports.sections.comparison import EXPLANATION, Standing, build, table
 from conservative.reports.terminal import progress
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
@@ -27,14 +27,18 @@ GOOD, ON_TIME = found(), timed(SAME)
 
 def answer(was=GOOD, now=GOOD, time=ON_TIME):
     rows = [{TIMED.id: each} if each else {} for each in (was, now)]
-    return Answer(judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {}), {"command": "conservative gate --against was"})
+    return judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {})
 
 
-SLOWER = answer(time=timed(SLOW, SLOW))
+def document(*compared, **others):
+    return build(answer(*compared, **others), {"command": "conservative gate --against was"})
+
+
+SLOWER = document(time=timed(SLOW, SLOW))
 FAILED = found("diverged at 1 s", status=Status.FAILED)
 STANDINGS = {
     Standing.SAME: answer(),
-    Standing.SLOWER: SLOWER,
+    Standing.SLOWER: answer(time=timed(SLOW, SLOW)),
     Standing.FASTER: answer(time=timed(FAST)),
     Standing.WORSE: answer(now=found(steps=601.0)),
     Standing.NOTHING: answer(was=FAILED, now=FAILED, time=None),
@@ -43,13 +47,12 @@ STANDINGS = {
 
 @pytest.mark.parametrize("standing", STANDINGS)
 def test_each_row_has_a_standing(standing):
-    (line,) = STANDINGS[standing].lines
-    assert line.standing is standing
-    assert str(line.cells[2]).endswith(standing)
+    (row,) = table(STANDINGS[standing]).rows
+    assert str(row[2]).endswith(standing)
 
 
 def test_the_table_has_both_versions():
-    (row,) = answer(now=found(attitude_error_max=2e-3), time=timed(SLOW, SAME)).table[1]
+    (row,) = table(answer(now=found(attitude_error_max=2e-3), time=timed(SLOW, SAME))).rows
     assert [str(cell) for cell in row] == [
         "brick_flip",
         "reduced",
@@ -61,12 +64,12 @@ def test_the_table_has_both_versions():
         "2.00e-16",
         "2",
     ]
-    (row,) = STANDINGS[Standing.NOTHING].table[1]
+    (row,) = table(STANDINGS[Standing.NOTHING]).rows
     assert [str(cell) for cell in row[3:]] == ["–"] * 6
 
 
 def test_json_has_what_was_measured_and_null_for_what_was_not():
-    content = json.loads(answer(time=timed((math.nan,) * 3, reason="crashed")).json_text())
+    content = json.loads(text_of(document(time=timed((math.nan,) * 3, reason="crashed")), "json"))
     assert not content["passed"]
     (row,) = content["rows"]
     assert row["time"]["first"] == {"value": None, "low": None, "high": None, "processes": 7}
@@ -75,23 +78,23 @@ def test_json_has_what_was_measured_and_null_for_what_was_not():
 
 
 def test_markdown_and_junit_have_the_violations():
-    text = SLOWER.markdown_text()
-    assert text.startswith("## is against was\n\n**gate: FAILED")
+    text = text_of(SLOWER, "markdown")
+    assert text.startswith("# is against was\n\n**gate: FAILED")
     assert "| brick_flip | reduced | ✗ slower | 1.100 | 1.080 to 1.120 |" in text
     assert EXPLANATION in text
-    suite = ElementTree.fromstring(SLOWER.junit_text()).find("testsuite")
+    suite = ElementTree.fromstring(text_of(SLOWER, "junit")).find("testsuite")
     assert (suite.get("tests"), suite.get("failures")) == ("1", "1")
-    assert ElementTree.fromstring(answer().junit_text()).find("testsuite").get("failures") == "0"
+    assert ElementTree.fromstring(text_of(document(), "junit")).find("testsuite").get("failures") == "0"
 
 
 def test_the_page_has_rows_ratios_and_filters():
-    page = render_comparison(SLOWER)
-    assert 'data-standing="slower"' in page
+    page = text_of(SLOWER, "html")
     assert 'aria-label="1.100, 1.080 to 1.120"' in page
-    assert re.findall(r'name="standing" value="(\w+)"', page) == ["slower"]
+    assert '<input type="search"' in page
+    assert 'id="vega"' not in page  # it has no charts
     assert "conservative gate --against was" in page
-    assert not re.search(r'(?:src|href)="(?!data:)', page)  # it opens without a network
-    assert 'role="img"' not in render_comparison(STANDINGS[Standing.NOTHING])
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # it opens without a network
+    assert 'role="img"' not in text_of(build(STANDINGS[Standing.NOTHING]), "html")
 
 
 # ---------------------------------------------------------------------------------------------------------------- the command
@@ -117,11 +120,11 @@ def test_a_violation_exits_with_1_and_leaves_the_files(gate, tmp_path):
     options = [text for name, path in files.items() for text in (f"--{name}", path)]
     code, text = gate("--against", "main", *options)
     assert code == 1
-    assert text == f"{SLOWER}\n"
-    assert files["markdown"].read_text() == SLOWER.markdown_text()
-    assert files["html"].read_text() == render_comparison(SLOWER)
-    assert files["junit"].read_text() == SLOWER.junit_text()
-    assert gate("--against", "main", ended=answer())[0] == 0
+    assert text.splitlines() == [block.text for block in SLOWER.brief[:1]] + [f"  {each}" for each in SLOWER.failures]
+    assert files["markdown"].read_text() == text_of(SLOWER, "markdown")
+    assert files["html"].read_text() == text_of(SLOWER, "html")
+    assert files["junit"].read_text() == text_of(SLOWER, "junit")
+    assert gate("--against", "main", ended=document())[0] == 0
 
 
 @pytest.mark.parametrize("options", [("--update", "why"), ("--baseline", "kept.json"), ("results.json",)])
@@ -142,18 +145,18 @@ def test_options_of_two_versions_need_two(gate, options):
 
 def test_junit_has_violations_that_belong_to_no_row():
     nothing = answer(was=None)  # no row of the earlier version has passed: everything would
-    assert [each.measure for each in nothing.comparison.violations] == ["rows"]
-    suite = ElementTree.fromstring(nothing.junit_text()).find("testsuite")
+    assert [each.measure for each in nothing.violations] == ["rows"]
+    suite = ElementTree.fromstring(text_of(build(nothing), "junit")).find("testsuite")
     assert suite.get("failures") == "1"
     assert "rows" in suite.find(".//failure").get("message")
 
 
 def test_without_jinja2_only_the_page_is_refused_and_before_any_work(gate, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)  # neither found nor imported
-    monkeypatch.delitem(sys.modules, "conservative.reports.page.versions")
+    monkeypatch.delitem(sys.modules, "conservative.reports.document.html", raising=False)
     markdown = tmp_path / "gate.md"
-    assert gate("--against", "main", "--markdown", markdown) == (1, f"{SLOWER}\n")
-    assert gate("--against", "main", "--markdown", markdown, ended=answer())[0] == 0
+    assert gate("--against", "main", "--markdown", markdown)[0] == 1
+    assert gate("--against", "main", "--markdown", markdown, ended=document())[0] == 0
     code, text = gate("--against", "main", "--html", tmp_path / "page.html", ended=None)
     assert (code, "conservative-rotation[report]" in text) == (2, True)
     assert not (tmp_path / "page.html").exists()

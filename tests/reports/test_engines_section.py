@@ -4,25 +4,21 @@ import math
 
 import pytest
 
-from conservative import BadInput, MissingEngine, registry, scenes
+from conservative import BadInput, MissingEngine, registry
 from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.reports.charts import engines as picture
 from conservative.reports.cli.completion import engine_lists
 from conservative.reports.cli.options import split_list
-from conservative.reports.page import figures as section
+from conservative.reports.document.model import Grade
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import differences, terms
-from conservative.reports.tables.cells import Grade
+from conservative.reports.sections.closing import verdict
+from conservative.reports.sections.engines import OVER_STEPS, beside, engine_rows, every_setting, figure, picture_points
 from conservative.reports.tables.classes import OF_ENGINES, of_classes
-from conservative.reports.tables.closing import verdict
-from conservative.reports.tables.engine_rows import engine_rows, points_of
-from conservative.reports.tables.engine_scenes import engine_scenes
-from conservative.reports.tables.engine_tables import beside, every_setting
-from conservative.reports.tables.work_precision import all_points
+from conservative.reports.tables.work_precision import all_points, points
 
 from .made_up import SCENE, STEPS, at_step, over_steps
 from .rows import point, table
@@ -52,13 +48,13 @@ def measured():
 @pytest.fixture(scope="module")
 def rows():
     found = measured()
-    return {row.label: row for row in engine_rows(found, SCENE, points_of(found))}
+    return {row.label: row for row in engine_rows(found, SCENE, points(found, OVER_STEPS))}
 
 
 @pytest.fixture(scope="module")
 def settings(rows):
-    header, body = every_setting(list(rows.values()), "0.01")
-    return {row[0]: dict(zip(header, row, strict=True)) for row in body}
+    table = every_setting(list(rows.values()), "0.01", SCENE)
+    return {row[0]: dict(zip(table.header, row, strict=True)) for row in table.rows}
 
 
 def test_accurate_rows_come_first_and_those_without_an_error_last(rows):
@@ -104,20 +100,18 @@ def test_a_crash_is_a_marked_row_and_what_is_not_supported_one_for_each_engine(s
 
 
 def test_an_engine_as_installed_stands_beside_its_best(rows):
-    header, body = beside(list(rows.values()))
-    found = {row[0]: dict(zip(header, map(str, row), strict=True)) for row in body}
+    table = beside(list(rows.values()), SCENE)
+    found = {row[0]: dict(zip(table.header, map(str, row), strict=True)) for row in table.rows}
     assert list(found) == ["a==1", "b==2", "c==3"]
     assert [found["a==1"][f"{part}: attitude error, rad"] for part in ("as installed", "at its best")] == ["3", "1.0e-6"]
     assert found["b==2"]["as installed: setting"] == "–"
 
 
-def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend():
-    (scene,) = engine_scenes(measured(), (scenes.brick_flip(),))
-    assert scene.count == 3
-    lines = {tuple(line) for line in scene.points[["name", "kind"]].itertuples(index=False)}
+def test_the_picture_has_two_lines_of_an_engine_and_one_entry_in_its_legend(rows):
+    drawn = picture_points(list(rows.values()), points(measured(), OVER_STEPS))
+    lines = {tuple(line) for line in drawn[["name", "kind"]].itertuples(index=False)}
     assert lines == {("a==1", "at its best"), ("a==1", "as installed"), ("b==2", "at its best"), ("c==3", "at its best")}
-    figure = section.engine_figure(scene, picture.work_precision(scene.points, scene.name))
-    assert [entry.name for entry in figure.legend] == ["a==1", "b==2", "c==3"]
+    assert [entry.name for entry in figure(drawn, SCENE).legend] == ["a==1", "b==2", "c==3"]
 
 
 def test_a_plan_has_studies_of_engines_only_where_some_are_named():

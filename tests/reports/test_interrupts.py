@@ -136,7 +136,7 @@ def lost(*arguments):
 
 
 def test_an_interrupt_is_not_lost_in_another_exception(handled, monkeypatch):
-    monkeypatch.setattr("conservative.reports.tables.catalogue.tables", lost)
+    monkeypatch.setattr("conservative.reports.sections.catalogue.scenes", lost)
     done = CliRunner().invoke(main, ["list"])
     assert (done.exit_code, done.stdout, done.stderr) == (143, "", "Interrupted; kept\n")
 
@@ -189,8 +189,8 @@ def test_a_signal_waits_until_the_end_of_what_belongs_together(handled):
 
 def test_compiled_code_that_writes_to_stdout_leaves_json_whole():
     code = (
-        "import os\nfrom conservative.reports.tables import catalogue\nbefore = catalogue.json_text\n"
-        "def noisy():\n    os.write(1, b'a log of an engine')\n    return before()\ncatalogue.json_text = noisy\n"
+        "import os\nfrom conservative.reports.sections import catalogue\nbefore = catalogue.build\n"
+        "def noisy():\n    os.write(1, b'a log of an engine')\n    return before()\ncatalogue.build = noisy\n"
         "import sys; sys.argv = ['conservative', 'list', '--json']\n"
         "from conservative.reports.cli.launch import launch\nlaunch()"
     )
@@ -201,9 +201,9 @@ def test_compiled_code_that_writes_to_stdout_leaves_json_whole():
 
 SIGNS = """
 import sys
-from conservative.reports.tables import catalogue
-from conservative.reports.terminal.tables import TerminalTable
-catalogue.tables = lambda: [TerminalTable("times", ("µs", "done"), [("1", "✓")])]
+from conservative.reports.sections import catalogue
+from conservative.reports.document.model import Document, Table
+catalogue.build = lambda: Document("", "", [Table(("µs", "done"), [("1", "✓")], "times")])
 sys.argv = ["conservative", "list"]
 from conservative.reports.cli.launch import launch
 launch()

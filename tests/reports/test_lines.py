@@ -14,7 +14,8 @@ from conservative.benchmarks.studies import sphere_curves, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
 from conservative.reports.labels import with_names
-from conservative.reports.tables import lines, paper
+from conservative.reports.sections import paper
+from conservative.reports.tables import lines
 
 from .made_up import curves
 
@@ -123,7 +124,7 @@ def test_position_errors_fall_by_the_papers_factor():
     found = {measure: table[table["measure"] == measure.text]["value"].round(4).tolist() for measure in Measure}
     assert found[Measure.PERIOD_X1] == [0.06, 0.0205, 0.005]
     assert found[Measure.PERIOD_DISTANCE] == [0.0696, 0.0206, 0.0051]
-    assert [row[2:] for row in paper.position_errors(table)[1]] == [
+    assert [row[2:] for row in paper.position_errors(table).rows] == [
         ["0.0600", "0.0696"],
         ["0.0205", "0.0206"],
         ["0.0050", "0.0051"],

@@ -11,18 +11,18 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from conservative.reports.page import figures, page
+from conservative.reports.page.versions import render_comparison
+from conservative.reports.tables.comparison import Answer
+from conservative.reports.view import build
 
 from conservative import registry
 from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.measures import measurement
 from conservative.reports import document
-from conservative.reports.page import figures, page
-from conservative.reports.page.versions import render_comparison
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables.comparison import Answer
-from conservative.reports.view import build
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, found, timed
 from .made_up import at_step, over_steps

@@ -8,15 +8,17 @@ import pytest
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
-from conservative.reports import document, view
 from conservative.reports.charts.random_ratios import ratios as draw_ratios
+from conservative.reports.document.model import Table, walk
+from conservative.reports.report import render
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import BODIES, QUICK_BODIES, plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import terms
-from conservative.reports.tables import random_bodies
+from conservative.reports.sections import random_bodies
+from conservative.reports.sections.random_bodies import ANY, ratios
+from conservative.reports.sections.report import build
 from conservative.reports.tables.cells import tolerance
-from conservative.reports.tables.random_bodies import ANY, ratios
 from conservative.scenes.random_body import name_of
 
 from .made_up import measurements
@@ -100,7 +102,7 @@ def test_a_setting_that_was_not_timed_or_failed_is_no_way_there():
 def test_every_decade_and_every_field_has_its_row():
     other = [line(0, name, role, flat(1.0), field="gravity") for name, role in (("gauss", "ours"), ("heyoka", "engine"))]
     every = found(*TWICE, *other)
-    _, rows = random_bodies.as_table(every)
+    rows = random_bodies.as_table(every).rows
     assert [each[:2] for each in rows] == [[field, tolerance(e)] for field in (FIELD, "gravity") for e in DECADES]
 
 
@@ -115,14 +117,15 @@ def test_without_an_engine_there_is_nothing_to_say():
 
 
 def test_the_table_grades_a_ratio_below_one():
-    _, (first, *_) = random_bodies.as_table(found(*SLOWER))
+    first, *_ = random_bodies.as_table(found(*SLOWER)).rows
     assert str(first[3]) == "✗ 0.50"
-    assert str(random_bodies.as_table(found(*TWICE))[1][0][3]) == "✓ 2.00"
+    assert str(random_bodies.as_table(found(*TWICE)).rows[0][3]) == "✓ 2.00"
     assert list(map(str, first[6:])) == ["1", "gauss", "heyoka"]
 
 
 def test_each_engine_has_a_row():
-    header, rows = random_bodies.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
+    table = random_bodies.by_engine(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(30.0, least=1e-7))))
+    header, rows = table.header, table.rows
     assert header == ["field", "engine", "1e-3", "1e-6", "1e-9", "1e-12"]
     assert [row[:2] for row in rows] == [[FIELD, "heyoka"], [FIELD, "scipy"]]
     assert rows[0][2:5] == ["1.00 (0.50 to 2.00)"] * 3
@@ -156,19 +159,17 @@ def plan():
 
 def built(plan, *tables):
     found = measurements()
-    return view.build(plan, Measurements(pd.concat([found.table, *tables]), found.samples), provenance(["report"]))
+    return build(plan, Measurements(pd.concat([found.table, *tables]), found.samples), provenance(["report"]))
 
 
 @pytest.fixture(scope="module")
 def folder(plan, tmp_path_factory):
     place = tmp_path_factory.mktemp("random")
-    document.render(built(plan, ROWS), place, png=False)
+    render(built(plan, ROWS), place, png=False)
     return place
 
 
-@pytest.mark.parametrize(
-    ("file", "then"), [("report.md", "The scenes of this report"), ("index.html", '<section id="brick_flip"')]
-)
+@pytest.mark.parametrize(("file", "then"), [("report.md", "## brick_flip"), ("index.html", '<section id="brick_flip"')])
 def test_random_bodies_come_before_the_scenes(folder, file, then):
     text = (folder / file).read_text(encoding="utf-8")
     assert 0 < text.index(SECTION) < text.index(then)
@@ -185,17 +186,15 @@ def test_the_picture_is_there(folder):
 
 def test_a_report_without_random_bodies_does_not_mention_them(tmp_path):
     without = plan_report(["brick_flip"], METHODS, quick=True)
-    found = built(without)
-    document.render(found, tmp_path, png=False)
-    assert found.random is None
+    render(built(without), tmp_path, png=False)
     assert SECTION not in (tmp_path / "report.md").read_text() + (tmp_path / "index.html").read_text()
 
 
 def test_rows_of_random_bodies_are_nowhere_else(plan):
-    alone, both = built(plan), built(plan, ROWS)
-    assert [each for each in both.headline if not each.scene.startswith("random")] == list(alone.headline)
-    assert both.scenes[0].summary.classes == alone.scenes[0].summary.classes
-    assert len(both.failures[1]) == len(alone.failures[1])
+    alone, both = ({each.title: each for each in built(plan, *rows).blocks} for rows in ((), (ROWS,)))
+    for title in ("brick_flip", "What failed, what is not supported, and the reference solutions"):
+        tables = [[block for block in walk(found[title].blocks) if isinstance(block, Table)] for found in (alone, both)]
+        assert tables[0] == tables[1]
 
 
 def test_how_many_bodies_a_report_has():

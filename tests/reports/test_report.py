@@ -3,7 +3,6 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,13 +13,15 @@ from conservative import BadInput, MissingEngine, NotConverged, Reduced, registr
 from conservative.benchmarks.measures.measurement import COLUMNS
 from conservative.benchmarks.studies import selection, studies
 from conservative.methods.gauss import Gauss
-from conservative.reports import document
+from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import split_names
+from conservative.reports.document.model import Document
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables import runs
+from conservative.reports.sections import failures
+from conservative.reports.sections.report import SCHEMA
 
 from .made_up import measurements
 from .rows import frame, row
@@ -96,10 +97,10 @@ def test_a_quick_report_with_random_bodies_ends_well(tmp_path):
 
 def test_a_report_names_the_commit_that_it_began_at(monkeypatch, tmp_path):
     commits = iter(["before", "after"])
-    monkeypatch.setattr(document, "provenance", lambda: replace(provenance([]), commit=next(commits)))
-    monkeypatch.setattr(document, "measure", lambda plan, step, progress: measurements())
-    written = document.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
-    assert written.source.commit == "before"
+    monkeypatch.setattr(report, "provenance", lambda: replace(provenance([]), commit=next(commits)))
+    monkeypatch.setattr(report, "measure", lambda plan, step, progress: measurements())
+    written = report.write(plan_report(["brick_flip"], ["reduced"], quick=True), tmp_path / "report", lambda *_: None)
+    assert written.data["commit"] == "before"
 
 
 def test_table_and_json_hold_the_same_rows_with_their_origin(made):
@@ -109,7 +110,7 @@ def test_table_and_json_hold_the_same_rows_with_their_origin(made):
     assert tuple(table.columns) == COLUMNS
     assert len(stored["rows"]) == len(table) > 100
     assert {"paper", "convergence", "speed", "work_precision", "long_runs"} == set(table["study"])
-    assert stored["schema"] == document.SCHEMA
+    assert stored["schema"] == SCHEMA
     assert stored["packages"]["mujoco"]
     assert stored["machine"]["cores"]
     for key in ("command", "python", "commit", "date"):
@@ -139,7 +140,7 @@ def test_report_that_is_stopped_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
+        report.write(plan_report(["brick_flip"], ["reduced"]), tmp_path / "report", stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -150,7 +151,7 @@ def test_folder_is_checked_before_any_work(tmp_path):
         pytest.fail("work was begun")
 
     with pytest.raises(BadInput, match=r"out: got .*mine.txt"):
-        document.write(plan_report(["brick_flip"], ["reduced"]), tmp_path, fail)
+        report.write(plan_report(["brick_flip"], ["reduced"]), tmp_path, fail)
 
 
 @pytest.mark.parametrize(
@@ -200,11 +201,9 @@ def test_failure_of_ours_is_told(monkeypatch):
         row("paper", "reduced", "energy drift max", float("nan"), 0.01, scene="brick_flip", outcome=each)
         for each in (outcome, "unsupported")
     ]
-    failed = runs.failures_of_ours(frame(found))
+    failed = failures.failures_of_ours(frame(found))
     assert failed == [f"reduced on brick_flip, dt = 0.01 s: {outcome}"]
-    monkeypatch.setattr(
-        document, "write", lambda plan, out, step, resume: SimpleNamespace(failed=failed, closing=(), verdict="")
-    )
+    monkeypatch.setattr(report, "write", lambda plan, out, step, resume: Document("", "", (), failures=failed))
     done = CliRunner().invoke(main, ["report", "--methods", "reduced"])
     assert done.exit_code == 1
     assert "not converged in step 3" in done.stderr

@@ -8,9 +8,10 @@ import pytest
 from conservative import registry
 from conservative.benchmarks.measures import measurement
 from conservative.reports.labels import with_names
-from conservative.reports.tables import families, random_bodies, summary
+from conservative.reports.sections import random_bodies
+from conservative.reports.sections.headline import first_lost, of_points, of_random_bodies
+from conservative.reports.tables import families, summary
 from conservative.reports.tables.classes import MethodClass, class_of
-from conservative.reports.tables.headline import first_lost, of_points, of_random_bodies
 from conservative.reports.tables.work_precision import points
 
 from .rows import frame, point, row
@@ -28,8 +29,8 @@ def told(*lines, drifts=NOTHING, troubles=NOTHING, integrable=True):
 
 
 def cells(found, kind):
-    (line,) = [line for line in found.classes[1] if line[0].startswith(kind)]
-    return dict(zip(found.classes[0], line, strict=True))
+    (line,) = [line for line in found.classes.rows if str(line[0]).startswith(kind)]
+    return dict(zip(found.classes.header, map(str, line), strict=True))
 
 
 @pytest.mark.parametrize(
@@ -90,12 +91,12 @@ def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
 
 def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     found = told(OURS, SOLVER, SOLUTION, ENGINE)
-    assert [line[0].partition(":")[0] for line in found.classes[1]] == [kind.value for kind in MethodClass]
+    assert [str(line[0]).partition(" (")[0] for line in found.classes.rows] == [kind.value for kind in MethodClass]
     ours = cells(found, MethodClass.GENERAL)
-    assert (ours["µs at 1e-3 rad"], ours["µs at 1e-6 rad"], ours["µs at 1e-9 rad"]) == ("2.0 gauss", "3.4 gauss", "–")
+    assert (ours["µs at 1e-3 rad"], ours["µs at 1e-6 rad"], ours["µs at 1e-9 rad"]) == ("2.0 (gauss)", "3.4 (gauss)", "–")
     assert float(ours["error at equal cost"]) == 1e-7  # no smaller one was measured, at any cost
     assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
-    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 lame"
+    assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 (lame)"
     assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
 
@@ -150,7 +151,7 @@ def random(*lines, drifts=NOTHING):
 def test_random_bodies_have_a_row_a_class_too():
     found = random(*TWICE)
     ours, engine = cells(found, MethodClass.GENERAL), cells(found, MethodClass.SOLVER)
-    assert (ours["µs at 1e-6 rad"], engine["µs at 1e-6 rad"]) == ("1,000,000 gauss", "2,000,000 heyoka")
+    assert (ours["µs at 1e-6 rad"], engine["µs at 1e-6 rad"]) == ("1,000,000 (gauss)", "2,000,000 (heyoka)")
     assert (float(ours["error at equal cost"]), ours["where it fails"]) == (1e-12, "nowhere here")
     assert "no closed form" in cells(found, MethodClass.SOLUTION)["where it fails"]
     missed = random(*TWICE, *ENGINE_ALONE)

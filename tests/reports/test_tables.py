@@ -12,9 +12,13 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.errors import Diverged
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.reports import labels
+from conservative.reports.document import markdown
+from conservative.reports.document.model import Cell, Grade, Table
 from conservative.reports.run import single_run
-from conservative.reports.tables import cells, hard_cases, orders, overview, recommendation, runs, scene, scene_contests
-from conservative.reports.tables.cells import Cell, Grade, grade_drift
+from conservative.reports.sections import failures, hard_cases, recommendation, scenes
+from conservative.reports.sections import run as single
+from conservative.reports.tables import cells, orders, overview, scene_contests
+from conservative.reports.tables.cells import grade_drift
 from conservative.reports.tables.work_precision import points
 from conservative.trajectory import Trajectory
 
@@ -61,7 +65,8 @@ def test_drift_is_that_of_the_scenes_own_step():
     found = [row("paper", "energy drift max", 2e-16), row("paper", "energy drift max", 5e-16, dt=0.005)]
     found += [row("paper", "energy drift slope", 3e-18), row("paper", "energy drift slope stderr", 1e-18)]
     found += [row("paper", "orthonormality max", 4e-16)]
-    header, body = scene.drift(frame(found), "made_up")
+    table = scenes.drift(frame(found), "made_up")
+    header, body = table.header, table.rows
     assert header == ["method", "energy", "energy, 1/s", "orthonormality"]
     assert body == [["reduced", "2.0e-16", "3.0e-18 ± 1e-18", "4.0e-16"]]
 
@@ -70,28 +75,18 @@ def test_time_is_in_steps_of_reduced_too():
     found = [row("speed", "time per step", 5e-8), row("speed", "time per simulated second", 5e-6, detail="9 rounds")]
     engine = {"method": "mujoco", "version": "4.0.0", "setting": "RK4"}
     found += [row("speed", "time per step", 6e-6, **engine), row("speed", "time per simulated second", 6e-4, **engine)]
-    body = scene.time(frame(found), "made_up")[1]
+    body = scenes.time(frame(found), "made_up").rows
     assert body[0][:3] == ["reduced", "1", "50"]
     assert body[1][:3] == ["mujoco 4.0.0 RK4", "120", "6,000"]
     assert body[0][-1] == "9 rounds"
-
-
-def test_what_is_paid_once_is_in_the_units_of_its_columns():
-    found = [row("speed", "prepare time", 0.002), row("speed", "first call time", 0.03), row("speed", Measure.TIME, 4e-6)]
-    header, body = scene.costs_paid_once(frame(found), "made_up")
-    assert dict(zip(header, body[0], strict=True)) == {
-        "method": "reduced",
-        "prepare, ms": "2",
-        "first call, ms": "30",
-        "simulated second, µs": "4",
-    }
 
 
 def test_every_time_is_in_the_unit_of_its_column():
     measures = (Measure.TIME_PER_STEP, Measure.TIME_PER_STEP_MEDIAN, Measure.TIME, Measure.TIME_MEDIAN)
     found = [row("speed", measure, value) for measure, value in zip(measures, (1e-9, 2e-9, 3e-6, 4e-6), strict=True)]
     found += [row("speed", Measure.PREPARE, 5e-3), row("speed", Measure.FIRST_CALL, 6e-3)]
-    header, ((_, *values, _),) = scene.time(frame(found), "made_up")
+    table = scenes.time(frame(found), "made_up")
+    header, ((_, *values, _),) = table.header, table.rows
     assert header[2:8] == ["step, ns, min", "median", "simulated second, µs, min", "median", "prepare, ms", "first call, ms"]
     assert values[1:] == ["1", "2", "3", "4", "5", "6"]
 
@@ -102,7 +97,8 @@ def test_errors_have_the_unit_that_they_are_measured_in():
         row("paper", Measure.ATTITUDE_FINAL, 2.0),
         row("paper", Measure.RATES_MAX, 3.0),
     ]
-    assert scene.accuracy(frame(found), "made_up") == (
+    table = scenes.accuracy(frame(found), "made_up")
+    assert (table.header, table.rows) == (
         [
             "method",
             *(
@@ -116,7 +112,8 @@ def test_errors_have_the_unit_that_they_are_measured_in():
 
 def order_table(found):
     table = frame(found)
-    return scene.order(*(orders.fits(orders.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX)))
+    fits = (orders.fits(orders.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
+    return scenes.order(*fits, "made_up")
 
 
 def test_order_is_fitted_and_its_window_told():
@@ -125,13 +122,13 @@ def test_order_is_fitted_and_its_window_told():
         for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX)
         for dt in (0.08, 0.04, 0.02, 0.01)
     ]
-    body = order_table(found)[1]
+    body = order_table(found).rows
     assert body == [["reduced", "2.00 ± 0.00", "2.00 ± 0.00", "0.08 to 0.01", "4", "–"]]
 
 
 def test_too_few_points_give_the_reason_and_no_order():
     found = [row("convergence", Measure.ATTITUDE_MAX, dt, dt=dt) for dt in (0.2, 0.1)]
-    (cells,) = order_table(found)[1]
+    (cells,) = order_table(found).rows
     assert cells[1] == "no order"
     assert "2 runs" in cells[3]
 
@@ -147,8 +144,8 @@ def test_failures_and_what_is_unsupported_are_told_apart():
         row("convergence", "observed order", nan, dt=nan, outcome=cannot("2 points", "no order")),
     ]
     table = frame(found)
-    assert runs.failures(table)[1] == [["made_up", "reduced", "diverged after t = 1 s", "paper, long_runs", "0.01"]]
-    assert runs.unsupported(table)[1] == [
+    assert failures.failures(table).rows == [["made_up", "reduced", "diverged after t = 1 s", "paper, long_runs", "0.01"]]
+    assert failures.unsupported(table).rows == [
         ["made_up", "unsupported", "for free bodies", "reduced"],
         ["made_up", "missing", "pip install x", "reduced"],
     ]
@@ -159,14 +156,14 @@ def test_what_a_method_cannot_do_is_told_once_with_its_first_reason():
         row("paper", "energy drift max", math.nan, method=method, outcome=cannot(reason))
         for method, reason in (("a", "2 > 1"), ("a", "3 > 1"), ("b", "for free bodies"), ("c", "for free bodies"))
     ]
-    assert runs.unsupported(frame(found))[1] == [
+    assert failures.unsupported(frame(found)).rows == [
         ["made_up", "unsupported", "2 > 1", "a"],
         ["made_up", "unsupported", "for free bodies", "b, c"],
     ]
 
 
 def test_markdown_escapes_what_would_end_a_cell():
-    assert cells.markdown((["a", "b"], [["|w|", "1"]])) == "| a | b |\n| --- | ---: |\n| \\|w\\| | 1 |"
+    assert markdown.table(Table(["a", "b"], [["|w|", "1"]])) == "| a | b |\n| --- | ---: |\n| \\|w\\| | 1 |"
 
 
 @pytest.mark.parametrize("value", [0.25, 12.0, 0.01, 3.1e-7, 5e4])
@@ -176,7 +173,8 @@ def test_a_number_below_nothing_is_shown_as_its_size_is(value):
 
 def test_contests_are_in_microseconds():
     lines = [*point("gauss", "ours", 1e-3, 2e-6), *point("scipy", "engine", 1e-3, 8e-6), *point("lame", "ours", 1e-3, 1e-6)]
-    header, (_, _, line) = scene_contests.as_table(points(frame(lines)), 0.5)
+    table = scene_contests.as_table(points(frame(lines)), 0.5)
+    header, (_, _, line) = table.header, table.rows
     assert [name for name in header if "µs" in name] == ["µs per s", "µs a sample"] * 3
     sides = (["gauss", "2.00", "1.00"], ["scipy", "8.00", "4.00"], ["4.00"], ["lame", "1.00", "0.500"], ["8.00"])
     assert line == ["1e-3", *chain.from_iterable(sides)]
@@ -206,8 +204,9 @@ def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds()
 
 def test_truths_are_told_with_their_agreement():
     found = [rows.row("paper", "exact", Measure.AGREEMENT, 2.5e-15, 0.01, role="truth", label="exact and heyoka")]
-    header, body = runs.truths(frame(found))
-    assert header[1:] == ["dt, s", "truths", "largest angle between them, rad"]
+    table = failures.truths(frame(found))
+    header, body = table.header, table.rows
+    assert header[1:] == ["dt, s", "reference solutions", "largest angle between them, rad"]
     assert body == [["made_up", "0.01", "exact and heyoka", "2.5e-15"]]
 
 
@@ -224,7 +223,7 @@ def test_the_largest_drift_is_shown_and_not_the_last(bumped):
     assert "2.00e-03 (relative)" in bumped._repr_html_()
     summary = single_run.summarize(bumped, cv.Reduced(), 0.1)
     assert summary["drift"]["energy"] == pytest.approx(2.001e-3, rel=1e-6)
-    assert "2.00e-03 (relative)" in single_run.summary_text(summary)
+    assert "2.00e-03 (relative)" in markdown.render(single.build([summary]))
     assert (summary["last"]["t"], summary["last"]["energy"]) == (bumped.t[-1], bumped.energy[-1])
 
 
@@ -243,7 +242,7 @@ def test_methods_are_ranked_by_what_they_keep():
         made_up.row("long_runs", "mujoco", "energy drift max", 1e-2, role="engine"),
         made_up.row("long_runs", "reduced", "energy drift max", 1e-15),
     ]
-    _, body = overview.conservation(frame(found), "brick_flip")
+    body = overview.conservation(frame(found), "brick_flip").rows
     assert [line[0] for line in body] == ["reduced", "mujoco", "b"]
 
 
@@ -276,11 +275,11 @@ def test_hard_cases_are_a_matrix():
         made_up.row("hard_cases", "reduced", "energy drift max", math.nan, scene="falling_top", outcome="not converged"),
         made_up.row("hard_cases", "mujoco", "energy drift max", 0.1, scene="needle", role="engine"),
     ]
-    header, body = hard_cases.hard_cases(frame(found)).as_table
-    assert header == ["method", "needle", "falling_top"]
-    assert body == [
-        ["reduced", "motion –, invariants ✓ 1.0e-15 energy", "✗ not converged"],
-        ["mujoco", "motion –, invariants ✗ 0.1 energy", "– not run"],
+    table = hard_cases.hard_cases(frame(found))
+    assert table.header == ["case", "reduced", "mujoco"]
+    assert [list(map(str, row)) for row in table.rows] == [
+        ["needle", "motion –, invariants ✓ 1.0e-15 energy", "motion –, invariants ✗ 0.1 energy"],
+        ["falling_top", "✗ not converged", "– not run"],
     ]
     assert hard_cases.hard_cases(made_up.table()) is None
 
@@ -288,7 +287,7 @@ def test_hard_cases_are_a_matrix():
 def judged(*values):
     found = [made_up.row("hard_cases", "reduced", measure, value) for measure, value in values]
     judgement = hard_cases.judge(frame(found))
-    return judgement.motion.grade, judgement.invariants.grade
+    return tuple(part.grade for part in judgement.parts)
 
 
 def test_a_hard_case_is_judged_by_its_motion_and_by_its_worst_invariant():
@@ -304,7 +303,7 @@ def test_methods_stand_in_the_order_in_which_they_did_well():
         made_up.row("hard_cases", name, "attitude error max", error, scene="needle")
         for name, error in (("a", 1.0), ("b", 1e-9))
     ]
-    assert hard_cases.hard_cases(frame(found)).methods == ("b", "a")
+    assert hard_cases.hard_cases(frame(found)).header == ["case", "b", "a"]
 
 
 def test_longest_steps_are_a_matrix():
@@ -315,6 +314,6 @@ def test_longest_steps_are_a_matrix():
         made_up.row("stability", "b", largest, 10.0, scene="needle"),
         made_up.row("stability", "c", largest, math.nan, scene="needle", outcome="unsupported"),
     ]
-    _, body = hard_cases.stability(frame(found))
+    body = hard_cases.stability(frame(found)).rows
     assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
     assert overview.scenes_in_trouble(frame(found)).empty

@@ -8,8 +8,9 @@ import sys
 
 import pytest
 
+from conservative.reports.document.model import Table
+from conservative.reports.document.terminal import fit_columns, print_table
 from conservative.reports.terminal import progress
-from conservative.reports.terminal.tables import TerminalTable, fit_columns, print_tables
 
 STEPS = """
 from time import sleep
@@ -87,7 +88,7 @@ ROWS = [("projected:order=4", "ok", "1.1e-16", "2.3e-9"), ("pinocchio", "unsuppo
 @pytest.mark.parametrize("width", [12, 30, 40, 50, 60, 80, 200])
 def test_no_word_is_broken_and_no_line_too_long(width, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(width))
-    print_tables([TerminalTable("Runs", HEADER, ROWS)])
+    print_table(Table(HEADER, ROWS, "Runs"))
     lines = capsys.readouterr().out.splitlines()
     shown = len(fit_columns([HEADER, *ROWS], width))
     words = [word for row in (HEADER, *ROWS) for cell in row[:shown] for word in cell.split()]

@@ -8,12 +8,13 @@ import pytest
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.throughput import EXACT
-from conservative.reports import document, view
 from conservative.reports.labels import with_names
+from conservative.reports.report import render
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
-from conservative.reports.tables import throughput
+from conservative.reports.sections import many_bodies as throughput
+from conservative.reports.sections.report import build
 from conservative.reports.tables.classes import MethodClass
 
 from .made_up import measurements
@@ -84,7 +85,7 @@ def test_a_side_that_does_not_reach_the_error_has_no_ratio(compared):
 
 def test_the_table_has_every_line_and_at_how_many_bodies():
     found = throughput.lines(with_names(ROWS))
-    _, rows = throughput.cost_table(found, throughput.body_costs(found))
+    rows = throughput.cost_table(found, throughput.body_costs(found)).rows
     assert ["heavy tops", "taylor, one at a time"] in [row[:2] for row in rows]
     (heyoka,) = [row for row in rows if row[:2] == ["heavy tops", "heyoka"]]
     assert heyoka[5:7] == ["8 (10)", "20 (10)"]
@@ -101,15 +102,15 @@ def test_what_did_not_run_has_its_reason():
         "throughput", "mjx", "attitude error max", float("nan"), outcome="unsupported", role="engine", scene="heavy_tops"
     )
     elsewhere = replace(failed, study="speed")
-    _, rows = throughput.absent(with_names(measurement.frame([*OURS, failed, elsewhere])))
+    rows = throughput.absent(with_names(measurement.frame([*OURS, failed, elsewhere]))).rows
     assert rows == [["heavy tops", "mjx", "unsupported: "]]
 
 
 def test_the_report_has_a_section_with_a_picture(tmp_path):
     plan, found = plan_report(["brick_flip"], ["reduced:order=4", "heyoka:tol=1e-9"], full=True, bodies=1), measurements()
     assert plan.names[-1] == "throughput"
-    built = view.build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
-    document.render(built, tmp_path, png=False)
+    built = build(plan, Measurements(pd.concat([found.table, ROWS]), found.samples), provenance(["report"]))
+    render(built, tmp_path, png=False)
     for name in ("report.md", "index.html"):
         assert "heyoka is 2.00 times as fast as ours" in (tmp_path / name).read_text(encoding="utf-8").replace("&#39;", "'")
     assert (tmp_path / "many_bodies.svg").read_text(encoding="utf-8").count("<path") > 20

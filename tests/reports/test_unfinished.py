@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from conservative import BadInput, NotConverged
 from conservative.benchmarks.measures.measurement import Samples
 from conservative.method import Role
-from conservative.reports import document
+from conservative.reports import report
 from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
 from conservative.reports.run.plan import plan_report
@@ -126,7 +126,7 @@ def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finish
 
     made = plan_report(["brick_flip"], ["reduced:order=4"], quick=True)
     with pytest.raises(KeyboardInterrupt):
-        document.write(made, unfinished / "report", stop)
+        report.write(made, unfinished / "report", stop)
     assert (unfinished / "report.partial.json").read_text() == before
 
 
@@ -137,7 +137,7 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
 
     made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
     with pytest.raises(BadInput) as caught:
-        document.write(made, tmp_path / "report", fail)
+        report.write(made, tmp_path / "report", fail)
     assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
     assert list(json.loads((tmp_path / "report.partial.json").read_text())["pieces"]) == ["paper"]
 

@@ -7,7 +7,8 @@ import pytest
 from conservative.benchmarks.contest import Cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.paper import APPROXIMATE
-from conservative.reports.tables import headline, scene_contests, summary, work_precision
+from conservative.reports.sections import headline
+from conservative.reports.tables import scene_contests, summary, work_precision
 from conservative.reports.tables.classes import MethodClass
 from conservative.reports.tables.work_precision import points
 
@@ -146,8 +147,8 @@ FOUND = scene_contests.each_step(TABLE, "made_up")
 
 def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
     told = summary.of_scene(points(TABLE), frame([]), frame([]), integrable=True, each=FOUND)
-    position = told.classes[0].index("µs a sample, each step kept")
-    assert [line[position] for line in told.classes[1]] == [
+    position = told.classes.header.index("µs a sample, each step kept")
+    assert [line[position] for line in told.classes.rows] == [
         "0.30 gauss; the end alone: 0.10 reduced",
         "0.10 lame; the end alone: 0.010",
         "0.60 heyoka; the end alone: 0.050",
@@ -156,13 +157,14 @@ def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
 
 
 def test_contests_have_both_at_last_in_the_units_of_their_columns():
-    header, body = scene_contests.as_table(points(TABLE), 0.5, FOUND)
+    table = scene_contests.as_table(points(TABLE), 0.5, FOUND)
+    header, body = table.header, table.rows
     assert header[1:4] == ("cheapest general integrator of ours", "µs per s", "µs a sample")
     kept, alone = body[-2:]
     assert kept[:8] == ["1e-6, each 0.1 s kept", "gauss", "3.00", "0.300", "heyoka", "6.00", "0.600", "2.00"]
     assert kept[8:] == ["lame", "1.00", "0.100", "6.00"]
     assert alone[:8] == ["1e-6, each 0.1 s, the end kept", "reduced", "1.00", "0.100", "heyoka", "0.500", "0.0500", "0.500"]
-    assert len(scene_contests.as_table(points(TABLE), 0.5)[1]) == len(body) - 2
+    assert len(scene_contests.as_table(points(TABLE), 0.5).rows) == len(body) - 2
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])

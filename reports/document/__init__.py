@@ -1,0 +1,24 @@
+"""One model of a document (`model`) and a renderer for each format: Markdown, HTML, JSON, JUnit and the terminal."""
+
+from __future__ import annotations
+
+from .model import Document
+
+
+def text(document: Document, kind: str) -> str:
+    """Return a document as "markdown", "html", "junit" or "json" (its data). Renderers are imported when they are used."""
+    if kind == "markdown":
+        from . import markdown
+
+        return markdown.render(document)
+    if kind == "html":
+        from . import html
+
+        return html.render(document)
+    if kind == "junit":
+        from . import junit
+
+        return junit.render(document)
+    from . import json
+
+    return json.render(document.data)

@@ -1,0 +1,85 @@
+"""One HTML file of a document. It opens from disk without a network: style, scripts, libraries and data are in the file.
+
+Vega, Vega-Lite and Vega-Embed draw the charts; DataTables sorts and filters the tables. They are packed with gzip (45 % of
+their length) and unpacked by the browser. A document without charts or tables does not carry their library.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from .model import Document, Section, Style, Table, walk
+
+WIDEST = 1.35
+"""Largest ratio in the drawing of an interval, and the reciprocal of the smallest."""
+
+
+def render(document: Document) -> str:
+    """Return the page of a document."""
+    loader = FileSystemLoader(Path(__file__).parent)
+    environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"whole": _whole, "narrow": _narrow, "place": _place}
+    blocks = list(walk(document.blocks))
+    linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
+    scripts: dict[str, str] = {}
+    if charts := {figure.name: list(figure.panels) for figure in document.figures if figure.panels}:
+        scripts |= {"charts": pack(json.dumps(_with_colours(charts), separators=(",", ":"))), "vega": _vega()}
+    if any(isinstance(block, Table) and block.style in (Style.SORTED, Style.FILTERED) for block in blocks):
+        scripts["datatables"] = _datatables()
+    template = environment.get_template("page.html.j2")
+    return re.sub(r"\n{2,}", "\n", template.render(document=document, linked=linked, scripts=scripts)) + "\n"
+
+
+def pack(text: str) -> str:
+    """Return a text compressed by gzip, in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
+
+
+@lru_cache(maxsize=1)
+def _vega() -> str:
+    import vl_convert
+
+    return pack(vl_convert.javascript_bundle("export default vegaEmbed;"))
+
+
+@lru_cache(maxsize=1)
+def _datatables() -> str:
+    import itables.options
+
+    return pack(Path(itables.options.dt_bundle).read_text(encoding="utf-8"))
+
+
+def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
+    """Return what the script draws, with replacements for the colours that have too little contrast on a light or dark page."""
+    from ..charts import contrast
+
+    found = contrast.colours_in(json.dumps(charts))
+    papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
+    return {"figures": charts, "colours": {name: contrast.stand_ins(found, paper) for name, paper in papers.items()}}
+
+
+def _whole(text: str) -> Markup:
+    """Return a text in which no line breaks within a number such as 1e-3, or before its unit; words in backticks are code."""
+    whole = re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", whole))
+
+
+def _narrow(name: str) -> Markup:
+    """Return a name in which a line may break after each underscore, so that a narrow column has whole words."""
+    return Markup(str(escape(name)).replace("_", "_<wbr>"))
+
+
+def _place(ratio: float) -> float:
+    """Return the place of a ratio on a logarithmic axis with 1 in the middle, in percent of its length."""
+    share = 0.5 + 0.5 * math.log(ratio) / math.log(WIDEST)
+    return round(100 * min(max(share, 0.0), 1.0), 2)

@@ -1,0 +1,262 @@
+"""The model of a document: sections of paragraphs, lists, tables and figures, which every renderer understands.
+
+Text is plain. Words between backticks are code. Everything else that a renderer shows (status, notes, intervals) is a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Grade(StrEnum):
+    """How good a cell is. The page shows it as a colour, in addition to a symbol in the text."""
+
+    GOOD = "good"
+    FAIR = "fair"
+    BAD = "bad"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A ratio with the ends of its interval, which the page draws on a logarithmic axis around 1, with a dashed `limit`."""
+
+    value: float
+    low: float
+    high: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell with more than text.
+
+    Attributes
+    ----------
+    text
+        The text.
+    grade
+        How good it is, if it is judged.
+    note
+        Less important words after the text, such as the method that a time belongs to.
+    interval
+        The interval to draw next to the text.
+    parts
+        The two halves of a cell in a table of style `GRID`; the text is then shown on request.
+    """
+
+    text: str
+    grade: Grade | None = None
+    note: str = ""
+    interval: Interval | None = None
+    parts: tuple[Cell, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.note})" if self.note else self.text
+
+
+Row = Sequence[str | Cell]
+
+
+class Style(StrEnum):
+    """How the page shows a table."""
+
+    SORTED = "sorted"
+    """Columns sort by a click."""
+    FILTERED = "filtered"
+    """Columns sort, and a search field selects rows."""
+    CARDS = "cards"
+    """A phone shows each row as a card."""
+    GRID = "grid"
+    """A matrix of small cells in two halves, whose text appears below the table."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table."""
+
+    header: Sequence[str]
+    rows: Sequence[Row]
+    caption: str = ""
+    style: Style = Style.SORTED
+
+
+class Role(StrEnum):
+    """What a paragraph is."""
+
+    BODY = ""
+    LEAD = "lead"
+    NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph."""
+
+    text: str
+    role: Role = Role.BODY
+
+
+@dataclass(frozen=True)
+class Item:
+    """An item of a list: an optional subject in bold, the text, and whether the page marks it with a cross."""
+
+    text: str
+    subject: str = ""
+    marked: bool = False
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list."""
+
+    items: Sequence[Item]
+
+    @classmethod
+    def of(cls, texts: Iterable[str]) -> Items:
+        """Return a list of plain texts."""
+        return cls([Item(text) for text in texts])
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Names and values."""
+
+    facts: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """A button of a legend: the line, its colour, its mark as an SVG outline or its dash, and whether it is drawn at first."""
+
+    name: str
+    colour: str
+    path: str
+    dash: str
+    shown: bool = True
+
+
+class Layout(StrEnum):
+    """How the page arranges the panels of a figure."""
+
+    SINGLE = ""
+    PANELS = "panels"
+    PAIRS = "pairs"
+    SPHERES = "sphere"
+    FAMILIES = "families"
+    """One chart, with a switch for single settings (the chart's parameter `single`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A figure.
+
+    Attributes
+    ----------
+    name
+        Name of the file of the picture, and anchor on the page.
+    title, summary
+        The caption; the summary states what the figure shows.
+    picture
+        The Altair chart that Markdown shows as a file; None for a figure of the page alone.
+    panels
+        The Vega-Lite specifications that the page draws; None for a figure of Markdown alone.
+    legend, layout
+        Buttons below the panels, and the arrangement of these.
+    """
+
+    name: str
+    title: str
+    summary: str = ""
+    picture: Any = None
+    panels: Sequence[dict[str, Any]] | None = None
+    legend: Sequence[LegendEntry] = ()
+    layout: Layout = Layout.SINGLE
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with blocks. The page links sections with an anchor in its header, under the title or the shorter `menu`."""
+
+    title: str
+    blocks: Sequence[Block]
+    anchor: str = ""
+    menu: str = ""
+    folded: bool = False
+    """Whether the page shows the title alone until it is pressed."""
+
+
+Block = Paragraph | Items | Facts | Table | Figure | Section
+
+
+@dataclass(frozen=True)
+class Check:
+    """A test case for continuous integration: group, name, output, and why it failed (empty if it passed)."""
+
+    group: str
+    name: str
+    output: str = ""
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A document.
+
+    Attributes
+    ----------
+    command
+        The command that writes it, such as `conservative track`.
+    title
+        The main heading.
+    blocks
+        The content; a section with its heading is a block.
+    brief
+        What the terminal shows instead of all blocks, if that is less.
+    data
+        The content for programs: dictionaries, lists, dataclasses, enums, numbers (JSON writes NaN and infinity as null).
+    checks
+        The test cases, of a document that judges something.
+    failures
+        Why the command fails; empty if it does not.
+    """
+
+    command: str
+    title: str
+    blocks: Sequence[Block]
+    brief: Sequence[Block] | None = None
+    data: Mapping[str, Any] | Sequence[Any] = field(default_factory=dict)
+    checks: Sequence[Check] = ()
+    failures: Sequence[str] = ()
+
+    @property
+    def figures(self) -> list[Figure]:
+        """All figures, in their order."""
+        return [block for block in walk(self.blocks) if isinstance(block, Figure)]
+
+
+def walk(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Yield blocks and the blocks of their sections, in reading order."""
+    for block in blocks:
+        yield block
+        if isinstance(block, Section):
+            yield from walk(block.blocks)
+
+
+def filled(*blocks: Block | None) -> list[Block]:
+    """Return blocks without those that are None, and without tables, lists and sections that are empty."""
+    return [block for block in blocks if block is not None and _has_content(block)]
+
+
+def _has_content(block: Block) -> bool:
+    match block:
+        case Table():
+            return bool(block.rows)
+        case Items():
+            return bool(block.items)
+        case Section():
+            return bool(block.blocks)
+    return True

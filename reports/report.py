@@ -1,0 +1,76 @@
+"""`conservative report`: measure, build the document, write it; completely or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from conservative import files
+from conservative.errors import BadInput
+
+from .document import json
+from .document.model import Document, Figure
+from .run import checkpoint
+from .run.measure import measure
+from .run.plan import Plan
+from .run.provenance import provenance
+from .terminal.progress import Step, announce
+from .terminal.report_folder import MANIFEST, report_folder
+
+
+def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
+    """Measure and write the report into the folder `out`, and return its document.
+
+    If the report is interrupted or fails, finished studies are kept (see `checkpoint`), and a note on the exception says so.
+    With `resume` they are not measured again.
+
+    Raises
+    ------
+    BadInput
+        The folder cannot be written, or there is nothing to resume; raised before any work.
+    """
+    source = provenance()  # before any work: files, and the commit, can change in the meantime
+    progress = checkpoint.begin(plan, out, source, resume)
+    source = replace(source, resumed=progress.describe_earlier(), environments=plan.locks)
+    try:
+        with report_folder(out) as folder:
+            measurements = measure(plan, step, progress)
+            step(1.0, "pictures and page")
+            announce("pictures and page")
+            from .sections.report import build  # here, as altair takes a second to import
+
+            document = build(plan, measurements, source)
+            render(document, folder, plan.png)
+            files.write_text(folder / "measurements.csv", measurements.table.to_csv(index=False, lineterminator="\n"), "out")
+            names = sorted({path.name for path in folder.iterdir()} | {MANIFEST})
+            files.write_text(folder / MANIFEST, json.render({**dict(document.data), "files": names}, indent=1), "out")
+    except BaseException as error:
+        if progress.results or not isinstance(error, BadInput):
+            error.add_note(progress.summary)
+        raise
+    progress.remove()
+    return document
+
+
+def render(document: Document, folder: Path, png: bool) -> None:
+    """Write report.md with its pictures, and the page."""
+    from .document import html, markdown
+
+    def draw(figure: Figure) -> str:
+        return save_picture(figure.picture, folder / figure.name, png)
+
+    files.write_text(folder / "report.md", markdown.render(document, draw), "out")
+    files.write_text(folder / "index.html", html.render(document), "out")
+
+
+def save_picture(chart: Any, path: Path, png: bool) -> str:
+    """Write a picture as SVG, and as PNG if `png`; return the name of the SVG."""
+    import vl_convert
+
+    specification = chart.to_json()
+    svg = path.with_suffix(".svg")
+    files.write_text(svg, vl_convert.vegalite_to_svg(specification), "out")
+    if png:
+        files.write_bytes(path.with_suffix(".png"), vl_convert.vegalite_to_png(specification, scale=2), "out")
+    return svg.name

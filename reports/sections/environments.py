@@ -1,0 +1,37 @@
+"""Environments of engines: the list, and what `install` and `remove` did."""
+
+from __future__ import annotations
+
+from conservative import registry
+from conservative.references.environments.environment import Environment, list_environments
+from conservative.references.environments.install import Installation
+
+from ..document.model import Document, Paragraph
+
+
+def build() -> Document:
+    """Return a line for each environment, and one for each engine without any."""
+    environments, lines = list_environments(), []
+    for engine in registry.list_engines():
+        mine = [environment for environment in environments if environment.engine == engine]
+        lines += [_line(environment) for environment in mine] or [f"{engine}: no environment"]
+    data = {"engines": registry.list_engines(), "environments": environments}
+    return Document("conservative engines", "Engines and environments", [Paragraph(line) for line in lines], data=data)
+
+
+def _line(environment: Environment) -> str:
+    return f"{environment.engine}=={environment.version}: Python {environment.python}, {', '.join(environment.packages)}"
+
+
+def installation_line(done: Installation) -> str:
+    """Return the result of an installation in one line."""
+    environment, how = done.environment, "installed" if done.new else "already installed"
+    name = f"{environment.engine}=={environment.version}"
+    trouble = f"; cannot be imported: {done.trouble}" if done.trouble else ""
+    advice = f". Run: conservative engines install --force {name}" if done.trouble and not done.new else ""
+    return f"{name}: {how}, {len(environment.packages)} packages, Python {environment.python}{trouble}{advice}"
+
+
+def removal_line(environment: Environment) -> str:
+    """Return one line about a removed environment."""
+    return f"{environment.engine}=={environment.version}: removed"

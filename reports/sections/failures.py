@@ -1,0 +1,77 @@
+"""Failed runs, unsupported and missing runs, and the agreement of the reference solutions."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.studies import ENGINES, HARD
+from conservative.method import Role
+from conservative.outcome import OutcomeKind
+
+from ..document.model import Paragraph, Section, Style, Table, filled
+from ..tables.cells import number, outcome_text
+from ..tables.rows import of_study, outcomes, with_outcome, without_outcome
+
+_ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
+_ELSEWHERE = (*HARD, *ENGINES)
+"""Studies with tables of their own."""
+
+
+def section(table: pd.DataFrame) -> Section:
+    """Return the section of the rows of a report."""
+    words = (
+        "Runs that did not reach their end, and runs that were skipped because they would have exceeded `--time-limit`. "
+        "Errors are relative to a reference solution that a second, independent one confirms."
+    )
+    absent = Section("Unsupported or not installed", filled(unsupported(table)), folded=True)
+    title = "What failed, what is not supported, and the reference solutions"
+    return Section(title, filled(Paragraph(words), failures(table), absent, truths(table)), "failures", "What failed")
+
+
+def failures(table: pd.DataFrame) -> Table:
+    """Return the runs that failed or were skipped."""
+    rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *_ABSENT)
+    rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
+    body = [
+        [*map(str, key), ", ".join(members["study"].unique()), _steps(members)]
+        for key, members in rows.groupby(["scene", "name", "text"], sort=False)
+    ]
+    header = ["scene", "method", "outcome", "studies", "at steps, s"]
+    return Table(header, body, "Runs that failed or were skipped", Style.FILTERED)
+
+
+def _steps(members: pd.DataFrame) -> str:
+    steps = sorted(members["dt"].dropna().unique(), reverse=True)
+    return ", ".join(f"{step:.3g}" for step in steps) or "–"
+
+
+def unsupported(table: pd.DataFrame) -> Table:
+    """Return what is unsupported or not installed: a row for each reason, with all its methods."""
+    rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *_ABSENT)
+    # A reason can contain numbers that differ from step to step: the first one stands for all of a method.
+    rows = rows.assign(reason=rows.groupby(["scene", "outcome", "name"])["reason"].transform("first"))
+    body = [
+        [*map(str, key), ", ".join(members["name"].unique())]
+        for key, members in rows.groupby(["scene", "outcome", "reason"], sort=False)
+    ]
+    return Table(["scene", "outcome", "why (numbers: of the first)", "methods"], body)
+
+
+def truths(table: pd.DataFrame) -> Table:
+    """Return the difference of the two independent reference solutions, for each scene and step."""
+    rows = table[table["measure"] == Measure.AGREEMENT.text]
+    body = [[row["scene"], f"{row['dt']:g}", row["label"], number(row["value"])] for _, row in rows.iterrows()]
+    header = ["scene", "dt, s", "reference solutions", "largest angle between them, rad"]
+    return Table(header, body, "Agreement of two independent reference solutions")
+
+
+def failures_of_ours(table: pd.DataFrame) -> list[str]:
+    """Return the failures of our methods at the steps of the paper, one line each."""
+    rows = of_study(table, "paper")
+    rows = without_outcome(rows[rows["role"] == Role.OURS.value], OutcomeKind.OK, OutcomeKind.SKIPPED, *_ABSENT)
+    lines = [
+        f"{method} on {scene}, dt = {dt:g} s: {outcome}"
+        for method, scene, dt, outcome in zip(rows["method"], rows["scene"], rows["dt"], outcomes(rows), strict=True)
+    ]
+    return list(dict.fromkeys(lines))

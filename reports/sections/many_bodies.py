@@ -1,0 +1,186 @@
+"""The study of throughput: what a body costs among many at an error, and ratios of each engine to ours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import pandas as pd
+
+from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.studies import THROUGHPUT
+from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
+from conservative.outcome import OutcomeKind
+
+from ..charts import throughput, vega_embed
+from ..charts.style import families_of
+from ..document.model import Cell, Figure, Items, Layout, Paragraph, Role, Section, Style, Table, filled
+from ..tables.cells import DASH, number, tolerance
+from ..tables.classes import OF_ENGINES, MethodClass, class_of
+from .random_bodies import grade, ratio_text
+
+TERMS = (
+    "The bodies all differ: asymmetric, in turned frames, heavy tops with no point on an axis, or free, drawn from a seed. "
+    "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
+    "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
+    "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
+    "not count. Solutions of integrable motions are a class apart: solutions take steps of 0.1 s, and would take any. Where "
+    "nothing else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
+)
+"""Explanation of the tables."""
+LINE = ["scene", "name", "line", "way", "family", "class"]
+"""Columns that identify a method in one way of running many bodies; `name` includes the way, `line` does not."""
+STATISTICS = (MEDIAN, MOST)
+
+
+def section(table: pd.DataFrame) -> Section:
+    """Return the section of a report from named rows of the study (see `labels.with_names`)."""
+    rows = lines(table)
+    reached = body_costs(rows)
+    compared, figure = list(contests(rows, reached)), None
+    points = reached[reached["statistic"] == MEDIAN].assign(time=reached["time"] * 1e6)
+    points = points.rename(columns={"scene": "kind", "bodies": "size"})[["kind", "error", "name", "family", "size", "time"]]
+    if len(points):
+        summary = "Time per body and simulated second at equal error, against the number of bodies; lower is better."
+        picture = throughput.costs(points)
+        panels = vega_embed.embed(picture, ("name", "size", "time"), 240)
+        legend = vega_embed.legend(families_of(points), marks=False)
+        title = "Many bodies: the cost of one of them"
+        figure = Figure("many_bodies", title, summary, picture, panels, legend, Layout.PANELS)
+    more = Section("What did not run", filled(absent(table)), folded=True)
+    blocks = filled(
+        Items.of(statements(compared)),
+        figure,
+        as_table(compared),
+        cost_table(rows, reached),
+        more,
+        Paragraph(TERMS, Role.NOTE),
+    )
+    return Section("Many bodies", blocks, "many-bodies")
+
+
+def lines(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the study with a value, with the columns of `LINE`."""
+    rows = table[(table["study"] == THROUGHPUT) & (table["measure"] != Measure.AGREEMENT.text)]
+    kinds = [class_of(role, method).value for role, method in zip(rows["role"], rows["method"], strict=True)]
+    rows = rows.assign(name=rows["line"].where(rows["way"] == "", rows["line"] + ", " + rows["way"]), **{"class": kinds})
+    return rows[rows["value"].notna() | (rows["class"] == MethodClass.SOLUTION)]
+
+
+def body_costs(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the time per body and simulated second, s: columns of `LINE`, bodies, statistic, error (rad) and time."""
+    setting = [*LINE, "method", "dt"]
+    values = {measure: rows[rows["measure"] == measure.text] for measure in (Measure.ATTITUDE_MAX, Measure.TIME)}
+    errors = values[Measure.ATTITUDE_MAX][[*setting, "quantity", "value"]].dropna()
+    errors = errors.rename(columns={"quantity": "statistic", "value": "error"})
+    times = values[Measure.TIME][[*setting, "bodies", "value"]].dropna().rename(columns={"value": "time"})
+    sizes = times[[*LINE, "bodies"]].drop_duplicates()  # each setting counts at each size, whether it was timed there or not
+    points = errors.merge(sizes, on=LINE).merge(times, how="left", on=[*setting, "bodies"])
+    reached = costs(points, ERRORS, [*LINE, "statistic", "bodies"])
+    return reached.astype({"bodies": int})
+
+
+def contests(rows: pd.DataFrame, reached: pd.DataFrame) -> Iterator[tuple[MethodClass, str, str, int, Contest]]:
+    """Yield class of ours, engine, statistic, number of bodies and contest, whose scene is the kind of the bodies.
+
+    Both sides run bodies at once on one thread, or in their only way. The number of bodies is the largest with times of both
+    sides, or of either.
+    """
+    engine = rows["class"].isin(OF_ENGINES)
+    plain = rows[(rows["way"] == "") | (engine & (rows["way"] == "one at a time"))]
+    for kind, here in plain.groupby("scene", sort=False):
+        engines = here[here["class"].isin(OF_ENGINES)]["family"].unique()
+        for group in (MethodClass.GENERAL, MethodClass.SOLUTION):
+            names = here[here["class"] == group]["name"].unique()
+            for rival in engines if len(names) else ():
+                theirs = here[(here["family"] == rival) & here["class"].isin(OF_ENGINES)]["name"].unique()
+                for statistic in STATISTICS:
+                    at = reached[(reached["scene"] == kind) & (reached["statistic"] == statistic)]
+                    sides = at[at["name"].isin(names)], at[at["name"].isin(theirs)]
+                    timed = here[
+                        here["name"].isin([*names, *theirs]) & (here["measure"] == Measure.TIME.text) & here["value"].notna()
+                    ]
+                    for error in ERRORS:
+                        yield group, str(rival), statistic, *_largest(str(kind), error, sides, timed["bodies"])
+
+
+def _largest(kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], timed: pd.Series[float]) -> tuple[int, Contest]:
+    """Return the contest among the most bodies at which both sides reach the error; else the one among the fewest."""
+    sizes = sorted(map(int, timed.unique()), reverse=True) or [1]
+    for size in sizes:
+        ours, theirs = (cheapest(side[(side["error"] == error) & (side["bodies"] == size)]) for side in sides)
+        if ours and theirs:
+            break
+    return size, Contest(kind, error, ours, theirs)
+
+
+Compared = tuple[MethodClass, str, str, int, Contest]
+
+
+def as_table(compared: Iterable[Compared]) -> Table:
+    """Return the contests, a row for each kind, engine and error."""
+    header = ["bodies", "of our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
+    rows = [_contest_row(*each) for each in compared]
+    return Table([*header, "ours is", "engine is"], rows, "Many bodies: an engine's time over ours", Style.FILTERED)
+
+
+def _contest_row(group: MethodClass, engine: str, statistic: str, size: int, contest: Contest) -> list[str | Cell]:
+    sides: tuple[Cheapest | None, Cheapest | None] = (contest.ours, contest.theirs)
+    times = [number(each.time * 1e6, 3) if each else DASH for each in sides]
+    names = [each.name if each else "no time" for each in sides]
+    at = [contest.scene.replace("_", " "), group.value, engine, tolerance(contest.error), statistic, f"{size:,}"]
+    return [*at, grade(contest.ratio), *times, *names]
+
+
+def cost_table(rows: pd.DataFrame, reached: pd.DataFrame) -> Table:
+    """Return every line: body-steps per second at best, the least preparation, and the time among most bodies at each error."""
+    header = ["bodies", "method", "class", "10^6 body-steps/s, best", "preparation, µs a body, least"]
+    body = []
+    for (kind, name, _, _, _, group), members in rows.groupby(LINE, sort=False):
+        rate, prepare = (members[members["measure"] == each.text]["value"] for each in (Measure.BODY_STEPS, Measure.PREPARE))
+        mine = reached[(reached["scene"] == kind) & (reached["name"] == name) & (reached["statistic"] == MEDIAN)]
+        times = [_cost_text(mine[mine["error"] == error]) for error in ERRORS]
+        figures = [number(float(rate.max()) / 1e6, 3), number(float(prepare.min()) * 1e6, 3)]
+        body.append([str(kind).replace("_", " "), str(name), str(group), *figures, *times])
+    header += [f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS]
+    return Table(header, body, "Many bodies: the cost of one of them", Style.FILTERED)
+
+
+def _cost_text(found: pd.DataFrame) -> str:
+    """Return the time among the most bodies at which a line reaches an error, and their number."""
+    if found.empty:
+        return DASH
+    most: pd.Series[Any] = found.sort_values("bodies").iloc[-1]
+    return f"{number(most['time'] * 1e6, 3)} ({most['bodies']:,})"
+
+
+def absent(table: pd.DataFrame) -> Table:
+    """Return what did not run, and why; sizes left out for lack of time are not listed, as fewer bodies ran."""
+    here = table["study"] == THROUGHPUT
+    failed = table[
+        here & ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
+    ]
+    grouped = failed.groupby(["scene", "name", "outcome", "reason"], sort=False).size()
+    rows = [[str(scene).replace("_", " "), str(name), f"{kind}: {reason}"] for scene, name, kind, reason in grouped.index]
+    return Table(["bodies", "method", "why not"], rows, "Many bodies: what did not run")
+
+
+def statements(compared: Iterable[Compared]) -> Iterator[str]:
+    """Yield the results at the median, a sentence for each kind, engine and class of ours."""
+    groups: dict[tuple[str, str, MethodClass], list[str]] = {}
+    for group, engine, statistic, size, contest in compared:
+        if statistic == MEDIAN:
+            groups.setdefault((contest.scene, engine, group), []).append(_words(engine, size, contest))
+    for (kind, engine, group), words in groups.items():
+        yield f"{kind.replace('_', ' ')}, the cheapest of {group} against {engine}: {'; '.join(words)}."
+
+
+def _words(engine: str, size: int, contest: Contest) -> str:
+    at, ratio = f"at {tolerance(contest.error)} rad", contest.ratio
+    if not contest.ours or not contest.theirs:
+        missing = [name for name, side in (("ours", contest.ours), (engine, contest.theirs)) if not side]
+        return f"{at} there is no time of {' and '.join(missing)}"
+    if ratio >= 1:
+        return f"{at} {engine} takes {ratio_text(ratio)} times as long (among {size:,})"
+    return f"{at} {engine} is {ratio_text(1 / ratio)} times as fast as ours (among {size:,})"

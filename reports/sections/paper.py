@@ -1,0 +1,43 @@
+"""The paper's figures, drawn again, and the errors of its figure 2."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from conservative.benchmarks.measures.measure import Measure
+
+from ..charts import paper
+from ..document.model import Figure, Layout, Section, Table, filled
+from ..tables import lines
+from ..tables.rows import of_study
+
+_MEASURES = (Measure.PERIOD, Measure.PERIOD_X1, Measure.PERIOD_DISTANCE)
+
+
+def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
+    """Return the section; figures whose scene is not in the report are left out."""
+    rates, errors, positions = lines.body_rates(samples), lines.conservation_errors(samples), lines.centre_of_mass(samples)
+    figures = []
+    if len(rates):
+        words = "The brick, disturbed by 1e-8, turns over repeatedly about its middle axis; signed errors of energy and |L|."
+        picture, panels = paper.figure_1(rates, errors), paper.panels_1(rates, errors)
+        title = "Figure 1 of the paper: body rates, energy and momentum"
+        figures.append(Figure("paper_figure_1", title, words, picture, *paper.embed(panels), Layout.PANELS))
+    if len(positions):
+        words = "The top's centre of mass for two steps, and exact. The tables of drift above show what the map conserves."
+        picture, panels = paper.figure_2(positions), paper.panels_2(positions)
+        title = "Figure 2 of the paper: centre of mass of the top"
+        figures.append(Figure("paper_figure_2", title, words, picture, *paper.embed(panels), Layout.PANELS))
+    return Section("The paper's figures, drawn again", filled(*figures, position_errors(table)), "paper", "The paper")
+
+
+def position_errors(table: pd.DataFrame) -> Table | None:
+    """Return the errors of the top's centre of mass after one period of precession; None without that study."""
+    rows = of_study(table, "paper_figures")
+    if rows.empty:
+        return None
+    wide = rows.pivot(index="dt", columns="measure", values="value").sort_index(ascending=False)
+    values = [(dt, *(row[measure.text] for measure in _MEASURES)) for dt, row in wide.iterrows()]
+    body = [[f"{dt:g}", f"{t:g}", f"{x1:.4f}", f"{distance:.4f}"] for dt, t, x1, distance in values]
+    caption = "Error of the centre of mass of the top after one period of precession (the nearest whole number of steps)"
+    return Table(["dt, s", "t, s", "error of x1, m", "distance, m"], body, caption)

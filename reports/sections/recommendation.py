@@ -1,0 +1,164 @@
+"""A recommendation: the settings that reach an error, their costs, and the probe runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from conservative.benchmarks.recommendation.extrapolation import Drift
+from conservative.benchmarks.recommendation.probe import Probe
+from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
+from conservative.benchmarks.studies.case import names_of
+from conservative.benchmarks.studies.selection import tolerance_setting
+
+from ..document.model import Block, Document, Items, Paragraph, Role, Section, Table
+from ..labels import display_name
+from ..tables.classes import MethodClass, class_of
+
+REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
+FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
+PROBES = ("method", "setting", "run, s", "error, rad", "to expect, rad")
+NEGLIGIBLE = 1e-13
+"""Relative drift up to which a quantity is called kept."""
+
+
+def setting_text(probe: Probe) -> str:
+    """Return the setting of a probe as text: a step or a tolerance."""
+    name = tolerance_setting(probe.method)
+    return f"dt = {probe.dt:.7g} s" if name is None else f"{name} = {probe.setting:.0e}"
+
+
+def method_text(advice: Advice) -> str:
+    """Return the name of a method, with the version of its engine, without the setting that is searched."""
+    if advice.best is None:
+        return advice.line.replace(":", " ")
+    names = names_of(advice.best.method)
+    return display_name(names["family"], names["version"], names["series_setting"])
+
+
+def build(recommendation: Recommendation) -> Document:
+    """Return the document of a recommendation; its picture is in `charts.recommendation`."""
+    conditions = recommendation.conditions
+    title = f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s"
+    blocks: list[Block] = [*tables(recommendation), Section("Basis of the numbers", [Items.of(notes(recommendation))])]
+    question = Paragraph(f"{title}\n", Role.LEAD)
+    return Document("conservative recommend", title, blocks, brief=[question, *blocks], data=_data(recommendation))
+
+
+def _data(recommendation: Recommendation) -> dict[str, Any]:
+    conditions, truth, cheapest = recommendation.conditions, recommendation.truth, recommendation.cheapest
+    amplified = conditions.amplification
+    return {
+        "scene": conditions.scene.name,
+        "error": conditions.error,
+        "duration": conditions.duration,
+        "cost_limit": conditions.cost_limit,
+        "cheapest": cheapest.line if cheapest else None,
+        "recommendations": [_advice(advice) for advice in recommendation.advice],
+        "not_installed": recommendation.missing,
+        "truth": {
+            "by": truth.names[0],
+            "checked_by": truth.names[1],
+            "agreement": truth.agreement_rad,
+            "checked_until": truth.checked_until,
+            "until": conditions.truth_until,
+        },
+        "motion": {
+            "unstable": amplified.unstable,
+            "disturbance": amplified.disturbance,
+            "becomes": amplified.final_size,
+            "lost": amplified.is_lost,
+            "measured_until": amplified.end,
+            "by": amplified.label,
+        },
+    }
+
+
+def _advice(advice: Advice) -> dict[str, Any]:
+    return {
+        "name": advice.line,
+        "called": method_text(advice),
+        "role": advice.role,
+        "reached": advice.reached,
+        "reason": advice.reason,
+        "cost": advice.cost,
+        "observed_order": advice.order.slope if advice.order else None,
+        "best": _probe(advice.best) if advice.best else None,
+        "probes": [_probe(probe) for probe in advice.probes],
+    }
+
+
+def _probe(probe: Probe) -> dict[str, Any]:
+    return {
+        "method": probe.method.name,
+        tolerance_setting(probe.method) or "dt": probe.setting,
+        "length": probe.length,
+        "error": probe.error,
+        "expected": probe.expected,
+        "law": probe.law,
+        "holds": probe.holds,
+        "drift": {d.name: {"measured": d.measured, "expected": d.expected, "secular": d.secular} for d in probe.drifts},
+        "outcome": probe.outcome,
+    }
+
+
+def tables(recommendation: Recommendation) -> Iterator[Table]:
+    """Yield the methods that reach the error, those that do not, and the probe runs."""
+    reaching, failing = [], []
+    for advice in sorted(recommendation.advice, key=lambda advice: advice.cost if advice.reached else 0.0):
+        if (probe := advice.best) is None:
+            continue
+        cost = "" if math.isnan(advice.cost) else f"{advice.cost * 1e6:.3g}"
+        names, drift = (method_text(advice), setting_text(probe), cost), drift_text(probe.drifts)
+        if advice.reached:
+            reaching.append((*names, f"{probe.expected:.1e}", drift))
+        else:
+            failing.append((*names, f"{probe.holds:.2g} s", _expected(probe), drift))
+    if reaching:
+        yield Table(REACHING, reaching, "Settings that reach the error, fastest first")
+    if failing:
+        limit = f"Methods that do not, at up to {recommendation.conditions.cost_limit:g} s of wall time per simulated second"
+        yield Table(FAILING, failing, limit)
+    probes = [row for advice in recommendation.advice for row in _probe_rows(advice)]
+    yield Table(PROBES, probes, "The probe runs; <- marks the settings of the tables above")
+
+
+def notes(recommendation: Recommendation) -> list[str]:
+    """Return the basis of the numbers: laws of growth, reference solution, stability, and what could not be tried."""
+    advice, conditions, truth = recommendation.advice, recommendation.conditions, recommendation.truth
+    amplified = conditions.amplification
+    after = ", and by any angle after that" if amplified.is_lost else ""
+    growth = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
+    solutions = [a for a in advice if a.best and class_of(a.role, a.best.method.name) is MethodClass.SOLUTION]
+    return [
+        *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
+        f"kept: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
+        f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
+        f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
+        f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
+        f"{amplified.final_size:.2g} rad within {amplified.end:.4g} s{after} ({amplified.label}): {growth}.",
+        "Times: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
+        *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in solutions),
+        *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
+        *(f"{name}: not installed." for name in recommendation.missing),
+    ]
+
+
+def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:
+    order = "" if advice.order is None else "no order seen" if advice.order.reason else f"order {advice.order.slope:.2f}"
+    for i, probe in enumerate(advice.probes):
+        error = f"{probe.error:.2e}" if probe.outcome.ok else str(probe.outcome)
+        name = (method_text(advice), order)[i] if i < 2 else ""
+        setting = setting_text(probe) + (" <-" if probe is advice.best else "")
+        yield name, setting, f"{probe.length:.4g}", error, _expected(probe)
+
+
+def _expected(probe: Probe) -> str:
+    return f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
+
+
+def drift_text(drifts: Sequence[Drift]) -> str:
+    """Return the relative drifts to expect; an arrow marks a steady drift, `kept` stands for a few rounding units."""
+    large = [f"{d.name} {d.expected:.0e}{' ↗' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
+    return ", ".join(large) or "kept"

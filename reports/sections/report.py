@@ -1,0 +1,52 @@
+"""The document of `conservative report`."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
+
+from ..document.model import Block, Document, Paragraph, filled
+from ..run.measure import Measurements
+from ..run.plan import Plan
+from ..run.provenance import Provenance
+from . import closing, engines, failures, hard_cases, many_bodies, paper, provenance, random_bodies, scenes, verdict
+from .measured import Measured, of_scene
+
+SCHEMA = 2
+"""Version of the layout of measurements.json; a change that breaks a reader raises it."""
+
+
+def build(plan: Plan, measurements: Measurements, source: Provenance) -> Document:
+    """Return the document of measurements. Every number that a report shows is computed here; nothing is measured."""
+    measured = Measured(plan, measurements, source)
+    summaries = {scene.name: scenes.summarize(measured, scene) for scene in plan.scenes}
+    rows = measured.scene_rows
+    blocks: list[Block] = [verdict.section(measured, summaries)]
+    if RANDOM in plan.names:
+        blocks.append(random_bodies.section(measured.ratios, plan.bodies, plan.seed))
+    blocks += [scenes.section(measured, scene, summaries[scene.name]) for scene in plan.scenes]
+    if plan.engines:
+        blocks.append(engines.section(measured))
+    if THROUGHPUT in plan.names:
+        blocks.append(many_bodies.section(measured.rows))
+    blocks += hard_cases.sections(rows)
+    blocks += filled(paper.section(rows, measured.samples), failures.section(rows), provenance.section(source))
+    tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]
+    sentence = closing.verdict(measured.points, [scene.name for scene in plan.scenes])
+    return Document(
+        "conservative report",
+        "Which integrator for a rotating body?",
+        blocks,
+        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), Paragraph(sentence)],
+        data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
+        failures=failures.failures_of_ours(rows),
+    )
+
+
+def records(table: pd.DataFrame) -> list[dict[str, object]]:
+    """Return the rows of a table for JSON."""
+    return [
+        {str(name): value for name, value in row.items()}
+        for row in table.astype(object).where(table.notna(), None).to_dict("records")
+    ]

@@ -1,0 +1,54 @@
+"""Single runs: outcome, drifts and final state; of several methods a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from ..document.model import Block, Document, Facts, Table
+from ..tables.cells import DASH
+
+
+def build(summaries: Sequence[dict[str, Any]]) -> Document:
+    """Return the document of the summaries of one or more methods on a scene (see `single_run.summarize`)."""
+    first = summaries[0]
+    title = f"{first['scene']}: {first['t_end']:g} s with dt = {first['dt']:g} s"
+    block: Block = Facts(list(_facts(first))) if len(summaries) == 1 else _table(summaries, title)
+    failed = [f"{each['label']} on {each['scene']}: {each['outcome']}" for each in summaries if not each["outcome"].ok]
+    return Document("conservative run", title, [block], data=first if len(summaries) == 1 else summaries, failures=failed)
+
+
+def _facts(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "scene", summary["scene"]
+    yield "method", summary["label"]
+    yield "status", str(summary["outcome"])
+    yield "run", f"{summary['t_end']:g} s with dt = {summary['dt']:g} s"
+    yield "work", ", ".join(f"{count} {name}" for name, count in summary["counters"].items() if count is not None)
+    for name, value in summary["drift"].items():
+        yield f"drift of {name}", f"{value:.2e} (relative)"
+    yield "orthonormality", f"{summary['orthonormality']:.2e}"
+    if last := summary["last"]:
+        yield f"at t = {last['t']:g} s", ""
+        yield from ((f"R_WB row {number}", _numbers(row)) for number, row in enumerate(last["R_WB"], start=1))
+        yield "w_WB_B, rad/s", _numbers(last["w_WB_B"])
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{value:+.12g}" for value in values)
+
+
+def _table(summaries: Sequence[dict[str, Any]], title: str) -> Table:
+    drifts = list(summaries[0]["drift"])
+    header = ["method", "outcome", *(f"drift of {name}" for name in drifts), "attitude error, rad", "steps", "wall time, s"]
+    rows = [
+        [
+            summary["method"],
+            str(summary["outcome"]),
+            *(f"{summary['drift'][name]:.1e}" for name in drifts),
+            DASH if summary["attitude_error"] is None else f"{summary['attitude_error']:.1e}",
+            f"{summary['counters']['steps']:,}",
+            f"{summary['wall_time']:.2g}",
+        ]
+        for summary in summaries
+    ]
+    return Table(header, rows, title)

@@ -1,0 +1,64 @@
+"""One study: its statements, tables and rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
+from conservative.outcome import OutcomeKind
+
+from ..document.model import Document, Facts, Items, Paragraph, Row, Section, Table, filled
+from ..labels import with_names
+from ..run.measure import Measurements
+from ..tables.cells import DASH, number
+from ..tables.rows import prefix_quantity
+from . import many_bodies, random_bodies
+from .report import records
+
+
+def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Document:
+    """Return the document of a study: ratios of random bodies, costs of many bodies, or else its rows.
+
+    Parameters
+    ----------
+    name
+        Name of the study.
+    measured
+        Its rows and samples.
+    made
+        How, where and when it was measured.
+    """
+    data: dict[str, Any] = {"study": name, **made}
+    named = with_names(measured.table)
+    if name == RANDOM:
+        ratios = random_bodies.ratios(named)
+        found = (random_bodies.as_table(ratios), random_bodies.by_engine(ratios), Items.of(random_bodies.statements(ratios)))
+        shown, terms = filled(*found), random_bodies.TERMS
+        data["ratios"] = random_bodies.records(ratios)
+    elif name == THROUGHPUT:
+        section = many_bodies.section(named)
+        shown, terms = [block for block in section.blocks if isinstance(block, Items | Table | Section)], many_bodies.TERMS
+    else:
+        shown, terms = [rows_table(name, named)], ""
+    data |= {"rows": records(measured.table), "samples": records(measured.samples)}
+    origin = Section("How this was made", [Facts(list(made.items()))])
+    blocks = filled(Paragraph(terms) if terms else None, *shown, origin)
+    return Document("conservative study", f"Study: {name}", blocks, brief=shown, data=data)
+
+
+def rows_table(name: str, table: pd.DataFrame) -> Table:
+    """Return named rows (see `labels.with_names`) as a table."""
+    header = ["scene", "method", "step, s", "measure", "value", "unit", "outcome"]
+    rows = [_row(row) for row in prefix_quantity(table).to_dict("records")]
+    return Table(header, rows, f"{name}: {len(table)} rows")
+
+
+def _row(row: Mapping[Any, Any]) -> Row:
+    step = DASH if math.isnan(row["dt"]) else f"{row['dt']:.4g}"
+    ok = row["outcome"] == OutcomeKind.OK
+    end = "" if ok else f"{row['outcome']}{': ' * bool(row['reason'])}{row['reason']}"
+    return [row["scene"], row["name"], step, row["measure"], number(row["value"], 3), row["unit"], end]

@@ -1,0 +1,199 @@
+"""The renderers on small documents, and the charts of the page."""
+
+import copy
+import json
+import math
+from html.parser import HTMLParser
+
+import pytest
+import vl_convert
+
+from conservative.outcome import OK
+from conservative.reports.charts import figures, vega_embed
+from conservative.reports.document import html, markdown, terminal, text
+from conservative.reports.document.model import (
+    Cell,
+    Check,
+    Document,
+    Facts,
+    Figure,
+    Grade,
+    Interval,
+    Item,
+    Items,
+    LegendEntry,
+    Paragraph,
+    Role,
+    Section,
+    Style,
+    Table,
+    filled,
+)
+from conservative.reports.tables.work_precision import front, points
+
+from .made_up import table
+
+PICTURE = Figure(
+    "picture", "A picture", "It shows <a>.", picture=object(), panels=[], legend=[LegendEntry("a", "#000000", "", "")]
+)
+GRID = Table(
+    ["case", "m"], [["needle", Cell("both", parts=(Cell("✓ 1", Grade.GOOD), Cell("✗ 2", Grade.BAD)))]], "Grid", Style.GRID
+)
+CARDS = Table(["class", "µs"], [[Cell("ours", note="a, b"), Cell("12", note="a")]], "Cards", Style.CARDS)
+SORTED = Table(["method", "ratio"], [["<b>", Cell("1.100", Grade.BAD, interval=Interval(1.1, 1.0, 1.2, 1.05))]], "Sorted")
+FACTS = Facts([("command", "`conservative`")])
+DOCUMENT = Document(
+    "conservative test",
+    "A title",
+    [
+        Section(
+            "First",
+            [
+                Paragraph("The verdict: 1e-3 rad.", Role.LEAD),
+                PICTURE,
+                Items([Item("is slow", "engine", marked=True)]),
+                Section("Nothing for Markdown", [Figure("page_only", "On the page", panels=[])]),
+            ],
+            "first",
+        ),
+        Section(
+            "Second", [GRID, CARDS, Section("Folded", [SORTED], folded=True), Facts([("command", "`conservative`")])], "second"
+        ),
+    ],
+    data={"value": math.nan, "outcome": OK, "grade": Grade.GOOD, "rows": [{"x": 1.0}]},
+    checks=[Check("scene", "method", "said", "too slow\x00"), Check("scene", "other")],
+    failures=["too slow"],
+)
+
+
+def test_markdown_has_every_block_and_the_picture_in_a_file():
+    drawn = []
+    text = markdown.render(DOCUMENT, lambda figure: drawn.append(figure) or f"{figure.name}.svg")
+    assert drawn == [PICTURE]
+    parts = [
+        "# A title",
+        "## First",
+        "**The verdict: 1e-3 rad.**",
+        "![A picture](picture.svg)",
+        "- **engine**: is slow",
+        "## Second",
+        "Grid",
+        "| case | m |\n| --- | ---: |\n| needle | both |",
+        "Cards",
+        "| class | µs |\n| --- | ---: |\n| ours (a, b) | 12 (a) |",
+        "### Folded",
+        "Sorted",
+        "| method | ratio |\n| --- | ---: |\n| <b> | 1.100 |",
+        "|  |  |\n| --- | ---: |\n| command | `conservative` |",
+    ]
+    assert text == "\n\n".join(parts) + "\n"
+
+
+def test_a_picture_needs_a_folder():
+    with pytest.raises(ValueError, match="picture"):
+        text(DOCUMENT, "markdown")
+
+
+def test_json_has_null_for_what_is_no_number_and_the_values_of_enums():
+    content = json.loads(text(DOCUMENT, "json"))
+    assert (content["value"], content["grade"], content["outcome"]["kind"]) == (None, "good", "ok")
+    assert content["rows"] == [{"x": 1.0}]
+
+
+def test_junit_has_every_check_and_no_character_that_xml_forbids():
+    suite = text(DOCUMENT, "junit")
+    assert 'tests="2" failures="1"' in suite
+    assert 'message="too slow?"' in suite
+
+
+def test_a_terminal_shows_the_brief_form_if_there_is_one(capsys):
+    terminal.show(DOCUMENT)
+    whole = capsys.readouterr().out
+    assert "The verdict" in whole
+    assert "engine: is slow" in whole
+    terminal.show(Document("", "", DOCUMENT.blocks, brief=[Facts([("name", "value"), ("longer name", "")])]))
+    assert capsys.readouterr().out == "name         value\nlonger name\n"
+
+
+def test_empty_blocks_are_left_out():
+    paragraph = Paragraph("")
+    assert filled(None, Table([], []), Items([]), Section("", []), paragraph) == [paragraph]
+
+
+class Outward(HTMLParser):
+    """Collects every reference of a tag, and the ids and links within the page."""
+
+    def __init__(self):
+        super().__init__()
+        self.references, self.ids, self.anchors = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.ids += filter(None, [found.get("id")])
+        if tag == "a":
+            self.anchors.append(found["href"])
+        else:
+            self.references += [found[name] for name in ("src", "href", "data", "action") if name in found]
+
+
+@pytest.fixture(scope="module")
+def page():
+    return html.render(DOCUMENT)
+
+
+def test_page_refers_to_nothing_outside_itself(page):
+    parser = Outward()
+    parser.feed(page)
+    assert parser.references == ["data:,"]
+    assert "url(" not in page.partition("</style>")[0]
+    assert parser.anchors == ["#main", "#first", "#second"]
+    assert {anchor[1:] for anchor in parser.anchors} <= set(parser.ids)
+    assert len(parser.ids) == len(set(parser.ids))
+
+
+def test_text_cannot_become_markup(page):
+    assert "<b>engine</b>" in page  # a subject
+    for part in ("&lt;b&gt;", "It shows &lt;a&gt;.", "<code>conservative</code>", '<span class="n">1e-3 rad</span>'):
+        assert part in page
+
+
+def test_page_shows_grades_halves_notes_and_intervals(page):
+    for part in (
+        '<i class="good" aria-hidden="true">✓</i><i class="bad" aria-hidden="true">✗</i>',
+        'data-about="m on needle: both"',
+        "<b>12</b> <small>a</small>",
+        'aria-label="1.100, 1.000 to 1.200"',
+        '<li class="lost">',
+        "<details><summary>Folded</summary>",
+        "Nothing was measured that could be drawn",
+    ):
+        assert part in page
+
+
+def test_a_page_carries_only_the_libraries_that_it_needs(page):
+    assert ('id="vega"' in page, 'id="datatables"' in page) == (False, True)
+    assert "datatables" not in html.render(Document("", "", [Paragraph("")])).partition('"use strict"')[0]
+
+
+def drawn(spec, hidden=()):
+    """Return the picture of a chart with some lines hidden, as the browser would draw it."""
+    spec = copy.deepcopy(spec) | {"width": 300}
+    for parameter in spec["params"]:
+        parameter["value"] = list(hidden)
+    return vl_convert.vegalite_to_svg(json.dumps(spec))
+
+
+def test_chart_draws_its_lines_and_the_switch_takes_one_away():
+    found = points(table())
+    (spec,) = vega_embed.embed(figures.work_precision(found, front(found), "brick_flip"), ("name", "error"))
+    colour = vega_embed.legend({"reduced": "reduced"}, True)[0].colour
+    assert drawn(spec).count(colour) > 1
+    assert colour not in drawn(spec, ["reduced"])
+    assert vega_embed.legend({"scipy DOP853": "scipy"}, True)[0].colour in drawn(spec, ["reduced"])
+    assert "legend" not in json.dumps(spec).replace('"legend": null', "")
+
+
+def test_data_are_short_and_exact_to_their_digits():
+    data = vega_embed.as_csv([{"name": "a, b", "x": 1 / 3, "left": 1}, {"name": "c", "x": 1e-17, "left": 2}], {"name", "x"})
+    assert data["values"].splitlines() == ["name,x", '"a, b",0.3333333', "c,1e-17"]
+    assert data["format"]["parse"] == {"x": "number"}
