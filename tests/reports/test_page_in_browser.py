@@ -11,18 +11,15 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from conservative.reports.page import figures, page
-from conservative.reports.page.versions import render_comparison
-from conservative.reports.tables.comparison import Answer
-from conservative.reports.view import build
 
 from conservative import registry
 from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.measures import measurement
-from conservative.reports import document
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
+from conservative.reports.sections import comparison
+from conservative.reports.sections.report import build
 
 from ..benchmarks.comparison.made_up import BASE, HEAD, found, timed
 from .made_up import at_step, over_steps
@@ -46,7 +43,7 @@ PATIENCE = 60  # s, for a loaded machine; nothing is timed by it
 def folder(tmp_path_factory):
     """A real report of both scenes."""
     out = tmp_path_factory.mktemp("browser") / "report"
-    document.write(plan_report([], METHODS, quick=True), out, lambda share, what: None)
+    report.write(plan_report([], METHODS, quick=True), out, lambda share, what: None)
     return out
 
 
@@ -157,11 +154,12 @@ def column(browser, table, number):
 
 
 def test_a_table_sorts_by_number_both_ways_and_says_so(opened):
-    table = opened.find_element("css selector", "#paid-once table.sortable")
+    region = "[aria-label='brick_flip: wall time at the scene\\'s step']"
+    table = opened.find_element("css selector", f"{region} table.sortable")
     head = table.find_elements("css selector", "thead th")[2]
     for wanted, backwards in (("ascending", False), ("descending", True)):
         head.click()
-        wait(opened, f"return document.querySelectorAll('#paid-once thead th')[2].ariaSort === '{wanted}'")
+        wait(opened, f"return document.querySelectorAll(`{region} thead th`)[2].ariaSort === '{wanted}'")
         found = [float(text.replace(",", "")) for text in column(opened, table, 2) if text != "–"]
         assert found == sorted(found, reverse=backwards)
         assert len(found) > 3
@@ -231,9 +229,9 @@ def engines_page(tmp_path_factory):
         *at_step("b==2", "Euler", 0.2),
     ]
     plan = Plan((registry.scene("brick_flip"),), (registry.method("reduced"),), (), engines=(registry.method("pinocchio"),))
-    view = build(plan, Measurements(measurement.frame(rows), measurement.samples_frame([])), provenance([]))
+    document = build(plan, Measurements(measurement.frame(rows), measurement.samples_frame([])), provenance([]))
     file = tmp_path_factory.mktemp("page") / "index.html"
-    file.write_text(page.render(view, figures.charts(view)), encoding="utf-8")
+    file.write_text(html.render(document), encoding="utf-8")
     with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
 
@@ -253,54 +251,31 @@ TIMES = {
     "gauss": timed((0.8, 0.79, 0.81)),
     "lame": timed((1.01, 0.99, 1.02)),
 }
-VISIBLE = (
-    "return [...document.querySelectorAll('tbody tr')].filter((row) => row.offsetHeight).map((row) => row.cells[1].textContent)"
-)
+ROWS = "[aria-label=Rows]"
+VISIBLE = f"return [...document.querySelectorAll('{ROWS} tbody tr:has(th)')].map((row) => row.cells[1].textContent)"
 
 
 @pytest.fixture(scope="module")
 def comparison_page(tmp_path_factory):
-    """A page with three rows: one slower, one faster, one as it was."""
+    """A page with three rows: one slower, one faster, one as before."""
     rows = {name: replace(found(), row=replace(found().row, id=name, method=name)) for name in TIMES}
     file = tmp_path_factory.mktemp("page") / "gate.html"
-    file.write_text(render_comparison(Answer(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
-    browser = start(tmp_path_factory.mktemp("profile"))
-    try:
-        browser.get(file.as_uri())
+    file.write_text(html.render(comparison.build(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
+    with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
-    finally:
-        browser.quit()
 
 
-@pytest.fixture
-def visible(comparison_page):
-    """Return the methods of the rows that are shown, of a page that was opened anew."""
-    comparison_page.refresh()
-    return lambda: comparison_page.execute_script(VISIBLE)
+def test_rows_that_failed_come_first_and_are_sorted_by_their_ratio_both_ways(comparison_page):
+    assert comparison_page.execute_script(VISIBLE) == ["reduced", "gauss", "lame"]
+    for order in (["gauss", "lame", "reduced"], ["reduced", "lame", "gauss"]):
+        comparison_page.find_element("css selector", f"{ROWS} thead th:nth-child(4)").click()
+        wait(comparison_page, f"{VISIBLE}.join() === '{','.join(order)}'")
 
 
-def click(browser, selector):
-    browser.execute_script(f"document.querySelector({selector!r}).click()")
-
-
-def test_rows_that_failed_come_first_and_every_row_is_shown(comparison_page, visible):
-    assert visible() == ["reduced", "gauss", "lame"]
-    assert comparison_page.execute_script("return document.getElementById('count').textContent") == "3 of 3 rows"
-
-
-def test_rows_are_filtered_by_text_and_by_standing(comparison_page, visible):
-    comparison_page.find_element("id", "text").send_keys("Brick LA")
-    assert visible() == ["lame"]
-    comparison_page.refresh()
-    click(comparison_page, "[value=same]")
-    assert visible() == ["reduced", "gauss"]
-    click(comparison_page, "[value=slower]")
-    assert visible() == ["gauss"]
-
-
-def test_rows_are_sorted_by_their_ratio_both_ways(comparison_page, visible):
-    click(comparison_page, "thead th:nth-child(4) button")
-    assert visible() == ["gauss", "lame", "reduced"]
-    click(comparison_page, "thead th:nth-child(4) button")
-    assert visible() == ["reduced", "lame", "gauss"]
-    assert comparison_page.execute_script("return document.querySelector('[aria-sort]').textContent") == "ratio"
+@pytest.mark.parametrize(("words", "methods"), [("Brick LA", {"lame"}), ("slower", {"reduced"}), (" ", set(TIMES))])
+def test_rows_of_a_comparison_are_filtered_by_words(comparison_page, words, methods):
+    field = comparison_page.find_element("css selector", ".filter input")
+    field.clear()
+    field.send_keys(words)
+    wait(comparison_page, f"{VISIBLE}.length === {len(methods)}")
+    assert set(comparison_page.execute_script(VISIBLE)) == methods

@@ -20,7 +20,7 @@ from conservative.reports.run.measure import Measurements
 from conservative.reports.run.single_study import plan_study
 from conservative.reports.sections.study import rows_table
 
-from .rows import row
+from .rows import frame, row
 from .test_random_ratios import SLOWER, TWICE
 
 RANDOM = ("study", "random", "--bodies", "2", "--seed", "7", "--methods", "projected,heyoka")
@@ -119,7 +119,7 @@ def test_numbers_of_bodies_are_read_as_people_write_them():
 
 
 def test_a_row_that_failed_says_why():
-    table = measurement.frame([row("paper", "reduced", "energy drift max", float("nan"), outcome="unsupported"), *TWICE[0]])
+    table = frame([row("paper", "reduced", "energy drift max", float("nan"), outcome="unsupported"), *TWICE[0]])
     failed, good, *_ = rows_table("paper", table).rows
     assert failed[3:] == ["energy drift max", "–", "1", "unsupported"]
     assert good[-1] == ""
