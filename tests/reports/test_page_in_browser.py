@@ -15,6 +15,8 @@ import pytest
 from conservative import registry
 from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.measures import measurement
+from conservative.reports import report
+from conservative.reports.document import html
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import provenance
