@@ -61,7 +61,7 @@ def _datatables() -> str:
 
 def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
     """Return what the script draws, with replacements for the colours that have too little contrast on a light or dark page."""
-    from ..charts import contrast
+    from . import contrast
 
     found = contrast.colours_in(json.dumps(charts))
     papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}

@@ -9,11 +9,10 @@ from typing import Any
 from conservative.benchmarks.recommendation.extrapolation import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
-from conservative.benchmarks.studies.case import names_of
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..document.model import Block, Document, Items, Paragraph, Role, Section, Table
-from ..labels import display_name
+from ..labels import method_text, setting_text
 from ..tables.classes import MethodClass, class_of
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
@@ -21,20 +20,6 @@ FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error 
 PROBES = ("method", "setting", "run, s", "error, rad", "to expect, rad")
 NEGLIGIBLE = 1e-13
 """Relative drift up to which a quantity is called kept."""
-
-
-def setting_text(probe: Probe) -> str:
-    """Return the setting of a probe as text: a step or a tolerance."""
-    name = tolerance_setting(probe.method)
-    return f"dt = {probe.dt:.7g} s" if name is None else f"{name} = {probe.setting:.0e}"
-
-
-def method_text(advice: Advice) -> str:
-    """Return the name of a method, with the version of its engine, without the setting that is searched."""
-    if advice.best is None:
-        return advice.line.replace(":", " ")
-    names = names_of(advice.best.method)
-    return display_name(names["family"], names["version"], names["series_setting"])
 
 
 def build(recommendation: Recommendation) -> Document:

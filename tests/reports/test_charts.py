@@ -11,8 +11,8 @@ import vl_convert
 from conservative import Reduced
 from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
-from conservative.reports.charts.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
 from conservative.reports.charts.style import _OTHERS, PALETTE, power_axis
+from conservative.reports.document.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
 from conservative.reports.tables import orders, work_precision
 
 from .rows import frame, point, row, table
