@@ -1,40 +1,60 @@
 """Probe runs: one method at one setting, its error, and the error to expect at the end of the duration.
 
-The times of samples of all runs are multiples of one spacing, a round number. Steps are that spacing divided or multiplied by a
-product of twos and fives. So steps are numbers that people type, and one reference solution serves all runs.
+All runs are sampled at multiples of one spacing, a round number. Steps are that spacing divided or multiplied by a product of
+twos and fives. So steps are numbers that people type, and one reference solution serves all runs.
 """
 
 from __future__ import annotations
 
 import bisect
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from conservative.attitude import Array, angle_between
+from conservative.errors import AccuracyNotReached
 from conservative.grid import Grid
+from conservative.integration.one import integrate
 from conservative.method import Method
-from conservative.methods.search import SAFETY
-from conservative.methods.trials import ASYMPTOTIC
+from conservative.methods.search import SAFETY, find_cheapest
+from conservative.methods.trials import ASYMPTOTIC, trials_of
+from conservative.methods.units import bound_rate
 from conservative.outcome import Outcome
+from conservative.references.exact.method import Exact
+from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 
+from ..measures.timing import wall_time
+from ..studies import step_ladder
 from ..studies.case import Case, Success
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_within
-from .extrapolation import Amplification, Drift, ErrorLaw, Scaling, extrapolate_drifts, fit_law
+from .growth import Amplification, Drift, ErrorLaw, extrapolate_drifts, fit_law
 
+CLOSED_RADIANS, RADIANS = 60.0, 30.0
+"""Length of short probes, rad, with a closed form and with multi-precision, which takes a second for ten radians."""
+SAMPLES = 32
+"""Least number of samples of a short probe."""
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
-"""Longest run of a short and of a long probe, s of wall time: with a short step it covers less of the motion."""
+"""Wall time, s, of a short and of a long probe; with a short step it covers less of the motion."""
 LONG_SAMPLES = 256
 LEAST_SAMPLES = 4
 STEPS = 8
 """Least number of steps in a short window."""
 MUCH_LONGER = 4
-"""Use the coarser run's law only if that run is this many times longer."""
+"""The law of a coarser run is used only if that run is this many times as long."""
+DISTURBANCE = 1e-9
+"""Relative change of the initial rates."""
+AFFORDABLE = 0.3
+"""Wall time, s, of each of the two disturbed runs if there is no closed form."""
+DENSE = 256
+MOST_GRIDS = 16
+"""Number of grids whose exact attitudes are kept, because methods that are probed alike share them."""
 
 _ROUND = sorted({2**a * 5**b for a in range(44) for b in range(19) if 2**a * 5**b <= 10**13})
 
@@ -46,21 +66,21 @@ class Probe:
     Attributes
     ----------
     method, dt
-        Method, and its step, s; for an adaptive method the distance of samples.
+        The method and its step, s; for an adaptive method the sampling interval.
     length, error
-        Of the run, s, and its largest attitude error against the truth, rad; nan where it failed.
+        Length of the run, s, and its largest attitude error, rad; nan if it failed.
     expected, law
-        Expected largest error over the whole duration, rad, infinite where the attitude is lost; and the reason, in words.
+        Expected largest error over the whole duration, rad (infinite if the attitude is lost), and how it was found, in words.
     holds
-        How long the error is expected to stay within the one that is wanted, s.
+        Time, s, up to which the error is expected to stay within the requested one.
     error_law
-        How the error grows; None where the run failed.
+        Growth of the error; None if the run failed.
     drifts
-        Of the invariants.
+        Drifts of the invariants.
     cost
-        Wall time per simulated second of this one run, s/s, to plan with; nan where it failed. Not interleaved.
+        Wall time per simulated second of this one run, s/s, for planning; nan if it failed.
     outcome
-        How it ended.
+        How the run ended.
     """
 
     method: Method
@@ -77,7 +97,7 @@ class Probe:
 
     @property
     def setting(self) -> float:
-        """The tolerance of an adaptive method, else the step, s."""
+        """The tolerance of an adaptive method, otherwise the step, s."""
         name = tolerance_setting(self.method)
         return self.dt if name is None else float(getattr(self.method, name))
 
@@ -89,13 +109,13 @@ class Conditions:
     Attributes
     ----------
     scene, error, duration
-        Scene, wanted attitude error, rad, and duration, s.
+        Scene, requested attitude error, rad, and duration, s.
     cost_limit
-        Wall time per simulated second, s/s, that a setting may cost.
+        Largest wall time of a setting per simulated second, s/s.
     spacing, samples
-        Distance of samples, s, and their number in a short window.
+        Sampling interval, s, and number of samples in a short window.
     truth
-        From a grid to true attitudes (n, 3, 3).
+        Returns the true attitudes (n, 3, 3) on a grid.
     truth_until
         End of the truth, s.
     rate
@@ -103,7 +123,7 @@ class Conditions:
     amplification
         Growth of a disturbance.
     time_limit
-        Time, s, after which a probe is ended.
+        Wall time, s, after which a probe is stopped.
     """
 
     scene: Scene
@@ -140,10 +160,19 @@ class Conditions:
             return self.spacing * float(_ROUND[bisect.bisect_left(_ROUND, dt / self.spacing * (1 - 1e-9))])
         return self.spacing / float(_ROUND[bisect.bisect_right(_ROUND, self.spacing / dt * (1 + 1e-9)) - 1])
 
-    def window(self, dt: float, cost: float, long: bool) -> Grid:
-        """Return the samples of a run whose steps are dt s long, or shorter, and cost `cost` s/s: as far as the limit goes.
+    def choose_ours(self, methods: Sequence[Method] | None = None, error: float | None = None) -> tuple[Method, float]:
+        """Return the method of the automatic choice for a short window, among all candidates or some, and its round step, s.
 
-        A short window has the spacing's samples, a long one goes as far as there is truth to measure it by.
+        The error, rad, is by default the window's share of the target.
+        """
+        wanted = self.target * min(1.0, self.short / self.duration) if error is None else error
+        method, dt = find_cheapest(trials_of(self.scene), wanted, self.short, methods)
+        return method, self.step_at_most(min(dt, self.short / STEPS))
+
+    def window(self, dt: float, cost: float, long: bool) -> Grid:
+        """Return the samples of a run with steps of at most dt, s, that cost `cost` s/s: as far as the time limit allows.
+
+        A short window has samples at the spacing. A long one extends as far as there is truth to measure errors by.
         """
         least = max(1, round(dt / self.spacing))
         affordable = (LONG_RUN_LIMIT if long else RUN_LIMIT) / cost if cost > 0 else math.inf
@@ -158,9 +187,9 @@ class Conditions:
         Parameters
         ----------
         method, dt
-            Method, and its step, s, which an adaptive method ignores.
+            The method and its step, s, which an adaptive method ignores.
         cost
-            Expected cost, s/s; NaN if unknown.
+            Expected wall time per simulated second, s/s; NaN if unknown.
         long
             Which window.
         before
@@ -170,34 +199,37 @@ class Conditions:
         samples = self.window(self.spacing if adaptive else dt, cost, long)
         each = 1 if adaptive else round(samples.dt / dt)
         grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
-        outcome = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
-        length = samples.dt * samples.n_steps
-        if not isinstance(outcome, Success):
-            why = outcome.outcome
-            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, why)
-        return self._evaluate(method, grid, samples, outcome, before)
-
-    def _evaluate(self, method: Method, grid: Grid, samples: Grid, outcome: Success, before: Sequence[Probe]) -> Probe:
-        trajectory = outcome.trajectory
-        error = angle_between(self.truth(samples), trajectory.R_WB)
-        found = extrapolate_drifts(trajectory, self.duration)
-        length, largest = float(trajectory.t[-1]), float(error.max())
-        # A steady change of energy or momentum is one of the speed at which the body goes round.
-        phase = self.rate * max((abs(drift.slope) for drift in found if drift.secular), default=0.0)
-        law = fit_law(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
-        law = self._carry_over(method, grid.dt, length, before) or law
+        run = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
+        if not isinstance(run, Success):
+            length = samples.dt * samples.n_steps
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, run.outcome)
+        trajectory = run.trajectory
+        length, error = float(trajectory.t[-1]), angle_between(self.truth(samples), trajectory.R_WB)
+        drifts = extrapolate_drifts(trajectory, self.duration)
+        # A steady change of energy or momentum changes the angular velocity steadily.
+        phase = self.rate * max((abs(drift.slope) for drift in drifts if drift.secular), default=0.0)
+        law = self._carry_over(method, grid.dt, length, before)
+        law = law or fit_law(trajectory.t, error, phase, self.amplification.excess(length, self.duration))
         exceeded = error > self.error
-        holds = float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.find_duration(self.error))
-        expected, cost = law.extrapolate(self.duration), outcome.cost.first_call / length
         return Probe(
-            method, grid.dt, length, largest, expected, law.describe(self.duration), holds, law, found, cost, trajectory.outcome
+            method,
+            grid.dt,
+            length,
+            error=float(error.max()),
+            expected=law.extrapolate(self.duration),
+            law=law.describe(self.duration),
+            holds=float(trajectory.t[np.argmax(exceeded)]) if exceeded.any() else max(length, law.find_duration(self.error)),
+            error_law=law,
+            drifts=drifts,
+            cost=run.cost.first_call / length,
+            outcome=trajectory.outcome,
         )
 
     def _carry_over(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> ErrorLaw | None:
-        """Return the law of the coarser setting that ran longest, carried to a finer one by the method's order.
+        """Return the law of the coarser setting that ran longest, scaled to a finer one by the order of the method.
 
         A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. None
-        where the finer run is about as long itself.
+        if the finer run is about as long itself.
         """
         whole = [probe for probe in before if self.shows_growth(probe)]
         name = tolerance_setting(method)
@@ -208,18 +240,90 @@ class Conditions:
         if length >= max(enough, min(self.short, self.duration)) * (1 - 1e-9):
             return None
         assert base.error_law is not None  # `shows_growth` requires it
-        if name is not None:
-            tolerance = getattr(method, name)
-            scaling = Scaling(name, base.setting, tolerance / base.setting, None)
+        if name is not None:  # the error is proportional to a tolerance
+            factor, where = getattr(method, name) / base.setting, f"{name} = {base.setting:g}, carried here in proportion to it"
         else:
             assert method.order is not None  # checked above
-            scaling = Scaling("dt", base.dt, (dt / base.dt) ** method.order, method.order)
-        carried = base.error_law.scale(scaling)
+            factor, where = (dt / base.dt) ** method.order, f"dt = {base.dt:.3g} s, carried here by order {method.order}"
+        carried = base.error_law.scale(factor, f" at {where}")
         # Round-off: a random walk of the rate by a rounding unit a step.
         rounding = self.rate * float(np.finfo(float).eps) / 2 * math.sqrt(self.duration / dt)
         return replace(carried, linear=carried.linear + rounding)
 
     def shows_growth(self, probe: Probe) -> bool:
-        """Whether a probe shows how its error grows: it ran over a whole short window and was not lost."""
+        """Whether a probe shows the growth of its error: it covered a whole short window and its attitude was not lost."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
-        return whole and probe.error_law is not None and probe.error_law.scaling is None and probe.error < ASYMPTOTIC
+        return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
+
+
+def prepare_conditions(
+    scene: Scene, error: float, duration: float, cost_limit: float, time_limit: float = HANG_LIMIT
+) -> tuple[Conditions, Truth]:
+    """Return the conditions of all probes, and the reference solution. Units are those of `Conditions`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyNotReached)  # only the angular velocity is used
+        until = min(duration, 2 * CLOSED_RADIANS / bound_rate(scene))
+        trial = integrate(scene, error=1e-3, t_end=until, on_failure="return")
+    rate = max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)  # at least one radian in the whole duration
+    closed = Exact().unsupported(scene) is None
+    length = min(duration, (CLOSED_RADIANS if closed else RADIANS) / rate)
+    spacing = _round_down(min(length / SAMPLES, step_ladder.RADIANS / rate))
+    samples = math.ceil(length / spacing * (1 - 1e-9))
+    # Runs with steps longer than the spacing end up to an eighth later.
+    truth = reference(scene, Grid(spacing, samples + samples // 8 + 1))
+
+    @lru_cache(maxsize=MOST_GRIDS)
+    def closed_form(grid: Grid) -> Array:
+        return Exact().solve(scene, grid).R_WB
+
+    def sampled(grid: Grid) -> Array:
+        """Return the attitudes at multiples of the spacing, all of which the reference solution has."""
+        return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
+
+    conditions = Conditions(
+        scene,
+        error,
+        duration,
+        cost_limit,
+        spacing,
+        samples,
+        truth=closed_form if closed else sampled,
+        truth_until=float(max(duration, truth.trajectory.t[-1]) if closed else samples * spacing),
+        rate=rate,
+        amplification=Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, ""),
+        time_limit=time_limit,
+    )
+    return replace(conditions, amplification=_measure_amplification(conditions)), truth
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is at most `value`."""
+    power = math.floor(math.log10(value))
+    digit = max(digit for digit in (1, 2, 5) if digit <= value / 10.0**power * (1 + 1e-9))
+    return float(f"{digit}e{power}")
+
+
+def _measure_amplification(conditions: Conditions) -> Amplification:
+    """Return the effect of a small change of the initial rates: by closed forms, otherwise by our own method."""
+    scene = conditions.scene
+    size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
+    disturbed = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
+    exact = Exact().unsupported(scene) is None and Exact().unsupported(disturbed) is None
+    until = conditions.duration
+    method, dt = (Exact(), until) if exact else conditions.choose_ours(error=DISTURBANCE / 100)
+    if not exact:  # as far as the method gets within the wall time
+        n = max(1, math.ceil(conditions.short / dt))
+        run = method.prepare(scene, Grid(dt, n, n))
+        run()
+        until = min(until, AFFORDABLE * n * dt / wall_time(run))
+    times, factors = [], []
+    for end in sorted({min(until, conditions.short), until}):
+        n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
+        grid = Grid(end / n, n, max(1, n // DENSE))
+        pair = [method.solve(each, grid) for each in (scene, disturbed)]
+        shared = min(map(len, pair))
+        times.append(pair[0].t[:shared])
+        factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
+    t, factor = np.concatenate(times), np.concatenate(factors)
+    order = np.argsort(t, kind="stable")
+    return Amplification(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)

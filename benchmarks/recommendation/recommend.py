@@ -1,47 +1,63 @@
-"""Which method and step of ours, and which setting of each engine, reach an error over a duration, and at what cost.
+"""Recommend a method and step of ours, and a setting of each engine, that reach an error over a duration, with their cost.
 
-1. A trial run gives the rate of the body. The spacing of samples and the length of probes follow from it.
+1. A trial run gives the angular velocity of the body, which determines the sampling interval and the length of probes.
 2. The reference solution is confirmed by a second one. A closed form covers the whole duration, others cover the probes.
-3. A disturbed start shows how the motion itself amplifies errors (all three: `motion`).
-4. Each method is probed from coarse to fine (`probe`, `search`). A stated law carries errors to the duration (`extrapolation`).
-5. The settings found are timed against each other in interleaved rounds.
+3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `prepare_conditions`).
+4. Our methods are those of the automatic choice: its first choice, and if that has no truncation error, the best general
+   integrator as well. Each method is probed from coarse to fine (`refine`). A stated law extrapolates errors to the duration.
+5. The resulting settings are timed against each other in interleaved rounds.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from conservative.attitude import Array
 from conservative.check import positive_number
 from conservative.errors import BadInput, nearest
 from conservative.grid import Grid
 from conservative.method import Method, Role
-from conservative.outcome import Outcome
+from conservative.methods.automatic import ATTEMPTS
+from conservative.methods.search import candidates, step_factor, stops_falling
+from conservative.methods.trials import ASYMPTOTIC
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.truth import Truth
 from conservative.scene import Scene
 
-from ..measures.convergence_order import Order, observed_order
+from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, fail_unsupported
+from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_here
-from .motion import choose_ours, prepare_conditions
-from .probe import STEPS, Conditions, Probe
-from .search import Refinement, at_round_off, refine
+from .probe import RUN_LIMIT, STEPS, Conditions, Probe, prepare_conditions
 
 Progress = Callable[[float, str], None]
 
 COST_LIMIT = 1.0
-"""Wall time per simulated second, s/s, that a setting may cost: as fast as the body itself."""
+"""Wall time per simulated second, s/s, that a setting may cost: real time."""
 RUN_TIME = 0.005
 """Target duration of a timed run, s."""
 ROUNDS, TIMING_BUDGET = 7, 0.25
 COARSER_START = 4
-"""Factor from the step of the automatic choice to the first step of ours, so that an order can be seen."""
+"""First step of ours, in units of that of the automatic choice, so that an order can be observed."""
 LOOSEST = 1e-3
 """Largest first tolerance of adaptive methods."""
+SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8
+"""Smallest factor from one step to the next, and the factor if a probe has no usable error."""
+LONGER = 8
+"""Step of an additional long run, relative to the candidate step."""
+TIGHTEST = -16
+"""Exponent of the smallest tolerance: round-off."""
+LARGEST_TOLERANCE_CUT = 4
+"""Largest cut of a tolerance from one probe to the next, powers of ten."""
+COARSEN_BELOW = 1 / 16
+"""A longer step is tried as well if the error is below this share of the requested one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +86,15 @@ def ask(
     Parameters
     ----------
     scene
-        The body, its start and its field.
+        The scene.
     error
         Largest attitude error over the duration, rad.
     duration
-        s; by default that of the scene.
+        Duration, s; default: that of the scene.
     engine_names
-        Engines, such as `("mujoco",)`; by default all that are installed.
+        Engines, such as `("mujoco",)`; default: all that are installed.
     cost_limit
-        Wall time per simulated second, s/s, that a setting may cost.
+        Largest wall time of a setting per simulated second, s/s.
     time_limit
         Wall time, s, after which the run of an engine is stopped.
 
@@ -93,10 +109,10 @@ def ask(
     end = scene.t_end if duration is None else positive_number("duration", duration, "a finite duration above 0, s")
     positive_number("cost_limit", cost_limit, "a finite wall time per simulated second above 0, s/s")
     positive_number("time_limit", time_limit, "a finite duration above 0, s")
-    found = list_engines(engine_names)
-    missing = tuple(method.name for method in found if isinstance(method, selection.Missing))
-    methods = tuple(method for method in found if not isinstance(method, selection.Missing))
-    return Question(scene, error, end, methods, missing, cost_limit, time_limit)
+    engines = list_engines(engine_names)
+    missing = tuple(method.name for method in engines if isinstance(method, selection.Missing))
+    installed = tuple(method for method in engines if not isinstance(method, selection.Missing))
+    return Question(scene, error, end, installed, missing, cost_limit, time_limit)
 
 
 def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
@@ -111,16 +127,14 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     MissingEngine
         A named engine is not installed.
     """
-    everything = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
-    if names is None:
-        wanted: Iterable[Method] = everything
-    else:
-        known = {method.name.partition(":")[0] for method in everything}
+    wanted = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
+    if names is not None:
+        known = {method.name.partition(":")[0] for method in wanted}
         for name in names:
             if name.partition(":")[0] not in known:
                 raise BadInput("engine", repr(name), nearest(name, known))
-        wanted = selection.methods(names)
-    lines = {selection.series(method): method for method in reversed(tuple(wanted))}
+        wanted = list(selection.methods(names))
+    lines = {selection.series(method): method for method in reversed(wanted)}
     return tuple(reversed(lines.values()))
 
 
@@ -133,9 +147,9 @@ class Advice:
     line
         Name of the method without the setting that is searched.
     best
-        The probe at the recommended setting; if no setting reaches the error, at the nearest one.
+        The probe at the recommended setting; if no setting reaches the error, the nearest one.
     reached
-        Whether the wanted error may be expected.
+        Whether the requested error can be expected.
     cost
         Wall time per simulated second at that setting, s/s, interleaved minimum; NaN if it could not be timed.
     order
@@ -143,7 +157,7 @@ class Advice:
     probes
         All runs, coarse to fine.
     reason
-        Why the method cannot be used, or why it does not reach the error; empty if it does.
+        Why the method cannot be used or does not reach the error; empty if it does.
     """
 
     line: str
@@ -154,6 +168,11 @@ class Advice:
     order: Order | None
     probes: tuple[Probe, ...]
     reason: str
+
+    @property
+    def general(self) -> bool:
+        """Whether the method is a general integrator, and not a closed form of some motions."""
+        return self.best is None or not self.best.method.card.exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,14 +189,18 @@ class Recommendation:
 
     @property
     def ours(self) -> Advice:
-        """Advice on our own method."""
+        """Advice on the method of the automatic choice."""
         return self.advice[0]
 
     @property
-    def cheapest(self) -> Advice | None:
-        """The cheapest advice that reaches the error; None if there is none."""
-        good = [advice for advice in self.advice if advice.reached and not math.isnan(advice.cost)]
-        return min(good, key=lambda advice: advice.cost, default=None)
+    def winners(self) -> dict[str, Advice | None]:
+        """The cheapest advice that reaches the error: of all, of our general integrators, and of the engines."""
+        good = sorted((each for each in self.advice if each.reached and not math.isnan(each.cost)), key=lambda each: each.cost)
+        return {
+            "cheapest": next(iter(good), None),
+            "cheapest_general": next((each for each in good if each.role == Role.OURS and each.general), None),
+            "cheapest_engine": next((each for each in good if each.role == Role.ENGINE), None),
+        }
 
 
 def recommend(asked: Question, progress: Progress = lambda share, what: None) -> Recommendation:
@@ -189,14 +212,16 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
         There is no reference solution.
     """
     progress(0.0, "reference solution")
-    conditions, truth = prepare_conditions(asked.scene, asked.error, asked.duration, asked.cost_limit)
-    conditions = replace(conditions, time_limit=asked.time_limit)
-    own, step = choose_ours(conditions, conditions.target * min(1.0, conditions.short / conditions.duration))
+    conditions, truth = prepare_conditions(asked.scene, asked.error, asked.duration, asked.cost_limit, asked.time_limit)
+    starts = [conditions.choose_ours()]
+    if starts[0][0].card.exact and (general := candidates(asked.scene, exact=False)):
+        starts.append(conditions.choose_ours(general))
+    starts += [(method, math.nan) for method in asked.methods]
     roles: dict[str, Role] = {}
     refinements: dict[str, Refinement | Outcome] = {}
-    for i, method in enumerate((own, *asked.methods)):
+    for i, (method, step) in enumerate(starts):
         line = selection.series(method)
-        progress(0.2 + 0.7 * i / (1 + len(asked.methods)), f"probing {line}")
+        progress(0.2 + 0.7 * i / len(starts), f"probing {line}")
         roles[line] = method.role
         refinements[line] = _refine_from_start(conditions, method, step)
     progress(0.9, "timing")
@@ -207,14 +232,40 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     return Recommendation(conditions, truth, advice, asked.missing)
 
 
-def _refine_from_start(conditions: Conditions, method: Method, step: float) -> Refinement | Outcome:
-    """Return the probes of a method from its first setting on, ours near the step of the automatic choice, others coarse.
+@dataclass(frozen=True)
+class Refinement:
+    """The probes of a method, coarse to fine: over a short part of the motion, then over as much of it as a run may take."""
 
-    A method that does not support the scene has an outcome instead.
+    short: tuple[Probe, ...]
+    long: tuple[Probe, ...] = ()
+
+    @property
+    def last(self) -> tuple[Probe, ...]:
+        """The probes that count: the long ones if there are any."""
+        return self.long or self.short
+
+    def best(self, target: float) -> Probe:
+        """Return the coarsest probe whose expected error is at most `target`, rad, otherwise the nearest one."""
+        good = [probe for probe in self.last if probe.expected <= target]
+        if good:
+            return max(good, key=lambda probe: probe.setting)
+        return min(reversed(self.last), key=lambda probe: (probe.expected, -probe.holds))
+
+    def converging(self) -> tuple[Array, Array]:
+        """Return settings (n,) and errors (n,) for the fit of an order: of short probes of equal length."""
+        length = self.short[0].length
+        found = {p.setting: p.error for p in self.short if math.isclose(p.length, length) and p.error < ASYMPTOTIC}
+        return np.array(list(found)), np.array(list(found.values()))
+
+
+def _refine_from_start(conditions: Conditions, method: Method, step: float) -> Refinement | Outcome:
+    """Return the probes of a method: ours from near the step of the automatic choice, s, engines from a coarse setting.
+
+    The result is an outcome if the method does not support the scene.
     """
     if reason := method.unsupported(conditions.scene):
         return fail_unsupported(reason).outcome
-    setting = selection.tolerance_setting(method)
+    setting = tolerance_setting(method)
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))
         return refine(conditions, selection.at_tolerance(method, setting, float(f"{loosest:.0e}")), conditions.spacing)
@@ -224,8 +275,95 @@ def _refine_from_start(conditions: Conditions, method: Method, step: float) -> R
     return refine(conditions, method, step if method.order is None else min(COARSER_START * step, longest))
 
 
+def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
+    """Return the probes of a method from a step dt, s, or its tolerance, until the requested error can be expected.
+
+    If the truth is known for longer than the short window, short probes only need to be good enough for an error that grows in
+    proportion to time, and long probes are made as well.
+    """
+    longer = conditions.truth_until > conditions.short * (1 + 1e-9) and conditions.duration > conditions.short
+
+    def expect_linear(probe: Probe) -> float:
+        law = probe.error_law
+        return law.error * max(1.0, conditions.duration / law.length) if law and law.error < ASYMPTOTIC else math.inf
+
+    expect = expect_linear if longer else _expected
+    short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], expect, long=False)
+    if not longer or expect(short[-1]) > conditions.target:
+        return Refinement(tuple(short))
+    last, order = short[-1], method.order
+    before: Sequence[Probe] = short
+    long = []
+    if order is not None and conditions.window(last.dt, last.cost, long=True).t[-1] < conditions.duration * (1 - 1e-9):
+        # The affordable run is shorter than the duration. One with a longer step, which gets further, shows how errors grow.
+        step = min(LONGER * last.dt, short[0].dt)
+        before = long = [conditions.probe(method, step, last.cost * last.dt / step, True)]
+    long = [*long, conditions.probe(last.method, last.dt, last.cost, True, before)]
+    first = long[-1]
+    long = _refine_until(conditions, long, _expected, long=True)
+    if order is not None and first.expected < COARSEN_BELOW * conditions.target:
+        # At most four times: the error must still shrink with its order there.
+        factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / order))
+        step = conditions.step_at_most(first.dt * factor)
+        long += [conditions.probe(method, step, first.cost * first.dt / step, True)] if step > first.dt else []
+    return Refinement(tuple(short), tuple(long))
+
+
+def _expected(probe: Probe) -> float:
+    return probe.expected
+
+
+def _refine_until(conditions: Conditions, probes: list[Probe], expect: Callable[[Probe], float], long: bool) -> list[Probe]:
+    """Return probes with finer and finer settings until `expect` returns an error within the target, rad."""
+    next_setting = _shorten_step if tolerance_setting(probes[0].method) is None else _tighten_tolerance
+    while len(probes) < ATTEMPTS and expect(probes[-1]) > conditions.target:
+        if _at_round_off(probes) or probes[-1].outcome.kind is OutcomeKind.TIMEOUT:  # finer runs would take even longer
+            break
+        finer = next_setting(conditions, probes, expect(probes[-1]))
+        if finer is None:
+            break
+        probes.append(conditions.probe(*finer, long, tuple(probes)))
+    return probes
+
+
+def _at_round_off(probes: Sequence[Probe]) -> bool:
+    return stops_falling([probe.expected for probe in probes if probe.expected < ASYMPTOTIC])
+
+
+def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
+    """Return the method, the next step, s, and its cost, s/s; None if the cost limit allows no shorter step."""
+    last = probes[-1]
+    per_step = min((probe.cost * probe.dt for probe in probes if probe.outcome.ok), default=math.nan)
+    factor = step_factor(expected, conditions.error, last.method, SMALLEST_CUT, DEFAULT_CUT)
+    growing = sum(conditions.shows_growth(probe) for probe in probes)
+    if conditions.shows_growth(last) and growing < MIN_POINTS and per_step * conditions.short <= RUN_LIMIT * last.dt / 2:
+        factor = max(factor, 1 / 2)  # so that an order can be observed
+    dt = conditions.step_at_most(last.dt * factor)
+    if dt < per_step / conditions.cost_limit:
+        dt = conditions.step_at_least(per_step / conditions.cost_limit)
+    return (last.method, dt, per_step / dt) if dt < last.dt * (1 - 1e-9) else None
+
+
+def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
+    """Return the method with the next tolerance, a power of ten, the sampling interval, s, and the cost, s/s; None if none."""
+    last = probes[-1]
+    name = tolerance_setting(last.method)
+    wanted = math.floor(math.log10(conditions.target / expected)) if expected < math.inf else -2
+    if name is None or last.cost > conditions.cost_limit:
+        return None
+    power = round(math.log10(last.setting))
+    for cut in range(max(-LARGEST_TOLERANCE_CUT, min(-1, wanted)), 0):
+        if power + cut < TIGHTEST:
+            continue
+        try:
+            return selection.at_tolerance(last.method, name, float(f"1e{power + cut}")), last.dt, last.cost
+        except BadInput:  # tighter than the engine allows
+            continue
+    return None
+
+
 def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Outcome]) -> dict[str, float]:
-    """Return the wall time per simulated second of the settings found, s/s, by line: interleaved minimums."""
+    """Return the wall time per simulated second of the resulting settings, s/s, by line: interleaved minimums."""
     runs, lengths = {}, {}
     for line, refinement in refinements.items():
         probe = None if isinstance(refinement, Outcome) else refinement.best(conditions.target)
@@ -233,13 +371,13 @@ def time_settings(conditions: Conditions, refinements: dict[str, Refinement | Ou
             continue
         length = RUN_TIME / probe.cost
         n = max(1, round(length / probe.dt))
-        adaptive = selection.tolerance_setting(probe.method) is not None
+        adaptive = tolerance_setting(probe.method) is not None
         grid = Grid(length, 1) if adaptive else Grid(probe.dt, n, n)
-        outcome = attempt_here(conditions.time_limit, Case("recommendation", conditions.scene, probe.method, grid))
-        if isinstance(outcome, Success):
-            runs[line], lengths[line] = outcome.run, grid.dt * grid.n_steps
-    found = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
-    return {line: timing.minimum / lengths[line] if timing.outcome.ok else math.inf for line, timing in found.items()}
+        run = attempt_here(conditions.time_limit, Case("recommendation", conditions.scene, probe.method, grid))
+        if isinstance(run, Success):
+            runs[line], lengths[line] = run.run, grid.dt * grid.n_steps
+    timings = time_interleaved(runs, ROUNDS, min_time=RUN_TIME, budget=TIMING_BUDGET)
+    return {line: timing.minimum / lengths[line] if timing.outcome.ok else math.inf for line, timing in timings.items()}
 
 
 def _advise(conditions: Conditions, line: str, role: Role, refinement: Refinement | Outcome, cost: float) -> Advice:
@@ -250,7 +388,7 @@ def _advise(conditions: Conditions, line: str, role: Role, refinement: Refinemen
     reached = probe.expected <= conditions.error
     order = None if probe.method.order is None else observed_order(*refinement.converging())
     reason = "" if reached else _explain_shortfall(conditions, refinement, probe)
-    return Advice(line, role, probe, reached, cost, order, refinement.probes, reason)
+    return Advice(line, role, probe, reached, cost, order, refinement.short + refinement.long, reason)
 
 
 def _explain_shortfall(conditions: Conditions, refinement: Refinement, probe: Probe) -> str:
@@ -260,10 +398,10 @@ def _explain_shortfall(conditions: Conditions, refinement: Refinement, probe: Pr
         return str(probe.outcome)
     if math.isinf(conditions.amplification.excess(probe.length, conditions.duration)):
         return "the motion amplifies errors without bound"
-    if at_round_off(last):
-        return "finer settings do not help any more: round-off"
     if last[-1].cost > conditions.cost_limit / 2:
         return f"anything finer costs more than {conditions.cost_limit:g} s per simulated second"
-    if selection.tolerance_setting(probe.method) is not None:
+    if _at_round_off(last):
+        return "finer settings do not help: round-off"
+    if tolerance_setting(probe.method) is not None:
         return "it has no tighter tolerance"
     return f"not within {len(last)} probes"

@@ -6,20 +6,19 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from conservative.benchmarks.recommendation.extrapolation import Drift
+from conservative.benchmarks.recommendation.growth import Drift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..document.model import Block, Document, Items, Paragraph, Role, Section, Table
 from ..labels import method_text, setting_text
-from ..tables.classes import MethodClass, class_of
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
 FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
 PROBES = ("method", "setting", "run, s", "error, rad", "to expect, rad")
 NEGLIGIBLE = 1e-13
-"""Relative drift up to which a quantity is called kept."""
+"""Relative drift up to which the tables show `kept`."""
 
 
 def build(recommendation: Recommendation) -> Document:
@@ -32,14 +31,14 @@ def build(recommendation: Recommendation) -> Document:
 
 
 def _data(recommendation: Recommendation) -> dict[str, Any]:
-    conditions, truth, cheapest = recommendation.conditions, recommendation.truth, recommendation.cheapest
+    conditions, truth = recommendation.conditions, recommendation.truth
     amplified = conditions.amplification
     return {
         "scene": conditions.scene.name,
         "error": conditions.error,
         "duration": conditions.duration,
         "cost_limit": conditions.cost_limit,
-        "cheapest": cheapest.line if cheapest else None,
+        **{name: getattr(advice, "line", None) for name, advice in recommendation.winners.items()},
         "recommendations": [_advice(advice) for advice in recommendation.advice],
         "not_installed": recommendation.missing,
         "truth": {
@@ -110,13 +109,13 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
 
 
 def notes(recommendation: Recommendation) -> list[str]:
-    """Return the basis of the numbers: laws of growth, reference solution, stability, and what could not be tried."""
+    """Return the fastest methods, and the basis of the numbers: growth of errors, reference solution, stability."""
     advice, conditions, truth = recommendation.advice, recommendation.conditions, recommendation.truth
     amplified = conditions.amplification
     after = ", and by any angle after that" if amplified.is_lost else ""
     growth = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
-    solutions = [a for a in advice if a.best and class_of(a.role, a.best.method.name) is MethodClass.SOLUTION]
     return [
+        f"Fastest: {_fastest(recommendation)}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
         f"kept: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
@@ -124,10 +123,17 @@ def notes(recommendation: Recommendation) -> list[str]:
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
         f"{amplified.final_size:.2g} rad within {amplified.end:.4g} s{after} ({amplified.label}): {growth}.",
         "Times: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
-        *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in solutions),
+        *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in advice if not a.general),
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
         *(f"{name}: not installed." for name in recommendation.missing),
     ]
+
+
+def _fastest(recommendation: Recommendation) -> str:
+    """Return the fastest method that reaches the error, the fastest general one of ours, and the fastest engine."""
+    kinds = {"cheapest": "of all", "cheapest_general": "of our general integrators", "cheapest_engine": "of the engines"}
+    winners = recommendation.winners.items()
+    return ", ".join(f"{kinds[kind]} {method_text(advice) if advice else 'none'}" for kind, advice in winners)
 
 
 def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:

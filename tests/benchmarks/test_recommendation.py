@@ -9,8 +9,8 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion
-from conservative.benchmarks.recommendation import extrapolation
-from conservative.benchmarks.recommendation.extrapolation import Amplification, ErrorLaw, Scaling, fit_law
+from conservative.benchmarks.recommendation import growth
+from conservative.benchmarks.recommendation.growth import Amplification, ErrorLaw, fit_law
 from conservative.benchmarks.recommendation.recommend import ask, list_engines, recommend
 from conservative.grid import Grid
 from conservative.references.engines.heyoka import Heyoka
@@ -64,7 +64,7 @@ def of_mujoco():
 
 
 def test_all_integrators_of_an_engine_are_listed(of_mujoco):
-    named = {advice.line for advice in of_mujoco.advice[1:]}
+    named = {advice.line for advice in of_mujoco.advice if advice.role == "engine"}
     assert named == {"mujoco", *(f"mujoco:integrator={name}" for name in ("Euler", "implicit", "implicitfast", "discrete"))}
     by_name = {advice.line: advice for advice in of_mujoco.advice}
     assert by_name["mujoco"].reached
@@ -77,9 +77,17 @@ def test_all_integrators_of_an_engine_are_listed(of_mujoco):
 
 def test_ours_is_cheaper_and_keeps_what_it_should(of_mujoco):
     ours = of_mujoco.ours
-    assert of_mujoco.cheapest is ours
+    assert of_mujoco.winners["cheapest"] is ours
     assert max(drift.expected for drift in ours.best.drifts) < 1e-13  # measured 1e-15
     assert not any(drift.secular for drift in ours.best.drifts)
+
+
+def test_the_best_general_integrator_and_the_best_engine_stand_beside_a_closed_form(of_mujoco):
+    lines = {kind: advice.line for kind, advice in of_mujoco.winners.items()}
+    assert lines == {"cheapest": "moser_veselov", "cheapest_general": "taylor:order=12", "cheapest_engine": "mujoco"}
+    general = of_mujoco.winners["cheapest_general"]
+    assert (general.general, of_mujoco.ours.general) == (True, False)
+    assert general.best.expected < 1e-6  # measured 7e-8
 
 
 def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
@@ -146,7 +154,7 @@ def test_what_is_measured_is_not_extrapolated():
 
 def test_a_law_carried_to_a_finer_setting_is_extrapolated():
     law = fit_law(T, 1e-8 * T, 0.0, 1.0)
-    by_step = law.scale(Scaling("dt", 0.1, 1 / 16, 4))
+    by_step = law.scale(1 / 16, " at dt = 0.1 s")
     assert by_step.extrapolate(10.0) == pytest.approx(1e-7 / 16, rel=1e-12)
     assert not by_step.is_measured(10.0)
 
@@ -165,7 +173,7 @@ def test_amplification_tells_exponential_growth_from_linear():
 def test_an_unstable_motion_is_called_so():
     found = recommend(ask(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
     assert found.conditions.amplification.unstable
-    assert found.conditions.amplification.steepness > extrapolation.FASTER_THAN_LINEAR
+    assert found.conditions.amplification.steepness > growth.FASTER_THAN_LINEAR
 
 
 def test_steps_are_round_numbers(of_mujoco):

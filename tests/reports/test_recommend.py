@@ -29,7 +29,10 @@ def test_json_says_what_to_use_and_why(answered):
     assert content["scene"] == "my_body"
     assert content["error"] == 1e-4
     named = {entry["name"]: entry for entry in content["recommendations"]}
-    assert len(named) == 7  # ours, five integrators of MuJoCo, one line of heyoka
+    assert len(named) == 8  # two of ours, five integrators of MuJoCo, one line of heyoka
+    assert content["cheapest"] == "moser_veselov"
+    assert content["cheapest_general"].startswith("taylor")
+    assert content["cheapest_engine"] == "heyoka"
     best = named["mujoco"]["best"]
     assert best["expected"] < 1e-4
     assert best["dt"] > 0

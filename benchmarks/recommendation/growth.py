@@ -1,4 +1,4 @@
-"""Extrapolate an error measured over a short run to a long one, by a stated law."""
+"""Growth of errors and drifts with time: extrapolation from a short run to a long one by a stated law."""
 
 from __future__ import annotations
 
@@ -15,29 +15,19 @@ from conservative.trajectory import Trajectory
 from ..measures.errors import secular_slope
 
 TREND = 0.5
-"""Share of the largest drift that a straight line must explain for the drift to count as one that goes on."""
+"""Share of the largest drift that a straight line must explain in a secular drift."""
 SIGNIFICANT = 3.0
-"""Standard errors that its slope must be away from zero."""
+"""Standard errors between the slope of a secular drift and zero."""
 FASTER_THAN_LINEAR = 10.0
-"""How far above a straight line a disturbance must rise before it is called amplified."""
+"""A disturbance that rises this far above a straight line is called amplified."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Change of an invariant, relative to its scale.
+    """Change of an invariant relative to its reference scale.
 
-    Attributes
-    ----------
-    name
-        Of the invariant.
-    measured
-        The largest over the run.
-    expected
-        The largest to expect over the duration: in proportion to time where `secular`, else as measured.
-    slope
-        Of a straight line through it, 1/s.
-    secular
-        Whether it goes on in one direction.
+    `measured` is the largest in the run, `expected` the largest over the duration: proportional to time if the drift is
+    `secular`, otherwise as measured. `slope` is that of a straight line, 1/s.
     """
 
     name: str
@@ -48,8 +38,8 @@ class Drift:
 
 
 def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
-    """Return the drift of every invariant of a run, measured and expected over `duration` s."""
-    found = []
+    """Return the drift of every invariant of a run, measured and expected over `duration`, s."""
+    drifts = []
     for invariant in trajectory.scene.invariants:
         relative = trajectory.drift(invariant)
         largest = float(sizes(relative).max())
@@ -57,52 +47,27 @@ def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, 
         length = float(trajectory.t[-1])
         secular = abs(slope) > SIGNIFICANT * stderr and abs(slope) * length > TREND * largest
         factor = max(1.0, duration / length) if secular else 1.0
-        found.append(Drift(invariant.name, largest, largest * factor, slope, secular))
-    return tuple(found)
-
-
-@dataclass(frozen=True)
-class Scaling:
-    """How the law of a coarser setting is carried to a finer one.
-
-    Attributes
-    ----------
-    setting, base
-        "dt" or the name of a tolerance, and its coarser value.
-    factor
-        Error at the finer setting, in units of that at the coarser one.
-    order
-        The method's, by which its error shrinks with dt; None of a tolerance, which the error is proportional to.
-    """
-
-    setting: str
-    base: float
-    factor: float
-    order: int | None
-
-    def __str__(self) -> str:
-        if self.order is None:
-            return f" at {self.setting} = {self.base:g}, carried here in proportion to it"
-        return f" at {self.setting} = {self.base:.3g} s, carried here by order {self.order}"
+        drifts.append(Drift(invariant.name, largest, largest * factor, slope, secular))
+    return tuple(drifts)
 
 
 @dataclass(frozen=True)
 class ErrorLaw:
-    """The law by which an error is carried from a run to the duration.
+    """Attitude error over time, from a run that is shorter than the duration.
 
     Attributes
     ----------
     length, error
-        Of the run, s, and the largest attitude error over it, rad.
+        Length of the run, s, and its largest attitude error, rad.
     exponent
         p of t^p between half the run and all of it.
     linear, quadratic
-        Coefficients of a t + b t^2, rad/s and rad/s^2, b the larger of what that exponent says and what a steady drift of an
-        invariant makes of the phase.
+        Coefficients of a t + b t^2, rad/s and rad/s^2. b is the larger of what the exponent implies and the effect of a steady
+        drift of an invariant on the phase.
     excess
         Factor by which the motion itself amplifies errors beyond that, between the length and the duration.
-    scaling
-        How the law was carried over from a coarser setting; None where it is that of the run itself.
+    carried
+        Text on the coarser setting whose law this is, scaled to a finer one; "" for the law of the run itself.
     """
 
     length: float
@@ -111,10 +76,10 @@ class ErrorLaw:
     linear: float
     quadratic: float
     excess: float
-    scaling: Scaling | None = None
+    carried: str = ""
 
     def extrapolate(self, duration: float) -> float:
-        """Return the error to expect over `duration` s, rad; infinite where the body's attitude is lost."""
+        """Return the expected error over `duration` s, rad; infinite if the attitude is lost."""
         if self.error >= ASYMPTOTIC:
             return math.inf
         if self.is_measured(duration):
@@ -122,7 +87,7 @@ class ErrorLaw:
         return self.excess * max(self.error, self.linear * duration + self.quadratic * duration**2)
 
     def find_duration(self, error: float) -> float:
-        """Return for how long, s, the error to expect stays within `error`, rad; without amplification by the motion."""
+        """Return the time, s, up to which the expected error stays within `error`, rad, without amplification by the motion."""
         if not self.linear + self.quadratic > 0:
             return math.inf
         root = math.sqrt(self.linear**2 + 4 * self.quadratic * error)
@@ -130,18 +95,18 @@ class ErrorLaw:
 
     def is_measured(self, duration: float) -> bool:
         """Whether nothing needs to be extrapolated."""
-        return self.scaling is None and self.length >= duration * (1 - 1e-9)
+        return not self.carried and self.length >= duration * (1 - 1e-9)
 
-    def scale(self, scaling: Scaling) -> ErrorLaw:
-        """Return the law for a finer setting."""
-        linear, quadratic = self.linear * scaling.factor, self.quadratic * scaling.factor
-        return replace(self, error=self.error * scaling.factor, linear=linear, quadratic=quadratic, scaling=scaling)
+    def scale(self, factor: float, carried: str) -> ErrorLaw:
+        """Return the law of a finer setting, whose errors are `factor` times as large."""
+        linear, quadratic = self.linear * factor, self.quadratic * factor
+        return replace(self, error=self.error * factor, linear=linear, quadratic=quadratic, carried=carried)
 
     def describe(self, duration: float) -> str:
         """Return the law of `extrapolate` in words."""
         if self.is_measured(duration):
             return f"measured over all {duration:g} s"
-        run = f"measured over {self.length:.3g} s{self.scaling or ''}"
+        run = f"measured over {self.length:.3g} s{self.carried}"
         if self.error >= ASYMPTOTIC:
             return f"{run}, lost there"
         if math.isinf(self.excess):
@@ -155,17 +120,15 @@ class ErrorLaw:
 def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) -> ErrorLaw:
     """Return the law of an error.
 
-    With E1 and E2 the largest error over the first half of the run and over all of it, a t + b t^2 goes through both where the
+    With E1 and E2 the largest error over the first half of the run and over all of it, a t + b t^2 goes through both if the
     error grows faster than t and slower than t^2; b is 0 below that, and a above.
 
     Parameters
     ----------
-    t
-        Times (n,), s, from 0.
-    error
-        Attitude errors (n,), rad.
+    t, error
+        Times (n,), s, from 0, and attitude errors (n,), rad.
     phase_acceleration
-        Rate at which a steady drift of an invariant changes the rate of the phase, rad/s^2.
+        Rate at which a steady drift of an invariant changes the angular velocity, rad/s^2.
     excess
         See `ErrorLaw`.
     """
@@ -179,16 +142,10 @@ def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) ->
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """Growth of a small disturbance of the start.
+    """Growth of a small relative change of the initial rates, the `disturbance`.
 
-    Attributes
-    ----------
-    t, factor
-        Times (n,), s, and the largest difference so far (n,), rad, for each unit of relative change of the rates.
-    disturbance
-        The relative change that was made.
-    label
-        Who computed both motions.
+    `factor` (n,) is the largest difference of the attitudes up to the times t (n,), s, in rad, divided by the disturbance.
+    `label` is that of the method that integrated both motions.
     """
 
     t: Array
@@ -197,30 +154,30 @@ class Amplification:
     label: str
 
     @property
-    def _known(self) -> int:
-        """Return how many samples come before the two motions have nothing in common any more."""
+    def known(self) -> int:
+        """Number of samples before the two motions have nothing in common."""
         lost = self.factor * self.disturbance > ASYMPTOTIC
         return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
 
     @property
     def is_lost(self) -> bool:
         """Whether the two motions have nothing in common in the end."""
-        return self._known < len(self.t)
+        return self.known < len(self.t)
 
     @property
     def end(self) -> float:
         """End of the known part, s."""
-        return float(self.t[self._known - 1])
+        return float(self.t[self.known - 1])
 
     @property
     def final_size(self) -> float:
-        """Largest difference up to there, rad."""
-        return float(self.factor[self._known - 1]) * self.disturbance
+        """Largest difference in the known part, rad."""
+        return float(self.factor[self.known - 1]) * self.disturbance
 
     @property
     def steepness(self) -> float:
         """Final disturbance divided by a straight line through its value after an eighth of the samples."""
-        last = self._known - 1
+        last = self.known - 1
         early = max(1, last // 8)
         if self.factor[early] <= 0:
             return math.inf if self.factor[last] > 0 else 1.0
@@ -232,10 +189,10 @@ class Amplification:
         return self.steepness > FASTER_THAN_LINEAR
 
     def excess(self, start: float, stop: float) -> float:
-        """Return how much more than in proportion to time a disturbance grows between two times; infinite where lost."""
+        """Return the growth between two times, s, divided by that in proportion to time; infinite if the attitude is lost."""
         if self.is_lost and self.unstable and self.end < stop:
             return math.inf
-        known, last = slice(self._known), min(stop, self.end)
+        known, last = slice(self.known), min(stop, self.end)
         if last <= start:
             return 1.0
         before, after = np.interp([start, last], self.t[known], self.factor[known]).tolist()
