@@ -1,10 +1,9 @@
-"""Bad input over the public API and the command line: what is wrong, what was got, what is allowed, and nothing left behind.
+"""Bad input to the public API and the command line: argument, value and valid values are in the message, and no file is left.
 
-A row is a call, the argument that the message must name, a piece of what was got, and a piece of what is allowed.
+A row is a call, the argument, a piece of the value, and a piece of the valid values.
 """
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -17,7 +16,6 @@ from conservative.attitude import rotation_about
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.model_files import body_from_mjcf
 from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.exact import method
 from conservative.references.precise import Precise
@@ -50,71 +48,51 @@ def field(**changed):
 API = [
     # bodies
     (lambda: cv.RigidBody((1, 2, NAN)), "inertia", "nan", "three positive moments"),
-    (lambda: cv.RigidBody((1, INF, 2)), "inertia", "inf", "three positive moments"),
     (lambda: cv.RigidBody((1, -2, 2)), "inertia", "-2", "positive"),
-    (lambda: cv.RigidBody((1, 0, 2)), "inertia", "0.0", "positive"),
     (lambda: cv.RigidBody([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), "inertia", "off by 0.1", "symmetric"),
     (lambda: cv.RigidBody([[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "inertia", "-1", "positive definite"),
     (lambda: cv.RigidBody((1, 2)), "inertia", "shape (2,)", "(3,)"),
-    (lambda: cv.RigidBody(np.eye(4)), "inertia", "shape (4, 4)", "(3, 3)"),
     (lambda: cv.RigidBody("heavy"), "inertia", "'heavy'", "(3,)"),
     # scenes
     (lambda: scene(name=""), "name", "''", "one character"),
     (lambda: scene(body=(1, 2, 3)), "body", "(1, 2, 3)", "RigidBody"),
     (lambda: scene(R_WB0=SHEAR), "R_WB0", "|R'R - 1| = 0.001", "rotation"),
     (lambda: scene(R_WB0=np.diag([1, 1, -1])), "R_WB0", "reflection", "determinant +1"),
-    (lambda: scene(R_WB0=2 * ONE), "R_WB0", "|R'R - 1| = 3", "rotation"),
     (lambda: scene(R_WB0=(1, 0, 0, 0)), "R_WB0", "shape (4,)", "(3, 3)"),
-    (lambda: scene(R_WB0=np.full((3, 3), NAN)), "R_WB0", "not finite", "rotation"),
     (lambda: scene(w_WB_B0=(0, 1)), "w_WB_B0", "shape (2,)", "(3,)"),
-    (lambda: scene(w_WB_B0=(0, NAN, 1)), "w_WB_B0", "nan", "finite"),
-    (lambda: scene(t_end=0), "t_end", "0", "above 0"),
     (lambda: scene(t_end=-1), "t_end", "-1", "above 0"),
-    (lambda: scene(t_end=NAN), "t_end", "nan", "finite"),
     (lambda: scene(t_end="long"), "t_end", "'long'", "finite"),
     (lambda: scene(potential="gravity"), "potential", "'gravity'", "Potential"),
     (lambda: scene(dt=-0.1), "dt", "-0.1", "above 0"),
     # potentials
     (lambda: cv.UniformGravity(NAN, (0, 0, 1)), "weight", "nan", "finite"),
-    (lambda: cv.UniformGravity(1.0, (0, 0)), "com_B", "shape (2,)", "(3,)"),
     (lambda: cv.UniformGravity(1.0, (0, 0, INF)), "com_B", "inf", "finite"),
     (lambda: cv.LinearSpring(INF, (1, 0, 0), (0, 0, 1)), "stiffness", "inf", "finite"),
-    (lambda: cv.LinearSpring(1.0, (1, 0), (0, 0, 1)), "point_B", "shape (2,)", "(3,)"),
     (lambda: cv.PointAttraction(1.0, (1, 0, 0), (0, NAN, 1)), "anchor_W", "nan", "finite"),
     (lambda: cv.GravityGradient(0.0, (1, 2, 2.5)), "rate", "0.0", "above 0"),
     (lambda: cv.GravityGradient(1.0, (1, 2, 2.5), (0, 0, 0)), "direction_W", "[0.0, 0.0, 0.0]", "not all 0"),
     # runs
     (lambda: cv.integrate("brick_flip"), "scene", "'brick_flip'", "Scene"),
     (lambda: cv.integrate(BRICK, 0), "dt", "0", "above 0"),
-    (lambda: cv.integrate(BRICK, -0.01), "dt", "-0.01", "above 0"),
     (lambda: cv.integrate(BRICK, NAN), "dt", "nan", "finite"),
-    (lambda: cv.integrate(BRICK, True), "dt", "True", "finite"),
     (lambda: cv.integrate(BRICK, 7.0), "dt", "7", "at most t_end = 6"),
     (lambda: cv.integrate(BRICK, 0.01, t_end=-1), "t_end", "-1", "above 0"),
     (lambda: cv.integrate(BRICK, 0.01, sample_every=0), "sample_every", "0", "1 or more"),
-    (lambda: cv.integrate(BRICK, 0.01, sample_every=1.5), "sample_every", "1.5", "integer"),
     (lambda: cv.integrate(BRICK, 0.01, method="redused"), "method", "'redused'", "'reduced' (nearest)"),
     (lambda: cv.integrate(BRICK, 0.01, method=cv.Reduced), "method", "Reduced", "Method"),
     (lambda: cv.integrate(BRICK, 0.01, on_failure="ignore"), "on_failure", "'ignore'", "'raise', 'return'"),
     (lambda: cv.integrate(BRICK, error=0.0), "error", "0.0", "above 0"),
-    (lambda: cv.integrate(BRICK, error=NAN), "error", "nan", "finite"),
     (lambda: cv.integrate(BRICK, method=cv.Reduced(), error=1e-6), "method", "Reduced", "None together with error"),
     # methods
     (lambda: cv.Convected(tol=0), "tol", "0", "above 0"),
-    (lambda: cv.Convected(tol=NAN), "tol", "nan", "finite"),
     (lambda: cv.Reduced(tol=-1e-9), "tol", "-1e-09", "above 0"),
     (lambda: cv.Reduced(order=3), "order", "3", "2, 4, 6, 8, 10"),
     (lambda: cv.Gauss(stages=0), "stages", "0", "1 to 10"),
-    (lambda: cv.Gauss(stages=11), "stages", "11", "1 to 10"),
-    (lambda: cv.Gauss(frame="spinning"), "frame", "'spinning'", "'non_spinning'"),
-    (lambda: cv.MoserVeselov(order=3), "order", "3", "'exact'"),
     (lambda: cv.integrate(TOP, 0.01, cv.MoserVeselov()), "method", "lagrange_top", "free bod"),
     (lambda: cv.integrate(BRICK, 0.7, cv.MoserVeselov()), "dt", "0.7", "|w| dt < 6"),
     (lambda: cv.integrate(BRICK, 0.01, cv.Gauss(frame="non_spinning")), "method", "brick_flip", "symmetric"),
     (lambda: MuJoCo("RK5"), "integrator", "'RK5'", "'RK4'"),
-    (lambda: Pinocchio("verlet"), "scheme", "'verlet'", "RK4"),
     (lambda: Heyoka(tol=0), "tol", "0", "above 0"),
-    (lambda: SciPy("Euler"), "integrator", "'Euler'", "DOP853"),
     (lambda: SciPy(rtol=-1.0), "rtol", "-1.0", "below 1"),
     (lambda: Precise(bits=10), "bits", "10", "53"),
     (lambda: method.free_body(BODY, SHEAR, (0, 0, 1), [0.0]), "R_WB0", "0.001", "rotation"),
@@ -122,7 +100,6 @@ API = [
     # numbers that no float can follow, and those out of range
     (lambda: cv.RigidBody((HUGE, 1, 1)), "inertia", "1000", "three positive moments"),
     (lambda: cv.RigidBody((1e31, 1, 1)), "inertia", "1e+31", "the largest 0 or of magnitude 1e-30 to 1e+30"),
-    (lambda: cv.RigidBody((1e-31, 0, 0)), "inertia", "1e-31", "1e-30"),
     (lambda: cv.RigidBody(("1", "2", "3")), "inertia", "'1'", "three positive moments"),
     (lambda: cv.RigidBody(FLAT), "inertia", "e-15", "ratio up to 1e+13"),
     (lambda: scene(t_end=HUGE), "t_end", "1000", "above 0"),
@@ -130,9 +107,6 @@ API = [
     (lambda: scene(w_WB_B0=(Fraction(HUGE), 0, 0)), "w_WB_B0", "Fraction", "three finite rates"),
     (lambda: cv.UniformGravity(-1e-200, (0, 0, 1)), "weight", "-1e-200", "0 or of magnitude"),
     (lambda: cv.shapes.box((1, 2, 3), mass=HUGE), "mass", "1000", "above 0"),
-    (lambda: cv.integrate(BRICK, HUGE), "dt", "1000", "above 0"),
-    (lambda: cv.integrate(BRICK, 0.01, t_end=Fraction(1, HUGE)), "t_end", "Fraction", "above 0"),
-    (lambda: cv.Gauss(stages=10**5000), "stages", "a value of type int", "1 to 10"),
     (lambda: cv.scenes.lagrange_top(height=1e-30), "inertia", "e-", "1e-30"),
     (lambda: Heyoka(tol=1e-99), "tol", "1e-99", "from 1e-20"),
     # resources
@@ -140,44 +114,29 @@ API = [
     (lambda: cv.integrate(BRICK, 1e-18), "dt", "6e+18 steps", "6.66e-16 s or more"),
     (lambda: cv.Grid(0.01, 10**12), "every", "1000000000001 samples", "samples fit in memory"),
     (lambda: cv.Grid(0.01, 2**60, 2**60), "n_steps", "1152921504606846976", "2^53"),
-    (lambda: cv.Grid(NAN, 10), "dt", "nan", "above 0"),
-    (lambda: cv.Grid(0.01, 0), "n_steps", "0", "1 to 2^53"),
     (lambda: cv.Grid(0.01, 10, "2"), "every", "'2'", "1 to 2^53"),
     # settings and parts that are of no use at all
-    (lambda: cv.Reduced([]), "order", "[]", "2, 4, 6, 8, 10"),
-    (lambda: cv.Reduced(composition=[]), "composition", "[]", "None or"),
-    (lambda: cv.Gauss(frame=np.zeros(2)), "frame", "array", "'auto'"),
-    (lambda: cv.MoserVeselov(order={}), "order", "{}", "'exact'"),
-    (lambda: scene(extra_invariants=1.0), "extra_invariants", "1.0", "Invariants"),
     (lambda: scene(extra_invariants=[1.0]), "extra_invariants", "[1.0]", "Invariants"),
     (lambda: scene(potential=cv.UniformGravity), "potential", "UniformGravity", "a Potential"),
-    (lambda: scene(group=3), "group", "3", "a text"),
     (lambda: scene(name="a\0b"), "name", "x00", "a text"),
     (lambda: cv.Invariant("i", "J", 0.0, len), "scale", "0.0", "above 0"),
     (lambda: cv.Invariant("i", "J", 1.0, None), "evaluate", "None", "a function"),
     (lambda: body_from_mjcf("a\0b", "arm"), "path", "x00", "without NUL"),
     # functions of potentials
     (lambda: field(energy=lambda R: "one"), "energy", "'one'", "a real number"),
-    (lambda: field(energy=lambda R: [1.0]), "energy", "[1.0]", "a real number"),
     (lambda: field(energy=lambda R: 1 / 0), "energy", "ZeroDivisionError", "a real number"),
-    (lambda: field(energy=lambda R: NAN), "energy", "nan", "a real number"),
-    (lambda: field(energy=lambda R: HUGE), "energy", "OverflowError", "a real number"),
     (lambda: field(gradient=lambda R: None), "gradient", "None", "a matrix (3, 3)"),
-    (lambda: field(gradient=lambda R: 1j * ONE), "gradient", "1.j", "a matrix (3, 3)"),
     (lambda: field(gradient=lambda R: [1, 2, 3]), "gradient", "[1, 2, 3], not a matrix (3, 3)", "a matrix (3, 3)"),
     (lambda: field(axis_W=(0, 0, 2)), "axis_W", "2.0", "a unit vector"),
-    (lambda: field(axis_W=(0, NAN, 1)), "axis_W", "nan", "a unit vector"),
     (lambda: field(axis_W=(1, 0, 0)), "axis_W", "a torque of", "symmetric"),
     (lambda: field(scale=INF), "scale", "inf", "above 0"),
     # names
     (lambda: registry.scene("a\0.toml"), "scene", "x00", "a text"),
     (lambda: registry.method(3), "method", "3", "a text"),
     (lambda: registry.scene("brick_flip:none"), "scene brick_flip", "'none'", "a number"),
-    (lambda: registry.scene(f"brick_flip:{HUGE}"), "scene brick_flip", "1000", "a number"),
     (lambda: registry.scene("brick_flipp"), "scene", "'brick_flipp'", "'brick_flip' (nearest)"),
     (lambda: registry.scene("brick_flip:wobble=1"), "scene brick_flip", "wobble", "disturbance"),
     (lambda: registry.method("mujocco"), "method", "'mujocco'", "'mujoco' (nearest)"),
-    (lambda: registry.method("mujoco:RK5"), "integrator", "'RK5'", "'RK4'"),
     (lambda: registry.method("convected:eps=1e-8"), "method convected", "eps", "tol"),
 ]
 
@@ -189,55 +148,39 @@ def test_api(call, argument, got, allowed, tmp_path, monkeypatch):
         call()
     error = caught.value
     assert error.argument == argument
-    before, _, after = str(error).partition("expected")
-    assert before.startswith(f"{argument}: got ")
-    assert got in before
-    assert allowed in after
+    assert got in str(error.got)
+    assert allowed in error.allowed
+    assert str(error) == f"{argument}: got {error.got}; expected {error.allowed}"
     assert not list(tmp_path.iterdir())
 
 
-@dataclass
-class Line:
-    """A command line, and what its one line on stderr must say."""
-
-    words: str
-    argument: str
-    got: str
-    allowed: str
-
-
 COMMANDS = [
-    Line("run brickflip", "scene", "'brickflip'", "'brick_flip' (nearest)"),
-    Line("run brick_flip --method redused", "method", "'redused'", "'reduced' (nearest)"),
-    Line("run brick_flip --dt 0 --csv out.csv", "dt", "0.0", "above 0"),
-    Line("run brick_flip --dt nan --csv out.csv", "dt", "nan", "finite"),
-    Line("run brick_flip --dt 100", "dt", "100", "at most t_end"),
-    Line("run brick_flip --dt fast", "--dt", "'fast'", "float"),
-    Line("run brick_flip --t-end -1", "t_end", "-1", "above 0"),
-    Line("run brick_flip -m convected:tol=-1", "tol", "-1", "above 0"),
-    Line("run lagrange_top -m moser_veselov", "method", "lagrange_top", "free bod"),
-    Line("run brick_flip --csv no/such/folder/out.csv", "csv", "no/such/folder", "folder"),
-    Line("run no_such_file.toml", "no_such_file.toml", "no_such_file.toml", "file"),
-    Line("report --scenes nope", "scene", "'nope'", "one of"),
-    Line("report --methods reduced,nope", "method", "'nope'", "one of"),
-    Line("report --out kept.txt", "out", "kept.txt", "folder"),
-    Line("run brick_flip --csv a\0.csv", "--csv", "x00", "without NUL"),
-    Line("report --out a\0", "--out", "x00", "without NUL"),
-    Line("run a\0.toml", "scene", "x00", "a text"),
-    Line("run brick_flip --dt 1e-15", "dt", "more than 1e+11 steps", "--t-end"),
-    Line("reprot", "reprot", "reprot", "report"),
+    ("run brickflip", "scene", "'brickflip'", "'brick_flip' (nearest)"),
+    ("run brick_flip --method redused", "method", "'redused'", "'reduced' (nearest)"),
+    ("run brick_flip --dt 0 --csv out.csv", "dt", "0.0", "above 0"),
+    ("run brick_flip --dt fast", "--dt", "'fast'", "float"),
+    ("run brick_flip -m convected:tol=-1", "tol", "-1", "above 0"),
+    ("run lagrange_top -m moser_veselov", "method", "lagrange_top", "free bod"),
+    ("run brick_flip --csv no/such/folder/out.csv", "csv", "no/such/folder", "folder"),
+    ("run no_such_file.toml", "no_such_file.toml", "no_such_file.toml", "file"),
+    ("report --methods reduced,nope", "method", "'nope'", "one of"),
+    ("report --out kept.txt", "out", "kept.txt", "folder"),
+    ("run brick_flip --csv a\0.csv", "--csv", "x00", "without NUL"),
+    ("run a\0.toml", "scene", "x00", "a text"),
+    ("run brick_flip --dt 1e-15", "dt", "more than 1e+11 steps", "--t-end"),
+    ("reprot", "reprot", "reprot", "report"),
 ]
 
 
-@pytest.mark.parametrize("line", COMMANDS, ids=[line.words for line in COMMANDS])
-def test_command_line(line, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("words", "argument", "got", "allowed"), COMMANDS, ids=[row[0] for row in COMMANDS])
+def test_command_line(words, argument, got, allowed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "kept.txt").write_text("mine")
-    outcome = CliRunner().invoke(main, line.words.split())
+    outcome = CliRunner().invoke(main, words.split())
     assert outcome.exit_code == 2, outcome.output
     assert "Traceback" not in outcome.output
     assert outcome.stdout == ""
-    for piece in (line.argument, line.got, line.allowed):
+    for piece in (argument, got, allowed):
         assert piece in outcome.stderr
     assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
     assert (tmp_path / "kept.txt").read_text() == "mine"

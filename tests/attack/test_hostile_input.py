@@ -198,21 +198,7 @@ def scene_function(rng, folder):
 def scene_text(rng, folder):
     lines, path = scene_file.template().splitlines(), folder / "scene.toml"
     number = rng.choice([i for i, line in enumerate(lines) if "=" in line and not line.startswith("#")])
-    values = [
-        "1e400",
-        "nan",
-        "-inf",
-        "9" * 400,
-        "[1, 2]",
-        '"text"',
-        "true",
-        "1979-05-27",
-        '"\\u0000"',
-        "{}",
-        "1e-200",
-        "[[1e300]]",
-        "",
-    ]
+    values = ["1e400", "nan", "-inf", "[1, 2]", "true", "1979-05-27", "{}", "1e-200", "[[1e300]]", "9" * 400, '"text"', ""]
     lines[number] = lines[number].partition("=")[0] + "= " + rng.choice(values)
     text = "\n".join(lines)
     text = scramble(rng, text) if rng.random() < 0.5 else text

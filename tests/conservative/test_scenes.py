@@ -43,27 +43,13 @@ def numbers(case, key):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_registered_scene_is_named_grouped_and_sourced(name):
+def test_a_registered_scene_is_complete_and_conserves_its_energy(name):
     scene = registry.scene(name)
     assert (scene.name, scene.group != "your own", bool(scene.source)) == (name, True, True)
-    assert 5 <= scene.t_end / scene.dt <= 3e4  # a run of the defaults is short
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_registered_scene_has_invariants_with_a_scale(name):
-    scene = registry.scene(name)
-    R, w = np.repeat(scene.R_WB0[None], 2, 0), np.repeat(scene.w_WB_B0[None], 2, 0)
+    assert 5 <= scene.t_end / scene.dt <= 3e4  # a run with the defaults is short
     for invariant in scene.invariants:
-        value = invariant.evaluate(R, w)
-        assert len(value) == 2
-        assert np.isfinite(value).all()
-        assert 0 < invariant.scale < math.inf
-        assert np.abs(value).max() < 1e3 * invariant.scale
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_registered_scene_moves_with_energy_conserved(name):
-    scene = registry.scene(name)
+        value = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])
+        assert np.abs(value).max() < 1e3 * invariant.scale < math.inf
     method = cv.Projected() if isinstance(scene.potential, cv.Turning) else cv.Reduced()
     trajectory = cv.integrate(scene, scene.dt, method, t_end=20 * scene.dt)
     assert scene.invariants[0].name == (JACOBI_INTEGRAL if isinstance(scene.potential, cv.Turning) else "energy")
@@ -82,17 +68,11 @@ def test_registered_builder_refuses_what_is_not_a_number(name):
 @pytest.mark.parametrize(
     ("text", "argument"),
     [
-        ("sleeping_top:stability=0.9", "stability"),
-        ("falling_top:stability=1.1", "stability"),
         ("looping_top:precession=1", "precession"),
         ("unduloid_top:precession=11", "precession"),
         ("stable_spin:spin=0", "spin"),
-        ("stable_spin:revolutions=-1", "revolutions"),
         ("axis_spin:axis=4", "axis"),
-        ("symmetric_body:axial=0", "axial"),
-        ("planar_body:second=-1", "second"),
         ("pendulum_over_top:excess=0", "excess"),
-        ("kovalevskaya_top:moment=0", "moment"),
         ("gazebo_box:t_end=0", "t_end"),
     ],
 )
@@ -221,11 +201,8 @@ def test_every_scene_that_is_too_fast_for_game_engines_has_a_slow_motion():
 
 def test_an_engine_that_limits_rates_names_the_slow_motion():
     assert rate_limit_reason(cv.scenes.lagrange_top(slow=4), LIMIT) is None
-    reason = (
-        "as installed it limits rates to 100 rad/s, and the scene starts with 141 rad/s; lagrange_top:slow=4 is a slower one"
-    )
-    assert rate_limit_reason(cv.scenes.lagrange_top(), LIMIT) == reason
-    assert rate_limit_reason(cv.scenes.lagrange_top().rename("mine"), LIMIT).endswith("starts with 141 rad/s")
+    assert "lagrange_top:slow=4" in rate_limit_reason(cv.scenes.lagrange_top(), LIMIT)
+    assert "slow" not in rate_limit_reason(cv.scenes.lagrange_top().rename("mine"), LIMIT)
 
 
 def test_a_slow_motion_needs_a_field_that_can_be_scaled():
