@@ -47,6 +47,8 @@ class Row:
         Hash of scene, method and steps.
     values, spreads
         Measures that must not get worse, and the change of each by round-off alone.
+    reason
+        Why there are no values; "" if there are, or if it is not known.
     """
 
     id: str
@@ -57,6 +59,7 @@ class Row:
     definition: str = ""
     values: Mapping[str, float] = field(default_factory=dict)
     spreads: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ""
 
 
 @dataclass(frozen=True)

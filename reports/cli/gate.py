@@ -162,8 +162,8 @@ def _compare(options: dict[str, Any]) -> Document:
     BadInput
         A version or a scene cannot be used, or neither version has a method.
     """
-    from conservative.benchmarks.comparison.compare import compare_versions
-    from conservative.benchmarks.comparison.version import install_version
+    from conservative.benchmarks.versions.project import compare_projects
+    from conservative.benchmarks.versions.version import Version, install_version
     from conservative.references.environments.lock import Source
 
     from ..run.provenance import describe_origin
@@ -176,9 +176,11 @@ def _compare(options: dict[str, Any]) -> Document:
     asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}
     if options["processes"]:
         asked["processes"] = options["processes"]
-    versions = []
-    for name in (options["against"], head):
+
+    def prepare(name: str) -> Version:
         click.echo(f"preparing {name}", err=True)
-        versions.append(install_version(name, project, source, options["requirements"]))
+        return install_version(name, project, source, options["requirements"])
+
+    base, latest = prepare(options["against"]), prepare(head)
     with progress() as step:
-        return build(compare_versions(versions[0], versions[1], tell=step, **asked), made)
+        return build(compare_projects(base, latest, tell=step, **asked), made)

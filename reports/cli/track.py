@@ -108,7 +108,8 @@ def _answer(
     BadInput
         The engine, a version, a scene, a setting or the build cannot be used, or there are fewer than two versions.
     """
-    from conservative.benchmarks.tracking.track import make_plan, require_several, track
+    from conservative.benchmarks.versions.engine import compare_engine, plan_versions, require_several
+    from conservative.benchmarks.versions.version import Version
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
 
@@ -129,7 +130,6 @@ def _answer(
     if against is not None:
         tell(f"installing {against}")
         environments += (install_build(engine, against, source).environment,)
-    plan = make_plan(environments, settings, scenes)
+    sides = plan_versions([Version(each.version, "", each) for each in environments], settings, scenes)
     with progress() as step:
-        history = track(plan, lambda done, total, what: step(done / total, what))
-    return build(history, against is not None, made)
+        return build(compare_engine(sides, step), against is not None, made)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from conservative.benchmarks.measures.drift_class import DriftClass, classify
-from conservative.benchmarks.tracking.observation import Observation, Spread
-from conservative.benchmarks.tracking.track import History, Line, Transition
+from conservative.benchmarks.versions.changes import Transition, list_transitions
+from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Spread, ratio
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.model import Cell, Check, Document, Facts, Grade, Items, Paragraph, Role, Row, Section, Style, Table, filled
@@ -24,45 +24,52 @@ _WORDS = (
 )
 
 
-def build(history: History, gated: bool = False, made: Mapping[str, str] | None = None) -> Document:
-    """Return the document of a history.
+def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, str] | None = None) -> Document:
+    """Return the document of a comparison.
 
     Parameters
     ----------
-    history
+    comparison
         The measurements of all versions.
     gated
         Whether a loss in the last version is a failure.
     made
         How and where it was measured.
     """
-    plan, made = history.plan, made or {}
-    failures = list(_failures(history)) if gated else []
-    sentences = [text for each in history.transitions if (text := sentence(each))]
-    by_scene: dict[str, list[Line]] = {}
-    for line in history.lines:
+    made, transitions = made or {}, list_transitions(comparison)
+    environments = [version.environment for version in comparison.versions]
+    engine, names = environments[0].engine, [version.name for version in comparison.versions]
+    lost_last = [each for each in transitions if each.lost and each.now.version == names[-1]]
+    failures = []
+    if gated:
+        failures = [sentence(each) for each in lost_last]
+        if not any(line.results[-1] and line.results[-1].outcome.ok for line in comparison.lines):
+            failures.append(f"{names[-1]}: {NO_END}")
+    sentences = [text for each in transitions if (text := sentence(each))]
+    by_scene: dict[str, list[EngineLine]] = {}
+    for line in comparison.lines:
         by_scene.setdefault(line.scene, []).append(line)
     tables = [_table(scene, lines) for scene, lines in by_scene.items()]
     changed = Section("What changed", [Items.of(sentences) if sentences else Paragraph(NOTHING_CHANGED)])
-    failed = [text for line in history.lines for text in _unfinished(line)]
+    failed = [text for line in comparison.lines for text in _unfinished(line)]
     unfinished = Section("Runs that failed or show no order", filled(Items.of(failed)))
     verdict = []
     if gated:
-        was, now = plan.versions[-2:]
+        was, now = names[-2:]
         verdict = filled(Paragraph(f"{now} against {was}: {'FAILED' if failures else 'passed'}", Role.LEAD), Items.of(failures))
-    versions = [(each.version, each.python, ", ".join(each.packages)) for each in plan.environments]
+    versions = [(each.version, each.python, ", ".join(each.packages)) for each in environments]
     data = {
         "made": dict(made),
-        "engine": plan.engine,
+        "engine": engine,
         "passed": not failures,
         "failures": failures,
-        "versions": [{name: getattr(each, name) for name in ("version", "python", "packages")} for each in plan.environments],
-        "rows": [_record(line, each) for line in history.lines for each in line.observations],
-        "changes": [_change_record(each) for each in history.transitions if each.changes],
+        "versions": [{name: getattr(each, name) for name in ("version", "python", "packages")} for each in environments],
+        "rows": [_record(line, each) for line in comparison.lines for each in _seen(line)],
+        "changes": [_change_record(each) for each in transitions if each.changes],
     }
     return Document(
-        f"conservative track {plan.engine}",
-        f"Versions of {plan.engine}: {', '.join(plan.versions)}",
+        f"conservative track {engine}",
+        f"Versions of {engine}: {', '.join(names)}",
         filled(
             *verdict,
             changed,
@@ -73,33 +80,29 @@ def build(history: History, gated: bool = False, made: Mapping[str, str] | None 
         ),
         brief=filled(*tables, changed, unfinished, *verdict),
         data=data,
-        checks=_checks(history, gated, failures),
+        checks=_checks(transitions, lost_last if gated else [], failures, names[-1]),
         failures=failures,
     )
 
 
-def _failures(history: History) -> Iterator[str]:
-    """Yield why the last version does not pass: what it lost, or that no run reaches its end."""
-    yield from (sentence(each) for each in history.lost_last)
-    if not any(line.observations[-1].outcome.ok for line in history.lines):
-        yield f"{history.plan.versions[-1]}: {NO_END}"
-
-
-def _checks(history: History, gated: bool, failures: list[str]) -> list[Check]:
+def _checks(transitions: Sequence[Transition], failed: Sequence[Transition], failures: list[str], last: str) -> list[Check]:
     """Return a check for each setting, scene and pair of consecutive versions."""
     checks = []
-    for each in history.transitions:
+    for each in transitions:
         text = sentence(each)
         name = f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
-        failed = gated and each in history.lost_last
-        checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if failed else ""))
-    if failures and not history.lost_last:
-        checks.append(Check("all", history.plan.versions[-1], failure="\n".join(failures)))
+        checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if each in failed else ""))
+    if failures and not failed:
+        checks.append(Check("all", last, failure="\n".join(failures)))
     return checks
 
 
-def _unfinished(line: Line) -> Iterator[str]:
-    reasons = [(each.version, *_reason(each)) for each in line.observations]
+def _seen(line: EngineLine) -> list[Observation]:
+    return [each for each in line.results if each is not None]
+
+
+def _unfinished(line: EngineLine) -> Iterator[str]:
+    reasons = [(each.version, *_reason(each)) for each in _seen(line)]
     for kind in dict.fromkeys(kind for _, kind, _ in reasons if kind):
         found = [(version, reason) for version, this, reason in reasons if this == kind]
         versions = ", ".join(version for version, _ in found)
@@ -114,22 +117,22 @@ def _reason(seen: Observation) -> tuple[str, str]:
     return reason and OutcomeKind.NO_ORDER.value, reason and f"{OutcomeKind.NO_ORDER.value} ({reason})"
 
 
-def _table(scene: str, lines: list[Line]) -> Table:
-    names = list(dict.fromkeys(name for line in lines for each in line.observations for name in each.drifts))
+def _table(scene: str, lines: list[EngineLine]) -> Table:
+    names = list(dict.fromkeys(name for line in lines for each in _seen(line) for name in each.drifts))
     header = ("setting", "version", "order", "order of rates", *(f"{name} drift" for name in names))
     times = ("attitude error, rad", "outcome", "time ratio", "µs a step")
-    rows = [_row(line, each, names) for line in lines for each in line.observations]
-    return Table((*header, *times), rows, f"{scene}, dt = {lines[0].observations[0].dt:g} s", Style.FILTERED)
+    rows = [_row(line, each, names) for line in lines for each in _seen(line)]
+    return Table((*header, *times), rows, f"{scene}, dt = {_seen(lines[0])[0].dt:g} s", Style.FILTERED)
 
 
-def _row(line: Line, seen: Observation, quantities: list[str]) -> Row:
+def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
     drifts = [_drift_cell(seen.drifts[name].value if name in seen.drifts else math.nan) for name in quantities]
     fits = (seen.attitude_order, seen.rates_order)
     orders = [DASH if math.isnan(fit.slope) else order_text(fit.slope) for fit in fits]
-    ratio, step_time = _ratio(line, seen), min(line.times.get(seen.version, (math.nan,)))
-    ratio_text = DASH if ratio is None else number(ratio.value)
-    if ratio is not None and ratio.low != ratio.high:
-        ratio_text += f" ({number(ratio.low)} to {number(ratio.high)})"
+    shown, step_time = _ratio(line, seen), min((line.times or {}).get(seen.version, (math.nan,)))
+    ratio_text = DASH if shown is None else number(shown.value)
+    if shown is not None and shown.low != shown.high:
+        ratio_text += f" ({number(shown.low)} to {number(shown.high)})"
     outcome = outcome_cell(Outcome(seen.outcome.kind))  # the reason is below the tables
     names = (seen.setting or "default", seen.version)
     return (*names, *orders, *drifts, number(seen.error.value), outcome, ratio_text, number(1e6 * step_time))
@@ -143,20 +146,21 @@ def _drift_cell(drift: float) -> Cell:
     return Cell(f"{symbol} {drift_text(drift)}", colour)
 
 
-def _ratio(line: Line, seen: Observation) -> Spread | None:
+def _ratio(line: EngineLine, seen: Observation) -> Spread | None:
     """Return the time of a step divided by that in the first version that has one."""
-    first = next((each.version for each in line.observations if each.version in line.times), "")
-    return line.time_ratio(seen.version, first)
+    times = line.times or {}
+    first = next((times[each.version] for each in _seen(line) if each.version in times), None)
+    return ratio(first, times[seen.version]) if first and seen.version in times else None
 
 
-def _record(line: Line, seen: Observation) -> dict[str, Any]:
+def _record(line: EngineLine, seen: Observation) -> dict[str, Any]:
     return {
         **{name: getattr(seen, name) for name in ("scene", "setting", "version", "label", "dt", "outcome")},
         "attitude_order": seen.attitude_order,
         "rates_order": seen.rates_order,
         "attitude_error_rad": seen.error,
         "drifts": seen.drifts,
-        "step_times_s": line.times.get(seen.version, ()),
+        "step_times_s": (line.times or {}).get(seen.version, ()),
         "time_ratio": _ratio(line, seen),
     }
 

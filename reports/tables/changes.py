@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from conservative.benchmarks.measures.drift_class import SMALL
-from conservative.benchmarks.tracking.changes import Aspect, Change
-from conservative.benchmarks.tracking.observation import Fit, Spread
-from conservative.benchmarks.tracking.track import Transition
+from conservative.benchmarks.versions.changes import Aspect, Change, Transition
+from conservative.benchmarks.versions.engine import Fit, Spread
 from conservative.outcome import Outcome, OutcomeKind
 
 from .cells import number, outcome_text

@@ -7,9 +7,9 @@ machine that is never quiet.
 import pytest
 
 from conservative import registry
-from conservative.benchmarks.comparison.side import Side
-from conservative.benchmarks.comparison.times import Timed, compare_times
-from conservative.benchmarks.comparison.version import Version
+from conservative.benchmarks.versions.project import ProjectSide
+from conservative.benchmarks.versions.times import Timed, compare_times
+from conservative.benchmarks.versions.version import Version
 from conservative.references.environments.environment import Environment
 
 from .. import environments
@@ -20,7 +20,7 @@ METHODS = ("reduced", "moser_veselov:order=2")
 FACTORS = ("1.0", "1.2")
 
 
-class Slowed(Side):
+class Slowed(ProjectSide):
     """A side that takes as many times more steps as the name of a method ends with."""
 
     def timed(self, scene, method, dt, n_steps):
@@ -37,7 +37,7 @@ def test_only_slower_rows_raise_an_alarm(wheel, tmp_path):
     environments.Environment.create(tmp_path / "version", wheel)
     version = Version("wheel", "", Environment("wheel", "0", tmp_path / "version", "", ()))
     dt = registry.scene("brick_flip").dt
-    rows = [Timed(f"{method} x{factor}", "brick_flip", f"{method} x{factor}", dt) for method in METHODS for factor in FACTORS]
+    rows = [Timed("brick_flip", f"{method} x{factor}", dt) for method in METHODS for factor in FACTORS]
     alarms = []
     for _ in range(count(1)):
         sides = Usual(version), Slowed(version)
@@ -46,7 +46,7 @@ def test_only_slower_rows_raise_an_alarm(wheel, tmp_path):
         finally:
             for side in sides:
                 side.close()
-        alarms.append([name for name, row in found.items() if row.failed])
+        alarms.append([method for (_, method), row in found.items() if row.failed])
     print(alarms)
     for each in alarms:
         assert not [name for name in each if name.endswith("x1.0")]

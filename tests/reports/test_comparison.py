@@ -9,25 +9,28 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.gate.results import Status
+from conservative.benchmarks.versions.project import judge
 from conservative.reports.cli.main import main
 from conservative.reports.document import text as text_of
 from conservative.reports.sections.comparison import EXPLANATION, Standing, build, table
 from conservative.reports.terminal import progress
 
-from ..benchmarks.comparison.made_up import BASE, HEAD, TIMED, found, timed
+from ..benchmarks.versions.made_up import comparison, row, timed
 from ..environments import ROOT
 
 SAME, SLOW, FAST = (1.0, 0.98, 1.02), (1.1, 1.08, 1.12), (0.8, 0.79, 0.81)
 
 
-GOOD, ON_TIME = found(), timed(SAME)
+GOOD, ON_TIME = row(), timed(SAME)
 
 
 def answer(was=GOOD, now=GOOD, time=ON_TIME):
-    rows = [{TIMED.id: each} if each else {} for each in (was, now)]
-    return judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {})
+    return comparison((was, now, time))
+
+
+def shown(compared):
+    return table(compared, judge(compared).violations).rows
 
 
 def document(*compared, **others):
@@ -35,25 +38,25 @@ def document(*compared, **others):
 
 
 SLOWER = document(time=timed(SLOW, SLOW))
-FAILED = found("diverged at 1 s", status=Status.FAILED)
+FAILED = row("diverged at 1 s", status=Status.FAILED)
 STANDINGS = {
     Standing.SAME: answer(),
     Standing.SLOWER: answer(time=timed(SLOW, SLOW)),
     Standing.FASTER: answer(time=timed(FAST)),
-    Standing.WORSE: answer(now=found(steps=601.0)),
+    Standing.WORSE: answer(now=row(steps=601.0)),
     Standing.NOTHING: answer(was=FAILED, now=FAILED, time=None),
 }
 
 
 @pytest.mark.parametrize("standing", STANDINGS)
 def test_each_row_has_a_standing(standing):
-    (row,) = table(STANDINGS[standing]).rows
-    assert str(row[2]).endswith(standing)
+    (cells,) = shown(STANDINGS[standing])
+    assert str(cells[2]).endswith(standing)
 
 
 def test_the_table_has_both_versions():
-    (row,) = table(answer(now=found(attitude_error_max=2e-3), time=timed(SLOW, SAME))).rows
-    assert [str(cell) for cell in row] == [
+    (cells,) = shown(answer(now=row(attitude_error_max=2e-3), time=timed(SLOW, SAME)))
+    assert [str(cell) for cell in cells] == [
         "brick_flip",
         "reduced",
         "✗ worse",
@@ -64,16 +67,16 @@ def test_the_table_has_both_versions():
         "2.00e-16",
         "2",
     ]
-    (row,) = table(STANDINGS[Standing.NOTHING]).rows
-    assert [str(cell) for cell in row[3:]] == ["–"] * 6
+    (cells,) = shown(STANDINGS[Standing.NOTHING])
+    assert [str(cell) for cell in cells[3:]] == ["–"] * 6
 
 
 def test_json_has_what_was_measured_and_null_for_what_was_not():
     content = json.loads(text_of(document(time=timed((math.nan,) * 3, reason="crashed")), "json"))
     assert not content["passed"]
-    (row,) = content["rows"]
-    assert row["time"]["first"] == {"value": None, "low": None, "high": None, "processes": 7}
-    assert row["is"]["values"]["steps"] == 600
+    (record,) = content["rows"]
+    assert record["time"]["first"] == {"value": None, "low": None, "high": None, "processes": 7}
+    assert record["is"]["values"]["steps"] == 600
     assert content["versions"]["was"] == {"name": "was", "commit": "", "packages": ["numpy==2.0"]}
 
 
@@ -145,7 +148,7 @@ def test_options_of_two_versions_need_two(gate, options):
 
 def test_junit_has_violations_that_belong_to_no_row():
     nothing = answer(was=None)  # no row of the earlier version has passed: everything would
-    assert [each.measure for each in nothing.violations] == ["rows"]
+    assert [each.measure for each in judge(nothing).violations] == ["rows"]
     suite = ElementTree.fromstring(text_of(build(nothing), "junit")).find("testsuite")
     assert suite.get("failures") == "1"
     assert "rows" in suite.find(".//failure").get("message")

@@ -6,14 +6,12 @@ import os
 import shutil
 import time
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from conservative import registry
-from conservative.benchmarks.comparison.compare import judge
 from conservative.benchmarks.measures import measurement
 from conservative.reports import report
 from conservative.reports.document import html
@@ -23,7 +21,8 @@ from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import comparison
 from conservative.reports.sections.report import build
 
-from ..benchmarks.comparison.made_up import BASE, HEAD, found, timed
+from ..benchmarks.versions import made_up
+from ..benchmarks.versions.made_up import row, timed
 from .made_up import at_step, over_steps
 
 pytestmark = pytest.mark.browser
@@ -260,9 +259,9 @@ VISIBLE = f"return [...document.querySelectorAll('{ROWS} tbody tr:has(th)')].map
 @pytest.fixture(scope="module")
 def comparison_page(tmp_path_factory):
     """A page with three rows: one slower, one faster, one as before."""
-    rows = {name: replace(found(), row=replace(found().row, id=name, method=name)) for name in TIMES}
+    lines = [(row(method=name), row(method=name), time) for name, time in TIMES.items()]
     file = tmp_path_factory.mktemp("page") / "gate.html"
-    file.write_text(html.render(comparison.build(judge(BASE, HEAD, rows, rows, TIMES))), encoding="utf-8")
+    file.write_text(html.render(comparison.build(made_up.comparison(*lines))), encoding="utf-8")
     with open_drawn(file, tmp_path_factory.mktemp("profile")) as browser:
         yield browser
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.tracking.observation import Fit
+from conservative.benchmarks.versions.engine import Fit
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import HEAD
@@ -16,7 +16,7 @@ from conservative.reports.document import text as text_of
 from conservative.reports.document.model import Items, Section, walk
 from conservative.reports.sections.track import NO_END, NOTHING_CHANGED, build
 
-from ..benchmarks.made_up_versions import BAD, FAILED, GOOD, TIMES, history, near
+from ..benchmarks.versions.made_up_engine import BAD, FAILED, GOOD, TIMES, history, near
 
 
 def sentences(document):

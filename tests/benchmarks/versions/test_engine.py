@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.benchmarks.tracking.changes import Aspect, differ, find_changes, ratio
-from conservative.benchmarks.tracking.observation import NO_STEP, Fit, Point, Spread, fit_orders
-from conservative.benchmarks.tracking.track import make_plan, require_several
+from conservative.benchmarks.versions.changes import Aspect, find_changes, list_transitions
+from conservative.benchmarks.versions.engine import (
+    NO_STEP,
+    Fit,
+    Spread,
+    StepError,
+    differ,
+    fit_orders,
+    plan_versions,
+    ratio,
+    require_several,
+)
 from conservative.outcome import Outcome, OutcomeKind
 
-from .made_up_versions import BAD, GOOD, TIMES, environments, history, near
+from .made_up_engine import BAD, GOOD, TIMES, history, near
+from .made_up_engine import versions as made_up
 
 
 def changes(was, now, was_times=TIMES, now_times=TIMES):
@@ -115,8 +125,8 @@ def test_a_ratio_is_that_of_the_shortest_times():
 
 
 def points(order, steps, reached):
-    found = [Point(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
-    return tuple(point if k < reached else Point(point.dt, np.nan, np.nan, False) for k, point in enumerate(found))
+    found = [StepError(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
+    return tuple(point if k < reached else StepError(point.dt, np.nan, np.nan, False) for k, point in enumerate(found))
 
 
 def test_orders_are_fitted_to_the_steps_that_all_versions_have():
@@ -144,19 +154,16 @@ def test_what_has_no_step_has_no_order_and_says_so():
 # ---------------------------------------------------------------------------------------------------------------- histories
 
 
-def test_a_history_goes_from_version_to_version():
-    found = history(BAD, GOOD, GOOD, BAD)
-    assert [bool(each.changes) for each in found.transitions] == [True, False, True]
-    assert [each.now.version for each in found.lost_last] == ["4.0"]
-    assert history(GOOD, BAD, GOOD).lost_last == ()
+def test_changes_go_from_version_to_version():
+    found = list_transitions(history(BAD, GOOD, GOOD, BAD))
+    assert [bool(each.changes) for each in found] == [True, False, True]
+    assert [each.now.version for each in found if each.lost] == ["4.0"]
 
 
 def test_times_belong_to_their_versions():
     slow = tuple(3 * time for time in TIMES)
-    found = history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow))
-    assert [[each.aspect for each in step.changes] for step in found.transitions] == [[], [Aspect.TIME]]
-    assert found.lines[0].time_ratio("3.0", "1.0").value == pytest.approx(3)
-    assert history(GOOD, GOOD).lines[0].time_ratio("2.0", "1.0") is None
+    found = list_transitions(history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow)))
+    assert [[each.aspect for each in step.changes] for step in found] == [[], [Aspect.TIME]]
 
 
 @pytest.mark.parametrize(("versions", "message"), [(["1.0"], "two or more"), ([], "none"), (["1.0", "2.0", "1.0"], "twice")])
@@ -164,4 +171,4 @@ def test_fewer_than_two_versions_are_refused(versions, message):
     with pytest.raises(cv.BadInput, match=message):
         require_several(versions)
     with pytest.raises(cv.BadInput, match=message):
-        make_plan(environments(*versions), (), ())
+        plan_versions(made_up(*versions), (), ())

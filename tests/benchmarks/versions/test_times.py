@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conservative.benchmarks.comparison.times import (
+from conservative.benchmarks.versions.times import (
     LAYOUTS,
     MOST_TURNS,
     PROCESSES,
@@ -70,11 +70,11 @@ def test_what_is_open_is_measured_in_more_processes():
     row = compare(Side(), Side(1.08, spells=lambda process: (0.97, 1.0, 1.03)[process % 3]))
     assert row.first.processes > PROCESSES
     clock = Clock(Side(), Side(1.08, spells=lambda process: (0.96, 1.0, 1.05)[process % 3]))
-    assert len(settle(clock, [TIMED], 3)[TIMED.id]) == 3 * MOST_TURNS
+    assert len(settle(clock, [TIMED], 3)[TIMED.key]) == 3 * MOST_TURNS
 
 
 def test_a_side_that_does_not_survive_fails_its_row_alone():
-    other = Timed("brick_flip / gauss", "brick_flip", "gauss", 0.01)
+    other = Timed("brick_flip", "gauss", 0.01)
 
     class Fragile(Side):
         def timed(self, scene, method, dt, n_steps):
@@ -82,10 +82,10 @@ def test_a_side_that_does_not_survive_fails_its_row_alone():
             return super().timed(scene, method, dt, n_steps)
 
     found = compare_times(Side(), Fragile(), [TIMED, other])
-    assert found[other.id].failed
-    assert found[other.id].reason == "crashed (signal 11)"
-    assert found[other.id].first.processes == 2
-    assert not found[TIMED.id].failed
+    assert found[other.key].failed
+    assert found[other.key].reason == "crashed (signal 11)"
+    assert found[other.key].first.processes == 2
+    assert not found[TIMED.key].failed
 
 
 def test_no_rows_start_no_process():

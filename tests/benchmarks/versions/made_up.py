@@ -3,17 +3,15 @@
 import random
 from pathlib import Path
 
-from conservative.benchmarks.comparison.compare import Found, Place
-from conservative.benchmarks.comparison.times import Ratio, Timed, TimeRow
-from conservative.benchmarks.comparison.version import Version
 from conservative.benchmarks.gate.results import Row, Status
-from conservative.benchmarks.studies.study import Truths
+from conservative.benchmarks.versions.comparison import Comparison, Line
+from conservative.benchmarks.versions.times import Ratio, Timed, TimeRow
+from conservative.benchmarks.versions.version import Version
 from conservative.references.environments.environment import Environment
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import scene
 
-PLACE = Place("brick_flip", scene("brick_flip"), "definition", Truths())
-TIMED = Timed("brick_flip / reduced", "brick_flip", "reduced", PLACE.scene.dt)
+TIMED = Timed("brick_flip", "reduced", scene("brick_flip").dt)
 STEP = 1e-6
 """Time of a step, s."""
 
@@ -32,12 +30,19 @@ VALUES = {
 }
 
 
-def found(reason="", **changes):
-    """A row with values, some of which differ; with a status of its own it has none."""
+def row(reason="", method="reduced", **changes):
+    """A row with values, some of which differ; with a reason it has none."""
     status = changes.pop("status", Status.PASSED)
     values = {} if reason else VALUES | {name.replace("_", " "): value for name, value in changes.items()}
-    row = Row(TIMED.id, "brick_flip", "reduced", status, "", "definition", values, dict.fromkeys(values, 0.0))
-    return Found(row, reason)
+    spreads = dict.fromkeys(values, 0.0)
+    return Row(f"brick_flip / {method}", "brick_flip", method, status, "", "definition", values, spreads, reason)
+
+
+def comparison(*lines, base=BASE, head=HEAD):
+    """A comparison of lines (was, now, time): rows of both versions, and how their times compare; None for none."""
+    names = [(was or now).method for was, now, _ in lines if was or now]
+    found = [Line("brick_flip", name, (was, now), time) for name, (was, now, time) in zip(names, lines, strict=True)]
+    return Comparison((base, head), tuple(found))
 
 
 def timed(first, again=None, reason=""):

@@ -7,8 +7,8 @@ import subprocess
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.comparison import version
-from conservative.benchmarks.comparison.version import install_version
+from conservative.benchmarks.versions import version
+from conservative.benchmarks.versions.version import install_version
 from conservative.errors import BadInput
 from conservative.references.environments import projects
 from conservative.references.environments.environment import Environment, folder_of_projects

@@ -14,12 +14,8 @@ from enum import Enum
 from conservative.outcome import Outcome
 
 from ..measures.drift_class import DriftClass, classify
-from .observation import Fit, Observation, Spread
+from .engine import EngineComparison, Fit, Observation, Spread, StepTimes, differ, ratio
 
-StepTimes = tuple[float, ...]
-"""Shortest time of a step, s, in each repeat."""
-TIME_FACTOR = 1.25
-"""Smallest ratio of times that differ."""
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
 """Orders differ if their difference is larger than the first, and than so many standard errors."""
 FACTOR = 3.0
@@ -118,13 +114,25 @@ def direction(was: Spread, now: Spread) -> int:
     return int(after[0] > FACTOR * before[1]) - int(before[0] > FACTOR * after[1])
 
 
-def differ(was: StepTimes, now: StepTimes) -> bool:
-    """Return whether every time (n,), s, of one version is longer than every time of the other by `TIME_FACTOR`."""
-    if not was or not now:
-        return False
-    return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
+@dataclass(frozen=True)
+class Transition:
+    """The changes from one version to the next, with one setting on one scene; may be none."""
+
+    was: Observation
+    now: Observation
+    changes: tuple[Change, ...]
+
+    @property
+    def lost(self) -> tuple[Change, ...]:
+        """The changes by which the later version lost something."""
+        return tuple(change for change in self.changes if change.lost)
 
 
-def ratio(was: StepTimes, now: StepTimes) -> Spread:
-    """Return the ratio of the shortest times (n,), s, with the spread of the ratios of single repeats."""
-    return Spread.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])
+def list_transitions(comparison: EngineComparison) -> tuple[Transition, ...]:
+    """Return the changes from each version to the next, version by version."""
+    transitions = []
+    for line, was, now in comparison.steps:
+        if was and now and line.times is not None:
+            times = line.times.get(was.version, ()), line.times.get(now.version, ())
+            transitions.append(Transition(was, now, find_changes(was, now, *times)))
+    return tuple(transitions)

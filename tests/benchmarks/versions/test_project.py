@@ -1,28 +1,26 @@
 """What two versions differ in, from rows with chosen values: what fails, what is said beside that, and what passes."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from conservative.benchmarks.comparison.compare import TIME, Place, judge, judge_values, measure_rows
-from conservative.benchmarks.comparison.side import Setting
 from conservative.benchmarks.gate.results import Status
 from conservative.benchmarks.suite import points
 from conservative.benchmarks.suite.points import GatedValue
+from conservative.benchmarks.versions import project
+from conservative.benchmarks.versions.project import TIME, ProjectSide, define_scene, judge, judge_values
 from conservative.errors import BadInput
 from conservative.references.worker.client import EngineCrashed
 from conservative.registry import method, scene
 
-from .made_up import BASE, HEAD, PLACE, TIMED, VALUES, found, timed, version
+from .made_up import HEAD, VALUES, comparison, row, timed, version
 
 SAME = (1.0, 0.98, 1.02)
 SLOW = (1.1, 1.08, 1.12)
 
 
 def compare(was, now, time=None):
-    rows = [{TIMED.id: each} if each else {} for each in (was, now)]
-    return judge(BASE, HEAD, *rows, {TIMED.id: time} if time else {})
+    return judge(comparison((was, now, time)) if was or now else comparison())
 
 
 def violations(*arguments):
@@ -32,7 +30,7 @@ def violations(*arguments):
 
 
 def test_the_same_passes_and_says_nothing():
-    result = compare(found(), found(), timed(SAME))
+    result = compare(row(), row(), timed(SAME))
     assert result.passed
     assert result.notes == ()
 
@@ -50,7 +48,7 @@ WORSE = {
 def test_a_value_that_is_worse_fails(name):
     # By `judge_values`, as the rows of a version are made, so that no measure gets lost there either.
     was, now = (
-        judge_values(found().row, {key: GatedValue(value, 0.0) for key, value in values.items()})
+        judge_values(row(), {key: GatedValue(value, 0.0) for key, value in values.items()})
         for values in (VALUES, VALUES | {name: WORSE[name]})
     )
     assert violations(was, now) == {name}
@@ -60,56 +58,56 @@ def test_a_value_that_is_worse_fails(name):
 def test_no_measure_of_a_real_row_is_ignored():
     values = points.measure(points.Point(scene("lagrange_top:t_end=0.5"), method("reduced")))
     assert {"rate error max", "vertical momentum drift max", "iterations", "observed order"} <= values.keys()
-    was = judge_values(found().row, values)
+    was = judge_values(row(), values)
     for name, each in values.items():
         worse = GatedValue(each.value + (-0.5 if name == "observed order" else 0.5), each.spread)
-        assert violations(was, judge_values(found().row, values | {name: worse})) == {name}
+        assert violations(was, judge_values(row(), values | {name: worse})) == {name}
 
 
 def test_last_digits_fail_nothing():
-    assert violations(found(), found(attitude_error_max=1e-3 * (1 + 1e-8), energy_drift_max=9e-16)) == set()
+    assert violations(row(), row(attitude_error_max=1e-3 * (1 + 1e-8), energy_drift_max=9e-16)) == set()
 
 
 def test_a_time_fails_where_it_is_slower_twice():
-    (each,) = compare(found(), found(), timed(SLOW, SLOW)).violations
+    (each,) = compare(row(), row(), timed(SLOW, SLOW)).violations
     assert (each.measure, each.scene, each.method) == (TIME, "brick_flip", "reduced")
     assert each.now == "1.100 times as long (1.080 to 1.120)"
-    assert compare(found(), found(), timed(SLOW, SAME)).notes == (
+    assert compare(row(), row(), timed(SLOW, SAME)).notes == (
         "brick_flip, reduced: looked slower (1.100), and was not when measured again (1.000)",
     )
 
 
 def test_a_time_that_cannot_be_measured_fails():
-    (each,) = compare(found(), found(), timed((math.nan,) * 3, reason="crashed (signal 11)")).violations
+    (each,) = compare(row(), row(), timed((math.nan,) * 3, reason="crashed (signal 11)")).violations
     assert each.now == "crashed (signal 11)"
 
 
 def test_a_row_that_fails_now_or_is_gone_fails():
-    failed = found("diverged at 1 s", status=Status.FAILED)
-    assert violations(found(), failed) == {"row"}
-    assert violations(found(), None) == {"row"}
-    assert compare(found(), failed).notes == ("brick_flip, reduced: is without values: diverged at 1 s",)
+    failed = row("diverged at 1 s", status=Status.FAILED)
+    assert violations(row(), failed) == {"row"}
+    assert violations(row(), None) == {"row"}
+    assert compare(row(), failed).notes == ("brick_flip, reduced: is without values: diverged at 1 s",)
 
 
 def test_what_is_new_or_failed_before_has_nothing_to_be_compared_with():
-    failed = found("diverged at 1 s", status=Status.FAILED)
-    old = replace(found(), row=replace(found().row, id="a", method="gauss"))
-    new = judge(BASE, HEAD, {"a": old}, {"a": old, TIMED.id: found()}, {})
+    failed = row("diverged at 1 s", status=Status.FAILED)
+    old = row(method="gauss")
+    new = judge(comparison((old, old, None), (None, row(), None)))
     assert new.passed
     assert new.notes == ("brick_flip, reduced: was not there",)
-    mended = judge(BASE, HEAD, {"a": old, TIMED.id: failed}, {"a": old, TIMED.id: found()}, {})
+    mended = judge(comparison((old, old, None), (failed, row(), None)))
     assert mended.passed
     assert mended.notes == ("brick_flip, reduced: was without values: diverged at 1 s",)
 
 
 def test_without_a_row_that_passed_there_is_no_verdict():
-    assert violations(found("diverged", status=Status.FAILED), found()) == {"rows"}
-    assert violations(None, found()) == {"rows"}
+    assert violations(row("diverged", status=Status.FAILED), row()) == {"rows"}
+    assert violations(None, row()) == {"rows"}
 
 
 def test_what_differs_between_environments_is_said():
     other = version("is", "numpy==2.1", "numba==0.68", python="3.12.1")
-    result = judge(BASE, other, {TIMED.id: found()}, {TIMED.id: found()}, {})
+    result = judge(comparison((row(), row(), None), head=other))
     assert result.notes == (
         "another Python: was 3.11.7, is 3.12.1",
         "another numba: was not there, is numba==0.68",
@@ -129,29 +127,28 @@ RUNAWAY = "energy drift max is 2.7e+11, more than 1: the run failed"
     ],
 )
 def test_a_run_that_ran_away_failed_whatever_it_says(name, value, reason):
-    row = judge_values(found().row, {name: GatedValue(value, 0.0)})
-    assert (row.row.status, row.reason) == (Status.FAILED, reason)
-    assert judge_values(found().row, {"energy drift max": GatedValue(0.36, 0.0)}).reason == ""
+    judged = judge_values(row(), {name: GatedValue(value, 0.0)})
+    assert (judged.status, judged.reason) == (Status.FAILED, reason)
+    assert judge_values(row(), {"energy drift max": GatedValue(0.36, 0.0)}).reason == ""
 
 
-class Answers:
-    """A side that answers tasks from a table, or does not survive them."""
+class Answers(ProjectSide):
+    """A side that answers from a table, or does not survive the question."""
+
+    settings = [{"name": "reduced", "label": "made==1/reduced", "order": 2, "engine": ""}]  # noqa: RUF012
 
     def __init__(self, **answers):
-        self.answers = answers
+        self.version, self.answers = HEAD, answers
 
-    def ask(self, task, **values):
-        if task not in self.answers:
+    def ask(self, function, **values):
+        if function not in self.answers:
             raise EngineCrashed("ImportError: no such thing")
-        return self.answers[task]
-
-
-SETTING = Setting("reduced", "made==1/reduced", 2, "")
+        return self.answers[function]
 
 
 def test_a_scene_that_a_version_does_not_have_is_an_error_of_its_rows():
-    (each,) = measure_rows(Answers(), PLACE, [SETTING])
-    assert each.row.status is Status.ERROR
+    ((_, each),) = Answers().measure("brick_flip")
+    assert each.status is Status.ERROR
     assert "no such thing" in each.reason
 
 
@@ -168,27 +165,25 @@ def definition(scene):
 
 
 def test_a_scene_of_another_motion_is_not_compared():
-    place = Place.of("brick_flip")
-    heavier = definition(place.scene) | {"inertia": place.scene.body.inertia * 2}
-    (each,) = measure_rows(Answers(describe_scene=heavier), place, [SETTING])
+    brick = scene("brick_flip")
+    heavier = definition(brick) | {"inertia": brick.body.inertia * 2}
+    ((_, each),) = Answers(describe_scene=heavier).measure("brick_flip")
     assert each.reason == "another motion"
-    assert violations(found(), each) == {"definition"}
+    assert violations(row(), each) == {"definition"}
 
 
-def test_a_scene_that_a_version_cannot_do_is_skipped():
-    place = Place.of("brick_flip")
-    answers = Answers(
-        describe_scene=definition(place.scene), describe_pair={"unsupported": "for tops only", "longest_step": 1.0}
-    )
-    (each,) = measure_rows(answers, place, [SETTING])
-    assert (each.row.status, each.reason) == (Status.SKIPPED, "for tops only")
+def test_a_scene_that_a_version_does_not_support_is_skipped():
+    pair = {"unsupported": "for tops only", "longest_step": 1.0}
+    answers = Answers(describe_scene=definition(scene("brick_flip")), describe_pair=pair)
+    ((_, each),) = answers.measure("brick_flip")
+    assert (each.status, each.reason) == (Status.SKIPPED, "for tops only")
 
 
 def test_a_field_that_turns_is_told_from_another_one():
-    orbits = [Place.of(name).definition for name in ("stable_satellite", "unstable_satellite")]
-    assert orbits[0] != orbits[1]
+    assert define_scene("stable_satellite") != define_scene("unstable_satellite")
 
 
-def test_an_unknown_scene_is_refused():
+def test_an_unknown_scene_is_refused_before_any_work(monkeypatch):
+    monkeypatch.setattr(project, "ProjectSide", None)
     with pytest.raises(BadInput, match="scene: got 'nowhere'"):
-        Place.of("nowhere")
+        project.compare_projects(HEAD, HEAD, ["nowhere"])

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative import registry
-from conservative.grid import Grid
+from conservative import Grid, registry
 from conservative.method import Method, Role
 from conservative.scene import Scene
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from conservative.attitude import Array
 from conservative.errors import IntegrationFailed
 
 from ..measures.timing import wall_time
-from .side import Side, TimedRun
 
 SLOWER = 0.05
 """Part by which a row may become slower."""
@@ -43,14 +42,26 @@ MOST_STEPS, MOST_CALLS = 2**20, 10_000
 RESAMPLES = 4999
 
 
+class Process(Protocol):
+    """The process of a version: starts again after `close`, and prepares runs of n_steps steps dt, s, to be timed."""
+
+    def close(self) -> None: ...
+
+    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> Any: ...
+
+
 @dataclass(frozen=True)
 class Timed:
-    """What is timed: the id of the row, the scene and the method by their registered names, and the step dt, s."""
+    """What is timed: scene and method by their registered names, and the step dt, s."""
 
-    id: str
     scene: str
     method: str
     dt: float
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Scene and method."""
+        return self.scene, self.method
 
 
 @dataclass(frozen=True)
@@ -89,67 +100,68 @@ class TimeRow:
         return bool(self.reason) or (self.first.slower and self.again is not None and self.again.slower)
 
 
-Times = dict[str, list[tuple[float, float]]]
-"""Shortest times of a step, s, in both versions, for each pair of processes, by the id of the row."""
+Key = tuple[str, str]
+Times = dict[Key, list[tuple[float, float]]]
+"""Shortest times of a step, s, in both versions, for each pair of processes, by scene and method."""
 
 
-def compare_times(base: Side, head: Side, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[str, TimeRow]:
-    """Return the times of two versions by the id of each row; rows that are slower beyond doubt are measured again."""
+def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[Key, TimeRow]:
+    """Return the times of two versions by scene and method; rows that are slower beyond doubt are measured again."""
     clock = Clock(base, head)
     first = settle(clock, rows, processes)
-    found = {row.id: ratio_of(first[row.id]) for row in rows}
-    slower = [row for row in rows if found[row.id].slower]
+    found = {row.key: ratio_of(first[row.key]) for row in rows}
+    slower = [row for row in rows if found[row.key].slower]
     again = settle(clock, slower, processes)
-    repeated = {row.id: ratio_of(again[row.id]) for row in slower}
-    every = {row.id: [*first[row.id], *again.get(row.id, [])] for row in rows}
+    repeated = {row.key: ratio_of(again[row.key]) for row in slower}
+    every = {row.key: [*first[row.key], *again.get(row.key, [])] for row in rows}
     rows_found = {}
-    for id, times in every.items():
+    for key, times in every.items():
         was, now = np.min(times, axis=0) if times else (math.nan, math.nan)
-        rows_found[id] = TimeRow(float(was), float(now), found[id], repeated.get(id), clock.failures.get(id, ""))
+        rows_found[key] = TimeRow(float(was), float(now), found[key], repeated.get(key), clock.failures.get(key, ""))
     return rows_found
 
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
     """Return the times of rows from so many processes, and from more for rows whose interval contains the limit."""
-    found: Times = {row.id: [] for row in rows}
+    found: Times = {row.key: [] for row in rows}
     for _ in range(MOST_TURNS):
-        for id, times in clock.measure(rows, processes).items():
-            found[id] += times
-        rows = [row for row in rows if ratio_of(found[row.id]).open]
+        for key, times in clock.measure(rows, processes).items():
+            found[key] += times
+        rows = [row for row in rows if ratio_of(found[row.key]).open]
     return found
 
 
 class Clock:
-    """Measures rows in new processes each time. Attribute: `failures`, why rows have no times, by their id."""
+    """Measures rows in new processes each time. Attribute: `failures`, why rows have no times, by scene and method."""
 
-    def __init__(self, base: Side, head: Side) -> None:
+    def __init__(self, base: Process, head: Process) -> None:
         self._sides = base, head
-        self._work: dict[str, tuple[int, int]] = {}
-        self.failures: dict[str, str] = {}
+        self._work: dict[Key, tuple[int, int]] = {}
+        self.failures: dict[Key, str] = {}
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
         """Return the times of rows from so many processes."""
-        found: Times = {row.id: [] for row in rows}
+        found: Times = {row.key: [] for row in rows}
         for turn in range(processes if rows else 0):
             for side in self._sides:
                 side.close()
             for row in rows:
-                if row.id in self.failures:
+                if row.key in self.failures:
                     continue
                 try:
-                    found[row.id].append(self._shortest(row, turn))
+                    found[row.key].append(self._shortest(row, turn))
                 except IntegrationFailed as failure:
-                    self.failures[row.id] = str(failure.outcome)
+                    self.failures[row.key] = str(failure.outcome)
         return found
 
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
-        if row.id not in self._work:
+        if row.key not in self._work:
             base = self._sides[0]
             n, run = last_a_sample(lambda n: base.timed(row.scene, row.method, row.dt, n))
             spent = min(wall_time(run) for _ in range(5))
-            self._work[row.id] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
-        steps, calls = self._work[row.id]
+            self._work[row.key] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
+        steps, calls = self._work[row.key]
         runs = [[side.timed(row.scene, row.method, row.dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
         was, now = _sample(runs, calls, turn)
         return was / steps, now / steps
@@ -167,7 +179,7 @@ def last_a_sample(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Cal
         n = max(n + 1, math.ceil(n * min(8.0, SAMPLE / max(spent, 1e-9))))
 
 
-def _sample(runs: Sequence[Sequence[TimedRun]], calls: int, turn: int) -> tuple[float, float]:
+def _sample(runs: Sequence[Sequence[Any]], calls: int, turn: int) -> tuple[float, float]:
     """Return the shortest time, s, of a call in each version; the version that begins changes from round to round."""
     shortest = [math.inf, math.inf]
     for each in runs:

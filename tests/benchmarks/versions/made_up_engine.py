@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
-from conservative.benchmarks.tracking.observation import Fit, Observation, Spread
-from conservative.benchmarks.tracking.track import History, Line, Plan
+from conservative.benchmarks.versions.comparison import Comparison, Line
+from conservative.benchmarks.versions.engine import Fit, Observation, Spread
+from conservative.benchmarks.versions.version import Version
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.environment import Environment
 
@@ -50,14 +50,13 @@ FAILED = Observation(
 
 
 def history(*observations, times=()):
-    """Return the history of one setting on one scene: versions 1.0, 2.0 and so on."""
-    versions = [f"{number}.0" for number in range(1, len(observations) + 1)]
-    environments = tuple(Environment("made", version, Path(), "3.11.7", (f"made=={version}",)) for version in versions)
-    seen = tuple(replace(each, version=version) for each, version in zip(observations, versions, strict=True))
-    line = Line("brick", "midpoint", seen, dict(zip(versions, times, strict=False)))
-    return History(Plan(environments, (), ()), (line,))
+    """Return the comparison of one setting on one scene: versions 1.0, 2.0 and so on."""
+    names = [f"{number}.0" for number in range(1, len(observations) + 1)]
+    seen = tuple(replace(each, version=name) for each, name in zip(observations, names, strict=True))
+    line = Line("brick", "midpoint", seen, dict(zip(names, times, strict=False)))
+    return Comparison(tuple(versions(*names)), (line,))
 
 
-def environments(*versions):
-    """Return values that have what a plan looks at."""
-    return [SimpleNamespace(engine="made", version=version) for version in versions]
+def versions(*names):
+    """Return versions of an engine that nobody installed."""
+    return [Version(name, "", Environment("made", name, Path(), "3.11.7", (f"made=={name}",))) for name in names]

@@ -1,4 +1,4 @@
-"""A version of a project, given by a git ref, a folder or a wheel, and its environment."""
+"""A version of a project (a git ref, a folder or a wheel) or a release of an engine, and its environment."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _ALLOWED = "a git ref of the project's repository, a wheel, or a folder with pyp
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a project.
+    """A version of a project or of an engine.
 
     Attributes
     ----------
     name
-        The ref, or the name of the folder or of the wheel.
+        The ref, the release, or the name of the folder or of the wheel.
     commit
-        Its commit; of a folder with changes that are not committed with "+changes", of a wheel empty.
+        Its commit, with "+changes" for a folder with changes that are not committed; "" for a wheel or a release.
     environment
         Where it runs.
     """
@@ -83,27 +83,19 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
 
 def _wheel_of_commit(found: str, project: Path, source: Source) -> Path:
     """Return the wheel of a commit: a kept one, or a new one built from the files of the commit."""
-    inside = git(project, "rev-parse", "--show-prefix")
+    inside, top = git(project, "rev-parse", "--show-prefix"), git(project, "rev-parse", "--show-toplevel")
 
     def make_wheel(folder: Path) -> Path:
-        sources = folder / "sources"
-        _take_out(found, project, sources)
+        sources, archive = folder / "sources", ["git", "-C", top, "archive", "--format=tar", found]
+        try:
+            done = subprocess.run(archive, capture_output=True, check=True, timeout=600)
+        except (OSError, subprocess.SubprocessError) as error:
+            raise BadInput("against", f"{found}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
+        with tarfile.open(fileobj=io.BytesIO(done.stdout)) as files:
+            if hasattr(tarfile, "data_filter"):  # not before 3.11.4
+                files.extraction_filter = tarfile.data_filter
+            files.extractall(sources)
         # setuptools-scm, and tools built on it, would look for a version in a repository
         return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{found[:12]}")(folder)
 
     return keep_wheel(f"{found}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
-
-
-def _take_out(found: str, project: Path, folder: Path) -> None:
-    """Write the files of a commit into a folder."""
-    top = git(project, "rev-parse", "--show-toplevel")
-    try:
-        done = subprocess.run(
-            ["git", "-C", top, "archive", "--format=tar", found], capture_output=True, check=True, timeout=600
-        )
-    except (OSError, subprocess.SubprocessError) as error:
-        raise BadInput("against", f"{found}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
-    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
-        if hasattr(tarfile, "data_filter"):  # not before 3.11.4
-            archive.extraction_filter = tarfile.data_filter
-        archive.extractall(folder)

@@ -1,0 +1,85 @@
+"""The comparison of n versions: every setting on every scene in each version, then the times of settings that work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Generic, Protocol, TypeVar
+
+from .version import Version
+
+Result = TypeVar("Result")
+Measured = TypeVar("Measured", covariant=True)
+Times = TypeVar("Times")
+Tell = Callable[[float, str], None]
+"""Called with the share of the work that is done, and the name of the next step."""
+TIMING = 0.5
+"""Share of the work that is done when the timing begins."""
+
+
+class Side(Protocol[Measured]):
+    """A version that settings are measured in."""
+
+    version: Version
+
+    def measure(self, scene: str) -> Iterable[tuple[str, Measured]]:
+        """Yield the name of each setting and its result on a scene; failures are results."""
+
+
+@dataclass(frozen=True)
+class Line(Generic[Result, Times]):
+    """One setting on one scene: a result for each version (None if it does not have the setting), and their times."""
+
+    scene: str
+    setting: str
+    results: tuple[Result | None, ...]
+    times: Times | None = None
+
+
+@dataclass(frozen=True)
+class Comparison(Generic[Result, Times]):
+    """Versions, in the order of comparison, and a line for each setting on each scene."""
+
+    versions: tuple[Version, ...]
+    lines: tuple[Line[Result, Times], ...]
+
+    @property
+    def steps(self) -> Iterator[tuple[Line[Result, Times], Result | None, Result | None]]:
+        """Each line with its results in two consecutive versions, version by version."""
+        for pair in pairwise(range(len(self.versions))):
+            for line in self.lines:
+                yield line, line.results[pair[0]], line.results[pair[1]]
+
+
+def compare(
+    sides: Sequence[Side[Result]],
+    scenes: Sequence[str],
+    finish: Callable[[Sequence[Line[Result, Times]]], Mapping[tuple[str, str], Times]],
+    tell: Tell = lambda share, what: None,
+) -> Comparison[Result, Times]:
+    """Return the comparison of versions.
+
+    Parameters
+    ----------
+    sides
+        Two or more, in the order of comparison.
+    scenes
+        Registered names.
+    finish
+        Takes all lines and returns the times of those that are timed, by scene and setting.
+    tell
+        Progress.
+    """
+    lines: list[Line[Result, Times]] = []
+    for number, scene in enumerate(scenes):
+        found: list[dict[str, Result]] = []
+        for place, side in enumerate(sides):
+            tell(TIMING * (number + place / len(sides)) / len(scenes), f"{scene}: {side.version.name}")
+            found.append(dict(side.measure(scene)))
+        settings = dict.fromkeys(setting for results in found for setting in results)
+        lines += [Line(scene, setting, tuple(results.get(setting) for results in found)) for setting in settings]
+    tell(TIMING, f"timing {len(lines)} rows")
+    times = finish(lines)
+    timed = (replace(line, times=times.get((line.scene, line.setting))) for line in lines)
+    return Comparison(tuple(side.version for side in sides), tuple(timed))

@@ -1,0 +1,331 @@
+"""Versions of an engine: a run at the scene's step, a few with slightly shorter steps, errors over steps, and times in turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from conservative import registry
+from conservative.errors import BadInput
+from conservative.grid import Grid, grid_for
+from conservative.invariants import Invariant, sizes
+from conservative.method import Method
+from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.references.environments.engine_method import EngineMethod
+from conservative.scene import Scene
+from conservative.trajectory import Trajectory
+
+from ..measures.convergence_order import MIN_POINTS, observed_order
+from ..measures.errors import measure_errors
+from ..measures.measure import Measure
+from ..measures.timing import time_interleaved
+from ..studies import convergence, selection, step_ladder
+from ..studies.case import Case, Failure, Success
+from ..studies.speed import TimedRun, keep_end, lengthen, shorten
+from ..studies.study import Study
+from ..studies.time_limit import attempt_here, attempt_within
+from .comparison import Comparison, Line, Tell, compare
+from .version import Version
+
+MORE_STEPS = (0, 1, 2)
+"""Steps of the runs in addition to those at the scene's dt: a change caused by one or two more steps is noise."""
+SAMPLES = 1000
+"""Approximate number of samples of a run."""
+REPEATS = 3
+"""Repeats of all rounds: a difference between repeats is noise."""
+ROUNDS = 3
+"""Rounds of a repeat; the fastest call counts."""
+TIME_FACTOR = 1.25
+"""Smallest ratio of times that differ."""
+NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
+NO_STEP = "its accuracy does not depend on dt"
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A value, and its smallest and largest value under changes that should not matter.
+
+    For errors (rad) and drifts (relative) the change is one or two more steps in the run; for times (s) it is a repetition.
+    """
+
+    value: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Spread:
+        """Return the spread of values, of which the first is the one that counts; NaN are ignored."""
+        first, *rest = values
+        known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
+        return cls(first, min(known), max(known))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Smallest and largest absolute value."""
+        ends = sorted((abs(self.low), abs(self.high)))
+        return (0.0 if self.low < 0 < self.high else ends[0]), ends[1]
+
+
+NOTHING = Spread(math.nan, math.nan, math.nan)
+"""The spread of a value that could not be measured."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An order of convergence: its slope and standard error, NaN if there is none for a reason."""
+
+    slope: float = math.nan
+    stderr: float = math.nan
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class StepError:
+    """Largest errors at a step dt, s, of attitude, rad, and of rates, relative; NaN if the run did not reach its end.
+
+    `reached` is False if there was no time for the run.
+    """
+
+    dt: float
+    attitude: float
+    rates: float
+    reached: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation:
+    """Measurements of one version of an engine, with one setting, on one scene.
+
+    Attributes
+    ----------
+    scene, setting, version, label
+        Names; setting and label as the method has them.
+    dt
+        Step, s, of everything but the orders.
+    outcome
+        How the run ended.
+    points
+        Errors at shorter and shorter steps; empty for a method whose accuracy does not depend on a step.
+    attitude_order, rates_order
+        Orders of convergence, over the steps that all versions have.
+    error
+        Largest attitude error, rad.
+    drifts
+        Largest relative change of each invariant, by name; signed unless the invariant is a vector.
+    """
+
+    scene: str
+    setting: str
+    version: str
+    label: str
+    dt: float
+    outcome: Outcome = OK
+    points: tuple[StepError, ...] = ()
+    attitude_order: Fit = Fit()
+    rates_order: Fit = Fit()
+    error: Spread = NOTHING
+    drifts: Mapping[str, Spread] = field(default_factory=dict)
+
+
+def observe(study: Study, scene: Scene, method: Method, version: str) -> Observation:
+    """Return the observation of a method on a scene; the study has the time limit and the reference solutions."""
+    n = grid_for(scene, scene.dt).n_steps
+    counts = [n + more for more in MORE_STEPS]
+    cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
+    setting, dt = method.setting(), cases[0].grid.dt
+    found = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
+    first = attempt_within(study.hang_limit, cases[0], study.skip_missing)
+    if isinstance(first, Failure):
+        return replace(found, outcome=first.outcome)
+    done = [first, *(attempt_within(study.hang_limit, case, study.skip_missing) for case in cases[1:])]
+    runs = [each.trajectory for each in done if isinstance(each, Success)]
+    return replace(
+        found,
+        points=tuple(_points(study, scene, method)),
+        error=Spread.of(_largest_error(study, run, case.grid) for run, case in zip(runs, cases, strict=False)),
+        drifts={invariant.name: Spread.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
+    )
+
+
+def _largest_error(study: Study, run: Trajectory, grid: Grid) -> float:
+    truth = study.truth(run.scene, grid).trajectory
+    return next(each.value for each in measure_errors(run, truth) if each.measure is Measure.ATTITUDE_MAX)
+
+
+def _largest_change(run: Trajectory, invariant: Invariant) -> float:
+    """Return the largest relative change of an invariant, signed unless it is a vector."""
+    change = run.drift(invariant)
+    place = int(np.argmax(sizes(change)))
+    return float(change[place]) if change.ndim == 1 else float(sizes(change)[place])
+
+
+def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
+    """Yield the errors at shorter and shorter steps."""
+    if method.order is None:
+        return
+    truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
+    cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
+    for case, done in convergence.attempt_each(study, cases):
+        if isinstance(done, Success):
+            found = {each.measure: each.value for each in measure_errors(done.trajectory, truth)}
+            yield StepError(case.grid.dt, found[Measure.ATTITUDE_MAX], found[Measure.RATES_MAX])
+        else:
+            yield StepError(case.grid.dt, math.nan, math.nan, reached=done.outcome.kind not in NO_TIME)
+
+
+def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
+    """Return the observations of all versions with their orders, over the steps that every version had time for.
+
+    An order depends a little on the steps that it is fitted to. A version with too few steps for a fit takes none from others.
+    """
+    reached = [{point.dt for point in each.points if point.reached} for each in observations]
+    enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
+    steps = set.intersection(*enough) if enough else set()
+    return tuple(_with_orders(each, steps) for each in observations)
+
+
+def _with_orders(seen: Observation, steps: set[float]) -> Observation:
+    if not seen.outcome.ok:
+        return seen
+    if not seen.points:
+        return replace(seen, attitude_order=Fit(reason=NO_STEP), rates_order=Fit(reason=NO_STEP))
+    points = [point for point in seen.points if point.dt in steps]
+    fits = []
+    for errors in ([point.attitude for point in points], [point.rates for point in points]):
+        order = observed_order([point.dt for point in points], errors)
+        fits.append(Fit(reason=order.reason) if order.reason else Fit(order.slope, order.stderr))
+    return replace(seen, attitude_order=fits[0], rates_order=fits[1])
+
+
+StepTimes = tuple[float, ...]
+"""Shortest time of a step, s, in each repeat."""
+EngineLine = Line[Observation, Mapping[str, StepTimes]]
+EngineComparison = Comparison[Observation, Mapping[str, StepTimes]]
+
+
+def differ(was: StepTimes, now: StepTimes) -> bool:
+    """Return whether every time (n,), s, of one version is longer than every time of the other by `TIME_FACTOR`."""
+    if not was or not now:
+        return False
+    return min(now) > TIME_FACTOR * max(was) or min(was) > TIME_FACTOR * max(now)
+
+
+def ratio(was: StepTimes, now: StepTimes) -> Spread:
+    """Return the ratio of the shortest times (n,), s, with the spread of the ratios of single repeats."""
+    return Spread.of([min(now) / min(was), *(b / a for a, b in zip(was, now, strict=True))])
+
+
+@dataclass
+class EngineSide:
+    """A version of an engine, its methods, and the study with the time limit and the reference solutions."""
+
+    version: Version
+    methods: tuple[Method, ...]
+    study: Study
+
+    def measure(self, scene: str) -> Iterator[tuple[str, Observation]]:
+        """Yield an observation for each setting on a scene, by the setting as tables show it."""
+        (value,) = (each for each in self.study.scenes if each.name == scene)
+        for method in self.methods:
+            yield method.setting(), observe(self.study, value, method, self.version.name)
+
+
+def plan_versions(
+    versions: Sequence[Version], settings: Iterable[str], scene_names: Iterable[str], time_limit: float | None = None
+) -> tuple[EngineSide, ...]:
+    """Return the sides of a comparison of versions of an engine.
+
+    Parameters
+    ----------
+    versions
+        Two or more of one engine, in the order of comparison.
+    settings
+        As in the name of a method, `RK4` or `integrator=RK4`; by default those that tables show, and the engine as installed.
+    scene_names
+        By default those of a report that a setting supports.
+    time_limit
+        Longest single run to plan for, s; see `Study`.
+
+    Raises
+    ------
+    BadInput
+        There are fewer than two versions, one is there twice, a setting or a scene is unknown, no setting supports a scene, or
+        the time limit is not a finite duration above 0.
+    """
+    settings, scene_names = tuple(settings), tuple(scene_names)
+    require_several([version.name for version in versions])
+    engine = versions[-1].environment.engine
+    if not settings:  # those of the methods that tables show, and of the engine as installed
+        family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
+        shown = (*family.settings_for("variants"), *family.settings_for("as_installed"))
+        settings = tuple(dict.fromkeys(method.name.partition(":")[2] for method in shown))
+    methods = [tuple(registry.method(f"{engine}@{each.name}:{setting}") for setting in settings) for each in versions]
+    every = tuple(method for row in methods for method in row)
+    scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)
+    taken = tuple(scene for scene in scenes if any(method.unsupported(scene) is None for method in every))
+    study = Study("track", scenes if scene_names else taken, every, quick=True, time_limit=time_limit)
+    return tuple(EngineSide(version, row, study) for version, row in zip(versions, methods, strict=True))
+
+
+def require_several(versions: list[str]) -> None:
+    """Raise `BadInput` unless there are two versions or more, all different."""
+    if len(set(versions)) < len(versions):
+        twice = next(version for version in versions if versions.count(version) > 1)
+        raise BadInput("versions", f"{twice!r} twice", "different versions")
+    if len(versions) < 2:
+        raise BadInput(
+            "versions", f"{', '.join(versions) or 'none'}, nothing to compare", "two or more, --last N, or --against"
+        )
+
+
+def compare_engine(sides: Sequence[EngineSide], tell: Tell) -> EngineComparison:
+    """Return the comparison of versions of an engine: all settings on all scenes in all versions."""
+    study = sides[0].study
+    names = [scene.name for scene in study.scenes]
+
+    def finish(lines: Sequence[EngineLine]) -> dict[tuple[str, str], Mapping[str, StepTimes]]:
+        times: dict[tuple[str, str], Mapping[str, StepTimes]] = {}
+        for number, line in enumerate(lines):
+            tell(0.5 + number / len(lines) / 2, f"{line.scene}: timing {line.setting}")
+            good = {
+                side.version.name: next(method for method in side.methods if method.setting() == line.setting)
+                for side, seen in zip(sides, line.results, strict=True)
+                if seen is not None and seen.outcome.ok
+            }
+            times[line.scene, line.setting] = time_versions(study, study.scenes[names.index(line.scene)], good)
+        return times
+
+    made = compare(sides, names, finish, tell)
+    lines = (replace(line, results=fit_orders([each for each in line.results if each])) for line in made.lines)
+    return replace(made, lines=tuple(lines))
+
+
+def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> dict[str, StepTimes]:
+    """Return the times of a step by version, from rounds that go through all versions: one version computes at a time.
+
+    Versions whose run does not reach its end are left out. If a time differs from that of the version before, all are measured
+    again: a real difference appears again.
+    """
+    grid = keep_end(grid_for(scene, scene.dt))
+    ready = {}
+    for version, method in methods.items():
+        case = shorten(study, Case(study.name, scene, method, grid))
+        done = attempt_here(study.hang_limit, case, study.skip_missing)
+        if isinstance(done, Success):
+            ready[version] = TimedRun(*lengthen(case, done, study.hang_limit), done)
+    times = _repeat(study, ready, range(REPEATS))
+    if any(differ(was, now) for was, now in pairwise(times.values())):
+        again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))
+        return {version: times[version] + again[version] for version in ready}
+    return times
+
+
+def _repeat(study: Study, ready: Mapping[str, TimedRun], seeds: range) -> dict[str, StepTimes]:
+    runs = {version: timed.done.run for version, timed in ready.items()}
+    repeats = [time_interleaved(runs, ROUNDS, budget=study.timing_budget, seed=seed) for seed in seeds]
+    steps = {version: timed.done.trajectory.counters.steps or math.nan for version, timed in ready.items()}
+    return {version: tuple(each[version].minimum / steps[version] for each in repeats) for version in ready}

@@ -1,0 +1,301 @@
+"""Versions of a project: errors, drifts, orders and counts judged as the gate judges a baseline, and times in turn.
+
+Errors of all versions are against one reference solution, that of this process, and drifts are computed here. Nothing that a
+version reports about itself counts, except how a run ended.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from conservative import registry
+from conservative.errors import BadInput, IntegrationFailed
+from conservative.grid import Grid
+from conservative.method import Method, Role
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.references.environments.engine_method import WorkerRun
+from conservative.scene import Scene
+from conservative.trajectory import Counters, Trajectory
+
+from ..gate import compare as gate
+from ..gate.baseline import update_baseline
+from ..gate.compare import Verdict, Violation
+from ..gate.results import Results, Row, Status, find_runaway
+from ..studies.study import Truths
+from ..suite import points
+from . import inside
+from .comparison import Comparison, Line, Tell, compare
+from .times import PROCESSES, SLOWER, Timed, TimeRow, compare_times
+from .version import Version
+
+TIME = "time of a step"
+_COUNTS = tuple(each.name for each in fields(Counters))
+_ADAPTER = str(Path(inside.__file__).resolve())
+
+ProjectLine = Line[Row, TimeRow]
+ProjectComparison = Comparison[Row, TimeRow]
+
+
+class FailedThere(IntegrationFailed):
+    """A run of a version failed. Attribute: `outcome`, as that version has it."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        super().__init__(f"The run of this version ended: {outcome}. Use a run that the version completes")
+
+
+class ProjectSide:
+    """A version and its process, with its own folder of compiled kernels. `names` are methods; empty for all under test."""
+
+    def __init__(self, version: Version, names: Sequence[str] = (), truths: Truths | None = None) -> None:
+        self.version, self._names, self._truths = version, list(names), truths or Truths()
+        kernels = version.environment.folder / "home" / "kernels"
+        self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
+
+    def close(self) -> None:
+        """End the process; the next call starts another one."""
+        self._worker.close()
+
+    def ask(self, function: str, **values: Any) -> dict[str, Any]:
+        """Return the result of a function of `inside`. Raise `IntegrationFailed` if the version cannot answer."""
+        return self._worker.ask("call", adapter=_ADAPTER, function=function, **values)
+
+    @cached_property
+    def settings(self) -> list[dict[str, Any]]:
+        """Name, label, order and engine (the label of a foreign method, else "") of each setting."""
+        return list(self.ask("list_methods", names=self._names)["methods"])
+
+    def measure(self, scene: str) -> Iterator[tuple[str, Row]]:
+        """Yield a row for each setting on a scene; a failure is in its row."""
+        here, rows = define_scene(scene), {}
+        for each in self.settings:
+            row_id = f"{scene} / {each['name']}"
+            rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
+        try:
+            there = _define(scene, self.ask("describe_scene", **_question(scene)))
+        except IntegrationFailed as failure:
+            yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
+            return
+        for setting, (name, row) in zip(self.settings, rows.items(), strict=True):
+            if here == there:
+                yield name, self._measure(scene, setting, row)
+            else:  # there is no reference solution for its motion; the gate reports that the definitions differ
+                yield name, replace(row, definition=there, reason="another motion")
+
+    def _measure(self, name: str, setting: Mapping[str, Any], row: Row) -> Row:
+        try:
+            pair = self.ask("describe_pair", scene=name, method=setting["name"])
+            if pair["unsupported"]:
+                return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
+            method = Remote(self, setting["name"], setting["label"], setting["order"], name, pair["longest_step"])
+            point = points.Point(registry.scene(name), method, self._truths)
+            first = method.solve(point.scene, point.grid)
+            if not first.ok:
+                return replace(row, status=Status.FAILED, reason=str(first.outcome))
+            return judge_values(row, points.measure(point))
+        except IntegrationFailed as failure:
+            return replace(row, status=Status.FAILED, reason=str(failure.outcome))
+
+    def solver(self, states: States, **values: Any) -> WorkerRun[Trajectory]:
+        """Return a run that gives a trajectory."""
+        return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, states)
+
+    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> TimedRun:
+        """Return a prepared run of n_steps steps dt, s, to be timed."""
+        values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
+        run = TimedRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, States())
+        run.prepare()
+        return run
+
+
+class TimedRun(WorkerRun[Trajectory]):
+    """A run that is only timed."""
+
+    def __call__(self) -> Any:
+        return self.wall_time(1)
+
+    def wall_time(self, calls: int) -> float:
+        return float(self._ask("time", calls=calls)["seconds"])
+
+
+@dataclass(frozen=True)
+class States:
+    """Makes trajectories of a scene from the states of a version."""
+
+    scene: Scene | None = None
+    label: str = ""
+
+    def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
+        assert self.scene is not None
+        counts = Counters(**{name: answer["counts"].get(name) for name in _COUNTS})
+        failure = answer["failure"]
+        ended = FailedThere(Outcome(OutcomeKind(failure[0]), *failure[1:])) if failure else None
+        return Trajectory(self.scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, ended)
+
+    def failure(self, failure: IntegrationFailed) -> Trajectory:
+        assert self.scene is not None
+        return Trajectory(self.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), failure)
+
+
+@dataclass(frozen=True)
+class Remote(Method):
+    """A method of a version, as `Method` for studies and measures, on the scene with the name `scene_name`."""
+
+    side: ProjectSide = field(compare=False, repr=False)
+    its_name: str
+    its_label: str
+    its_order: int | None
+    scene_name: str
+    longest: float
+
+    family: ClassVar[str] = "remote"
+    role: ClassVar[Role] = Role.OURS
+
+    @property
+    def name(self) -> str:
+        return self.its_name
+
+    @property
+    def label(self) -> str:
+        return self.its_label
+
+    @property
+    def order(self) -> int | None:
+        return self.its_order
+
+    def longest_step(self, scene: Scene) -> float:
+        return self.longest
+
+    def prepare(self, scene: Scene, grid: Grid) -> WorkerRun[Trajectory]:
+        """Return the run. It is prepared at its first call, so that a failure to prepare is a failure of the run."""
+        values = {"dt": grid.dt, "n_steps": grid.n_steps, "every": grid.every, "w_WB_B0": scene.w_WB_B0}
+        return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)
+
+
+def _question(scene: str) -> dict[str, Any]:
+    return {"scene": scene, "probes": np.array(points.PROBES)}
+
+
+def define_scene(name: str) -> str:
+    """Return the hash of a scene as this process has it. Raise `BadInput` if it does not."""
+    return _define(name, inside.describe_scene(**_question(name)))
+
+
+def _define(name: str, answer: Mapping[str, Any]) -> str:
+    numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")]
+    return points.define([name, *answer["invariants"]], numbers)
+
+
+def judge_values(row: Row, values: Mapping[str, points.GatedValue]) -> Row:
+    """Return a row with its values. It failed if one of them is not finite, or if its energy ran away."""
+    plain = {name: each.value for name, each in values.items()}
+    nonsense = [f"{name} is {value}" for name, value in plain.items() if not math.isfinite(value)]
+    if reason := "; ".join(filter(None, [find_runaway(plain), *nonsense])):
+        return replace(row, status=Status.FAILED, reason=reason)
+    return replace(row, values=plain, spreads={name: each.spread for name, each in values.items()})
+
+
+def compare_projects(
+    base: Version,
+    head: Version,
+    scenes: Sequence[str] = points.SCENES,
+    methods: Sequence[str] = (),
+    processes: int = PROCESSES,
+    tell: Tell = lambda share, what: None,
+) -> ProjectComparison:
+    """Return the comparison of two versions of a project.
+
+    Parameters
+    ----------
+    base, head
+        The earlier and the later version.
+    scenes, methods
+        Registered names; by default the scenes of the suite, and all methods with the role `Role.OURS`.
+    processes
+        Number of processes of each version in a measurement of times.
+    tell
+        Progress.
+
+    Raises
+    ------
+    BadInput
+        This process does not have a scene, or neither version has a method.
+    """
+    for name in scenes:
+        define_scene(name)  # before any work
+    with ExitStack() as stack:
+        truths = Truths()
+        sides = ProjectSide(base, methods, truths), ProjectSide(head, methods, truths)
+        for side in sides:
+            stack.callback(side.close)
+
+        def finish(lines: Sequence[ProjectLine]) -> dict[tuple[str, str], TimeRow]:
+            if not lines:
+                raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
+            good = [line for line in lines if all(each is not None and _has_values(each) for each in line.results)]
+            timed = [Timed(line.scene, line.setting, registry.scene(line.scene).dt) for line in good]
+            return compare_times(*sides, timed, processes)
+
+        return compare(sides, scenes, finish, tell)
+
+
+def _has_values(row: Row) -> bool:
+    return row.status is Status.PASSED and not row.reason
+
+
+def judge(comparison: ProjectComparison) -> Verdict:
+    """Return the verdict on the last step of a comparison: the gate's on values, and rows that are slower."""
+    base, head = comparison.versions[-2:]
+    steps = [(line, line.results[-2], line.results[-1]) for line in comparison.lines]
+    before = {was.id: was for _, was, _ in steps if was is not None and was.status is Status.PASSED}
+    baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
+    verdict = gate.judge(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
+    slower = [each for line in comparison.lines for each in _time_violations(line)]
+    notes = (*(note for step in steps for note in _notes(*step)), *_packages(base, head))
+    return Verdict((*verdict.violations, *slower), notes, len(comparison.lines))
+
+
+def _time_violations(line: ProjectLine) -> Iterator[Violation]:
+    time = line.times
+    if time is None or not time.failed:
+        return
+    last = time.again or time.first
+    now = time.reason or f"{last.value:.3f} times as long ({last.low:.3f} to {last.high:.3f})"
+    yield Violation(TIME, line.scene, line.setting, f"{time.was:.3g} s", now, f"at most {1 + SLOWER:g} times as long")
+
+
+def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
+    """Yield findings that are not violations, and the reasons of rows without values."""
+    name, time = f"{line.scene}, {line.setting}", line.times
+    for when, row in (("was", was), ("is", now)):
+        if row is None:
+            yield f"{name}: {when} not there"
+        elif row.status is not Status.SKIPPED and row.reason:
+            yield f"{name}: {when} without values: {row.reason}"
+    if time and time.again and not time.failed:
+        yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
+    if time and not math.isnan(time.first.high) and time.first.high < 1 / (1 + SLOWER):
+        yield f"{name}: faster, {time.first.value:.3f} of the time"
+
+
+def _packages(base: Version, head: Version) -> Iterator[str]:
+    """Yield the differences of both environments besides the project itself, which can explain a ratio of times."""
+    packages = []
+    for version in (base, head):
+        environment = version.environment
+        by_name = {re.split("[ =@]", text)[0]: text for text in environment.packages}
+        by_name.pop(environment.engine, None)  # the project itself
+        packages.append(by_name | {"Python": environment.python})
+    was, now = packages
+    for name in sorted(was.keys() | now.keys()):
+        if was.get(name) != now.get(name):
+            yield f"another {name}: was {was.get(name, 'not there')}, is {now.get(name, 'not there')}"
