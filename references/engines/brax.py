@@ -40,16 +40,15 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run on a free joint, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
+    """Return a run, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
 
-    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process. What is compiled is kept in
-    the home of the environment.
+    The variable JAX_ENABLE_X64 of the process sets the precision. Compiled code is kept in the home of the environment.
     """
     import jax
     from brax.io import mjcf
 
     jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
-    system = mjcf.loads(_model(given)).replace(mj_model=None)  # each of which would be compiled for anew
+    system = mjcf.loads(_model(given)).replace(mj_model=None)  # static data, which would cause another compilation
     number = system.gravity.dtype
     place = np.array([0, 0, 0, *given.q0], number), np.array([0, 0, 0, *given.w0], number)
     counts = np.diff(given.steps).astype(np.int32)
@@ -65,7 +64,7 @@ def prepare(given):
 
 @lru_cache(maxsize=8)
 def _march(name):
-    """Return what computes all samples, compiled once for every number of them: steps and inertia are data."""
+    """Return a function that computes all samples, compiled once per number of samples: steps and inertia are data."""
     import jax
 
     pipeline, no_action = importlib.import_module(f"brax.{name}.pipeline"), np.zeros(0)
@@ -83,7 +82,7 @@ def _march(name):
 
 
 def _model(given):
-    """Return the body; Brax wants a shape, whose mass is none and which touches nothing."""
+    """Return the body as MJCF, with the shape that Brax requires, which has no mass and no contacts."""
     moments = " ".join(map(repr, given.moments.tolist()))
     return f"""
         <mujoco>

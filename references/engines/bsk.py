@@ -37,7 +37,7 @@ ADAPTIVE = ("RKF45", "RKF78")
 
 
 def prepare(given):
-    """Return a run of one spacecraft hub in Basilisk's own loop; a simulation starts once, so that each run has its own."""
+    """Return a run of one spacecraft hub. `renew` creates the simulation of the next call."""
     ready = []
 
     def run():
@@ -58,7 +58,7 @@ def _build(given):
 
     step = round(given.dt * 1e9)  # Basilisk counts nanoseconds
     if abs(step * 1e-9 / given.dt - 1) > 1e-9:
-        raise NotImplementedError(f"Basilisk's time is in whole nanoseconds, which dt = {given.dt:g} s is not")
+        raise NotImplementedError(f"Basilisk's steps are whole nanoseconds, unlike dt = {given.dt:g} s")
     simulation = SimulationBaseClass.SimBaseClass()
     simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", step))
     craft = spacecraft.Spacecraft()
@@ -81,6 +81,6 @@ def _build(given):
 
 
 def _quaternion(sigma):
-    """Return quaternions (n, 4), scalar first, of modified Rodrigues parameters (n, 3), of the shadow set or not."""
+    """Return quaternions (n, 4) from modified Rodrigues parameters (n, 3), of either set."""
     square = np.sum(sigma**2, axis=1, keepdims=True)
     return np.hstack([1 - square, 2 * sigma]) / (1 + square)

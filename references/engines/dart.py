@@ -22,7 +22,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body on a free joint, or on a ball joint at the fixed point; DART's loop is one step a call."""
+    """Return a run of one body."""
     import dartpy as dart
 
     world, joint, body = _build(dart, given)

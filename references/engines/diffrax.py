@@ -31,7 +31,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run compiled as a whole, with samples saved at their times. JAX_ENABLE_X64 says in which precision."""
+    """Return a run, compiled as a whole. The variable JAX_ENABLE_X64 of the process sets the precision."""
     import diffrax
     import jax
     import jax.numpy as jnp
@@ -45,7 +45,7 @@ def prepare(given):
 
     def derivative(t, y, _):
         q, w = y[:4], y[4:]
-        # of the unit quaternion's rotation, the third row: the vertical in body axes
+        # the vertical in body axes: the third row of the rotation matrix
         up = jnp.array([2 * (q[1] * q[3] - q[0] * q[2]), 2 * (q[2] * q[3] + q[0] * q[1]), 1 - 2 * (q[1] ** 2 + q[2] ** 2)])
         turn = jnp.concatenate([-jnp.dot(q[1:], w)[None], q[0] * w + jnp.cross(q[1:], w)]) / 2
         torque = jnp.cross(moments * w, w) - weight * jnp.cross(com, up)
@@ -61,8 +61,8 @@ def prepare(given):
     jax.block_until_ready(solve())
 
     def run():
-        found = solve()
-        y = np.asarray(found.ys, float)
-        return {"q": y[:, :4], "w": y[:, 4:], "steps": int(found.stats["num_steps"])}
+        solution = solve()
+        y = np.asarray(solution.ys, float)
+        return {"q": y[:, :4], "w": y[:, 4:], "steps": int(solution.stats["num_steps"])}
 
     return run

@@ -22,6 +22,8 @@ BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball
 No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
 """
 
+from contextlib import suppress
+
 import numpy as np
 
 ENGINE = {
@@ -45,11 +47,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body, advanced from sample to sample by Drake's Simulator.
-
-    A free body is on a quaternion floating joint; a body about a fixed point on Drake's only ball joint, whose coordinates are
-    roll, pitch and yaw. Where its first principal axis comes to stand upright, the run ends.
-    """
+    """Return a run of one body."""
     import pydrake.all as drake
 
     if given.accuracy and given.integrator in ("default", "discrete"):
@@ -68,7 +66,7 @@ def prepare(given):
             start()
             simulator.Initialize()
             for sample, time in enumerate(times.tolist()):
-                if sample:  # at its start a discrete plant would be updated
+                if sample:  # AdvanceTo(0) would update a discrete plant
                     simulator.AdvanceTo(time)
                 R[sample] = plant.EvalBodyPoseInWorld(inner, body).rotation().matrix()
                 w[sample] = plant.EvalBodySpatialVelocityInWorld(inner, body).rotational()
@@ -82,7 +80,7 @@ def prepare(given):
 
 
 def _start(drake, plant, body, context, given):
-    """Return what sets the body's attitude and rates to those of the start."""
+    """Return a function that sets the initial state."""
     turn = drake.RotationMatrix(drake.Quaternion(given.q0 / np.linalg.norm(given.q0)))
     if given.free:
         pose, spin = drake.RigidTransform(turn, np.zeros(3)), drake.SpatialVelocity(given.w0_W, np.zeros(3))
@@ -119,7 +117,7 @@ def _build(drake, given):
 
 
 def _choose(drake, simulator, given):
-    """Choose the integrator: in fixed steps, or in its own to an accuracy."""
+    """Set the integrator, with fixed steps or an accuracy."""
     if given.integrator == "default":
         simulator.get_mutable_integrator().set_maximum_step_size(given.dt)
         return
@@ -130,11 +128,5 @@ def _choose(drake, simulator, given):
     if given.accuracy:
         integrator.set_target_accuracy(given.accuracy)
     else:
-        _fix_steps(integrator)
-
-
-def _fix_steps(integrator):
-    try:
-        integrator.set_fixed_step_mode(True)
-    except RuntimeError:  # one without error estimates, whose steps are fixed
-        return
+        with suppress(RuntimeError):  # integrators without error estimates have fixed steps only
+            integrator.set_fixed_step_mode(True)

@@ -43,17 +43,12 @@ EXPLICIT = ("ExplicitEuler", "ExplicitMidpoint", "RK33", "RK44", "RK67", "DOPRI5
 
 
 def prepare(given):
-    """Return a run of one rigid body on the node that Exudyn's Lie group integrators take.
-
-    Explicit integrators take no joints. A body about a fixed point turns as a free one does that has its moments, about the
-    fixed point, as central ones, where weight pulls at the centre of mass and the support's force that is its opposite at the
-    fixed point.
-    """
+    """Return a run of one body."""
     import exudyn as exu
     from exudyn.utilities import RigidBodyInertia, SensorBody
 
     mbs, default = exu.SystemContainer().AddSystem(), given.integrator == "default"
-    # With Euler parameters, which are the default, the explicit integrators raise.
+    # The explicit integrators raise with the default, Euler parameters.
     kind = {} if default else {"nodeType": exu.NodeType.RotationRotationVector}
     body = mbs.CreateRigidBody(
         inertia=RigidBodyInertia(mass=given.mass, inertiaTensor=np.diag(given.moments)),
@@ -81,6 +76,7 @@ def prepare(given):
 
 
 def _load(mbs, body, given):
+    """Add the weight at the centre of mass, and the reaction force at the fixed point."""
     from exudyn.itemInterface import LoadForceVector, MarkerBodyRigid
 
     for place, sign in ((given.com, -1), (np.zeros(3), 1)) if given.gravity else ():
@@ -96,7 +92,7 @@ def _settings(exu, given):
     if given.integrator == "default":
         return settings
     settings.solutionSettings.writeSolutionToFile = False
-    time.automaticStepSize = False  # fixed steps with DOPRI5, too
+    time.automaticStepSize = False  # also for DOPRI5
     if given.integrator in EXPLICIT:
         time.explicitIntegration.useLieGroupIntegration = True
         time.explicitIntegration.computeEndOfStepAccelerations = False

@@ -41,10 +41,10 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body from an MJCF file; kernels are compiled here, once in the life of an environment."""
+    """Return a run of one body, with its kernels compiled."""
     import genesis as gs
 
-    if not getattr(gs, "_initialized", False):  # once in a process, which has one precision
+    if not getattr(gs, "_initialized", False):  # once per process
         gs.init(backend=gs.cpu, precision=given.precision[1:], logging_level="error")
     scene = _scene(gs, given)
     body = scene.add_entity(gs.morphs.MJCF(file=str(_write_model(given))))
@@ -80,7 +80,7 @@ def _scene(gs, given):
 
 
 def _write_model(given):
-    """Return the path of a file of the body; Genesis wants a shape, which touches nothing."""
+    """Write an MJCF file with the shape that Genesis requires, which has no contacts; return its path."""
     moments = " ".join(map(repr, given.moments.tolist()))
     path = Path("body.xml").resolve()
     path.write_text(

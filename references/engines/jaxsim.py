@@ -38,10 +38,9 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run on a floating base, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
+    """Return a run, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
 
-    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process. What is compiled is kept in
-    the home of the environment.
+    The variable JAX_ENABLE_X64 of the process sets the precision. Compiled code is kept in the home of the environment.
     """
     import jax
     import jaxsim.api as js
@@ -69,7 +68,7 @@ def prepare(given):
 
 @lru_cache(maxsize=1)
 def _march():
-    """Return what computes the samples after the start, compiled once for every integrator, step and number of samples."""
+    """Return a function that computes the samples after the first, compiled once per integrator, step and number of samples."""
     import jax
     import jaxsim.api as js
 
@@ -84,7 +83,7 @@ def _march():
 
 
 def _description(given):
-    """Return the body as SDF; JaxSim reads URDF by a program of Gazebo's."""
+    """Return the body as SDF, because JaxSim reads URDF with a program of Gazebo."""
     ixx, iyy, izz = map(repr, given.moments.tolist())
     return f"""
         <?xml version="1.0"?>

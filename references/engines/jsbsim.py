@@ -50,11 +50,11 @@ AIRCRAFT = """<fdm_config name="body" version="2.0">
   <ground_reactions/><propulsion/><aerodynamics/>
 </fdm_config>"""
 HEIGHT = 1e7
-"""Feet above a planet that the aircraft falls down to."""
+"""Initial height in feet: the aircraft falls."""
 
 
 def prepare(given):
-    """Return a run of one aircraft, far above a planet that does not turn; JSBSim's loop is one step a call."""
+    """Return a run of one body."""
     flight = _build(given)
     attitude = flight.get_propagate()
 
@@ -66,7 +66,7 @@ def prepare(given):
                 flight.run()
             T[sample] = attitude.get_Tec2b()
             w[sample] = [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]
-        # A planet-fixed frame is an inertial one here; how it lies in the world is known from the start.
+        # The planet-fixed frame is inertial here. Its attitude in the world follows from the initial attitude.
         return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": w}
 
     return run

@@ -36,46 +36,26 @@ ENGINE = {
     },
 }
 
-PER_BODY = (
-    *("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat"),
-    *("body_invweight0", "dof_invweight0"),
-)
-"""What of a model belongs to the body in it, beside gravity."""
+PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
+"""What differs between the models of two bodies, other than gravity."""
 
 
 def prepare(given):
-    """Return a run on a free joint, or on a ball joint at the fixed point.
-
-    A step is recorded once and then replayed, as MuJoCo Warp's documentation advises: from Python it takes a hundred times as
-    long. Kernels are compiled here, once in the life of an environment, which takes a minute or two.
-    """
-    import mujoco
-    import mujoco_warp
-    import warp
-
-    warp.config.quiet = True
-    with warp.ScopedDevice("cpu"):
-        host = _model(mujoco, given)
-        model, data = mujoco_warp.put_model(host), mujoco_warp.make_data(host)
-        mujoco_warp.step(model, data)
-        step = _record(warp, partial(mujoco_warp.step, model, data))
-    qpos, qvel = data.qpos.numpy()[0], data.qvel.numpy()[0]  # views of what the engine computes with
+    """Return a run of one body."""
+    run_many = prepare_many([given])
 
     def run():
-        qpos[:-4], qpos[-4:], qvel[:-3], qvel[-3:] = 0, given.q0, 0, given.w0
-        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                step()
-            q[sample], w[sample] = qpos[-4:], qvel[-3:]
-        return {"q": q, "w": w}
+        return {name: samples[0] for name, samples in run_many().items()}
 
-    run.data = data  # what owns the views
     return run
 
 
 def prepare_many(bodies):
-    """Return a run of many bodies, each in a world of its own, with rows of its own in the model."""
+    """Return a run of many bodies, each in its own world with its own rows in the model.
+
+    A step is recorded once and then replayed, as MuJoCo Warp's documentation advises: from Python it takes a hundred times as
+    long.
+    """
     import mujoco
     import mujoco_warp
     import warp
@@ -92,7 +72,7 @@ def prepare_many(bodies):
         model.opt.gravity = warp.array(gravity, dtype=warp.vec3)
         mujoco_warp.step(model, data)
         step = _record(warp, partial(mujoco_warp.step, model, data))
-    qpos, qvel = data.qpos.numpy(), data.qvel.numpy()  # views of what the engine computes with
+    qpos, qvel = data.qpos.numpy(), data.qvel.numpy()  # views of the engine's own arrays
     q0, w0 = np.array([body.q0 for body in bodies]), np.array([body.w0 for body in bodies])
 
     def run():
@@ -104,12 +84,12 @@ def prepare_many(bodies):
             q[:, sample], w[:, sample] = qpos[:, -4:], qvel[:, -3:]
         return {"q": q, "w": w}
 
-    run.data = data, model  # what owns the views, and the rows
+    run.owners = data, model  # of the views and the rows
     return run
 
 
 def _record(warp, step):
-    """Return what replays a step; the step itself, where a version of Warp records none on the CPU."""
+    """Return a function that replays a step; the step itself if this version of Warp does not record on the CPU."""
     try:
         with warp.ScopedCapture() as capture:
             step()
@@ -119,7 +99,6 @@ def _record(warp, step):
 
 
 def _model(mujoco, given):
-    """Return MuJoCo's model: the inertia about the centre of mass, in that inertia's own principal axes."""
     # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
     moments = np.minimum(given.moments_com, np.roll(given.moments_com, 1) + np.roll(given.moments_com, 2))
     inertial = {"pos": given.com, "quat": given.q_com, "diaginertia": moments}

@@ -36,18 +36,14 @@ ENGINE = {
     },
 }
 
-PER_BODY = (
-    *("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat"),
-    *("body_invweight0", "dof_invweight0"),
-)
-"""What of a model belongs to the body in it, beside gravity."""
+PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
+"""What differs between the models of two bodies, other than gravity."""
 
 
 def prepare(given):
-    """Return a run on a free joint, or on a ball joint at the fixed point, compiled as a whole.
+    """Return a run, compiled as a whole.
 
-    Whether JAX computes in double precision is said by the variable JAX_ENABLE_X64 of the process. What is compiled is kept in
-    the home of the environment.
+    The variable JAX_ENABLE_X64 of the process sets the precision. Compiled code is kept in the home of the environment.
     """
     import jax
     import mujoco
@@ -71,7 +67,7 @@ def prepare(given):
 
 
 def prepare_many(bodies):
-    """Return a run of many bodies, each a row of models and states, by `jax.vmap`."""
+    """Return a run of many bodies, by `jax.vmap` over models and states."""
     import jax
     import mujoco
     from mujoco import mjx
@@ -104,7 +100,7 @@ def prepare_many(bodies):
 
 @lru_cache(maxsize=1)
 def _march_many():
-    """Return what computes all samples of many bodies, compiled once for every number of bodies and of samples."""
+    """Return a function that computes all samples of many bodies, compiled once per number of bodies and of samples."""
     import jax
     from mujoco import mjx
 
@@ -116,7 +112,7 @@ def _march_many():
 
 
 def _march_samples(mjx, jax, model, start, counts):
-    """Return samples of attitude and rates, after as many steps each as `counts` has."""
+    """Return samples of attitude and rates; `counts` are the numbers of steps between them."""
 
     def advance(data, n_steps):
         data = jax.lax.fori_loop(0, n_steps, lambda _, data: mjx.step(model, data), data)
@@ -127,7 +123,7 @@ def _march_samples(mjx, jax, model, start, counts):
 
 @lru_cache(maxsize=1)
 def _march():
-    """Return what computes all samples, compiled once for every number of them: step, counts and inertia are data."""
+    """Return a function that computes all samples, compiled once per number of samples: step, counts and inertia are data."""
     import jax
     from mujoco import mjx
 

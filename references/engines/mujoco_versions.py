@@ -36,8 +36,8 @@ ENGINE = {
     },
 }
 
-# All that MuJoCo computes in a step and one body without contacts, actuators, springs or sensors has no use for. Bits that a
-# version does not have are skipped. Autoreset would start a diverged run afresh; its warning, which is read, would tell.
+# What MuJoCo computes in a step without need for one body without contacts, actuators, springs or sensors. Bits that a version
+# does not have are skipped. Autoreset would restart a diverged run.
 SWITCHED_OFF = (
     *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
     *(
@@ -55,20 +55,20 @@ SWITCHED_OFF = (
 )
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
 ROLLOUT_UP_TO = 8
-# Numbers in the states that a rollout of many bodies keeps at a time: 32 MiB.
+# Numbers that a rollout of many bodies stores at a time: 32 MiB.
 ROOM = 1 << 22
 
 
 def prepare(given):
-    """Return a run on a free joint, or on a ball joint at the fixed point, in MuJoCo's own loop."""
+    """Return a run on a free joint, or on a ball joint at the fixed point."""
     import mujoco as mj
 
-    mj.set_mju_user_warning(lambda message: None)  # they go into a file otherwise; they are read from the data instead
+    mj.set_mju_user_warning(lambda message: None)  # warnings are read from the data, not written to a file
     return prepare_with(mj, given)
 
 
 def prepare_with(mj: Any, given: Any) -> Any:
-    """Return a run with a module `mujoco` that is there."""
+    """Return a run with a given module `mujoco`."""
     model = _model(mj, given)
     data = mj.MjData(model)
     place = SimpleNamespace(mj=mj, model=model, data=data, start=_start(mj, model, data, given))
@@ -83,7 +83,7 @@ def prepare_with(mj: Any, given: Any) -> Any:
 
 
 def prepare_many(bodies):
-    """Return a run of many bodies by `mujoco.rollout`; see `prepare`."""
+    """Return a run of many bodies by `mujoco.rollout`."""
     import mujoco as mj
 
     mj.set_mju_user_warning(lambda message: None)
@@ -91,7 +91,7 @@ def prepare_many(bodies):
 
 
 def prepare_many_with(mj: Any, bodies: Any) -> Any:
-    """Return a run of many bodies, a model and a state for each, with a module `mujoco` that is there."""
+    """Return a run of many bodies with a given module `mujoco`: a model and a state for each."""
     from mujoco.rollout import Rollout
 
     given, models = bodies[0], [_model(mj, body) for body in bodies]
@@ -111,14 +111,14 @@ def prepare_many_with(mj: Any, bodies: Any) -> Any:
 
 
 def _read(model, states, given):
-    """Return samples of states (n, samples, size); a rollout stands still where it cannot go on, and so does its time."""
+    """Return samples of states (n, samples, size). If a rollout fails, its state and its time stay the same."""
     states[states[..., 0] < given.steps * given.dt * (1 - 1e-9)] = np.nan
     nq = 1 + model.nq
     return {"q": states[..., nq - 4 : nq], "w": states[..., nq + model.nv - 3 : nq + model.nv]}
 
 
 def _roll_on(pool, engine, state, n_steps, room):
-    """Return the states (n, size) after more steps: a rollout keeps all of them, and what they are kept in has an end."""
+    """Return the states (n, size) after more steps, in parts, because a rollout stores every step."""
     while n_steps:
         part = np.ascontiguousarray(room[:, :n_steps])
         pool.rollout(*engine, state, nstep=part.shape[1], state=part)
@@ -127,7 +127,6 @@ def _roll_on(pool, engine, state, n_steps, room):
 
 
 def _model(mj, given):
-    """Return the compiled model: one body, its inertia about the centre of mass in that inertia's own principal axes."""
     spec = mj.MjSpec()
     spec.option.timestep = given.dt
     spec.option.integrator = _integrator(mj, given.integrator)
@@ -143,11 +142,11 @@ def _model(mj, given):
 
 
 def _integrator(mj, name):
-    found = getattr(mj.mjtIntegrator, f"mjINT_{name.upper()}", None)
-    if found is None:
+    integrator = getattr(mj.mjtIntegrator, f"mjINT_{name.upper()}", None)
+    if integrator is None:
         has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
         raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {name}, but {', '.join(has)}")
-    return found
+    return integrator
 
 
 def _switched_off(mj, *more):
@@ -168,7 +167,7 @@ def _start(mj, model, data, given):
 
 
 def _roll_out(place, given):
-    """Return quaternions, rates and a reason from one call that stores every step."""
+    """Return quaternions, rates and a reason, from one call that stores every step."""
     from mujoco.rollout import rollout
 
     place.mj.mj_resetData(place.model, place.data)
@@ -177,7 +176,7 @@ def _roll_out(place, given):
     states = np.concatenate([place.start[None], states[0]])
     reason = _warning(place.mj, place.data)
     if reason:
-        # The rollout fills what it could not compute with the last state it had, whose time then stands still.
+        # After a failure the rollout repeats the last state, including its time.
         states[1:][np.diff(states[:, 0]) <= 0] = np.nan
     states = states[given.steps]
     nq = 1 + place.model.nq
@@ -201,7 +200,7 @@ def _step_to_samples(place, given):
 
 
 def _warning(mj, data):
-    """Return the engine's own word for a state that it found bad, "" if it found none."""
+    """Return MuJoCo's warning of a bad state; "" if there is none."""
     for kind in ("BADQPOS", "BADQVEL", "BADQACC"):
         if data.warning[int(getattr(mj.mjtWarning, f"mjWARN_{kind}"))].number:
             return f"MuJoCo warned of {kind}"

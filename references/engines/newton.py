@@ -51,20 +51,21 @@ ENGINE = {
 
 DAMPED = ("SemiImplicit", "Featherstone")
 WITH_MEMORY = ("VBD", "Kamino")
-"""Solvers that keep something from step to step beside the state, which `reset` clears."""
+"""Solvers that keep more than the state from step to step, which `reset` clears."""
 NOT_RECORDED = "VBD"
-"""A record of its step takes the pose of each step for the one before it, so that nothing moves."""
+"""A replay of its step mistakes the pose of each step for the previous one, so that nothing moves."""
 
 
 def prepare(given):
-    """Return a run of one body; its kernels are compiled here."""
+    """Return a run of one body, with its kernels compiled."""
     import newton
     import warp
 
     warp.config.quiet = True
     warp.set_device("cpu")
     model = _model(newton, warp, given)
-    solver, contacts = _solver(newton, model, given), _contacts(newton, model, given)
+    solver = _solver(newton, model, given)
+    contacts = newton.CollisionPipeline(model).contacts() if given.solver == "VBD" else None  # VBD does not step without
     states, start, control = (model.state(), model.state()), model.state(), model.control()
     newton.eval_ik(model, start, start.joint_q, start.joint_qd)
 
@@ -91,7 +92,7 @@ def _start(state, start):
 
 
 def _march(steps, views, renew, counts):
-    """Return samples of a run. States are written in turns, each from the other."""
+    """Return samples of a run. Steps alternate between two states."""
     renew()
     q, w = np.empty((len(counts), 4)), np.empty((len(counts), 3))
     done = 0
@@ -105,12 +106,12 @@ def _march(steps, views, renew, counts):
 
 
 def _views(state):
-    """Return what the engine computes with, as arrays: position and quaternion, scalar last; velocities in the world."""
+    """Return views of the engine's own arrays: position and quaternion, scalar last; velocities in the world."""
     return state.body_q.numpy()[0], state.body_qd.numpy()[0]
 
 
 def _record(warp, step):
-    """Return what replays a step; the step itself, where a version of Warp records none on the CPU."""
+    """Return a function that replays a step; the step itself if this version of Warp does not record on the CPU."""
     try:
         with warp.ScopedCapture() as capture:
             step()
@@ -132,7 +133,7 @@ def _model(newton, warp, given):
 
 
 def _add_body(builder, warp, given):
-    """Return the number of the body, on a free joint, or on a ball joint without armature, friction and damping."""
+    """Add the body, on a free joint, or on a ball joint without armature, friction and damping; return its number."""
     w, x, y, z = given.q_com.tolist()
     axes = np.array(warp.quat_to_matrix(warp.quat(x, y, z, w)), float).reshape(3, 3)
     w, x, y, z = given.q0.tolist()
@@ -162,8 +163,3 @@ def _solver(newton, model, given):
         sparse = {"dynamics_solver": "dvi", "sparse_dynamics": True, "sparse_jacobian": True}
         options["config"] = newton.solvers.SolverKamino.Config.from_model(model, **sparse)
     return getattr(newton.solvers, f"Solver{name}")(model, **options)
-
-
-def _contacts(newton, model, given):
-    """Return a place for contacts, without which VBD does not step."""
-    return newton.CollisionPipeline(model).contacts() if given.solver == "VBD" else None

@@ -23,7 +23,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body on a free joint, or on a ball joint at the fixed point; Nimble's loop is one step a call."""
+    """Return a run of one body."""
     import nimblephysics as nimble
 
     world, skeleton, body = _build(nimble, given)
@@ -59,6 +59,6 @@ def _build(nimble, given):
 
 
 def _rotation_vector(q):
-    """Return the rotation vector (3,), rad, of a quaternion, scalar first."""
+    """Return the rotation vector (3,), rad, of a quaternion."""
     sine = float(np.linalg.norm(q[1:]))
     return q[1:] * (2 * np.arctan2(sine, q[0]) / sine if sine else 2.0)

@@ -41,7 +41,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body on a free joint, or on a ball joint at the fixed point, integrated from sample to sample."""
+    """Return a run of one body."""
     import opensim
 
     opensim.Logger.setLevelString("off")
@@ -81,7 +81,7 @@ def _build(opensim, given):
 
 
 def _angles(R):
-    """Return the angles about x, y and z, each turned with the body, of a rotation."""
+    """Return the body-fixed angles about x, y and z."""
     return math.atan2(-R[1, 2], R[2, 2]), math.asin(max(-1.0, min(1.0, R[0, 2]))), math.atan2(-R[0, 1], R[0, 0])
 
 

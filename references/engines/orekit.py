@@ -18,10 +18,10 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run that evaluates the exact solution at each sample; a Java virtual machine is started once in a process."""
+    """Return a run of one body."""
     import orekit_jpype
 
-    orekit_jpype.initVM()
+    orekit_jpype.initVM()  # once per process
     from org.hipparchus.geometry.euclidean.threed import Rotation, Vector3D
     from org.orekit.attitudes import Attitude, Inertia, InertiaAxis, TorqueFree
     from org.orekit.frames import FramesFactory
@@ -29,7 +29,7 @@ def prepare(given):
     from org.orekit.utils import AngularCoordinates
 
     frame, date = FramesFactory.getGCRF(), AbsoluteDate.ARBITRARY_EPOCH
-    # Hipparchus' rotation of a quaternion turns the frame, not the vector: of that of R_WF, it takes world to F components.
+    # A rotation of Hipparchus turns the frame, not the vector: that of R_WF converts from world to F components.
     turn, spin = Rotation(*given.q0.tolist(), False), Vector3D(*given.w0.tolist())
     start = Attitude(date, frame, AngularCoordinates(turn, spin, Vector3D.ZERO))
     axes = zip(given.moments.tolist(), (Vector3D.PLUS_I, Vector3D.PLUS_J, Vector3D.PLUS_K), strict=True)
@@ -37,8 +37,8 @@ def prepare(given):
     times = (given.steps * given.dt).tolist()
 
     def run():
-        found = [motion.getAttitude(None, date.shiftedBy(time), frame) for time in times]
-        turns, rates = [each.getRotation() for each in found], [each.getSpin() for each in found]
+        attitudes = [motion.getAttitude(None, date.shiftedBy(time), frame) for time in times]
+        turns, rates = [each.getRotation() for each in attitudes], [each.getSpin() for each in attitudes]
         q = [(turn.getQ0(), turn.getQ1(), turn.getQ2(), turn.getQ3()) for turn in turns]
         return {"q": np.array(q), "w": np.array([(rate.getX(), rate.getY(), rate.getZ()) for rate in rates])}
 

@@ -36,7 +36,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one body, free, or on a spherical joint at the fixed point; Bullet's loop is one step a call."""
+    """Return a run of one body."""
     import pybullet as bullet
 
     bullet.connect(bullet.DIRECT)
@@ -60,7 +60,7 @@ def prepare(given):
 
 def _build_free(bullet, given):
     maximal = given.body == "maximal"
-    # A body in maximal coordinates that has no shape never moves.
+    # In maximal coordinates, a body without a shape does not move.
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
     body = bullet.createMultiBody(given.mass, shape, baseOrientation=_x_first(given.q0), useMaximalCoordinates=maximal)
     bullet.changeDynamics(body, -1, localInertiaDiagonal=given.moments.tolist())
@@ -77,8 +77,8 @@ def _look_at_free(bullet, body):
 def _build_held(bullet, given):
     """Return a body that is the only link of a base that does not move.
 
-    The link's frame is at the fixed point, and its axes are the principal ones about the centre of mass: in other axes
-    what is set of the joint is not the attitude of the link.
+    The link's frame is at the fixed point, and its axes are the principal axes about the centre of mass: in other axes the
+    state of the joint is not the attitude of the link.
     """
     q0, R = _product(given.q0, given.q_com), _matrix(given.q_com)
     link = {
@@ -91,7 +91,7 @@ def _build_held(bullet, given):
     if not given.as_installed:
         for part in (-1, 0):
             _switch_off(bullet, body, part)
-    # The motor that every joint has by default would hold the body.
+    # By default the motor of the joint holds the body.
     hold = {"targetPosition": [0, 0, 0, 1], "force": [0, 0, 0], "positionGain": 0, "velocityGain": 0}
     bullet.setJointMotorControlMultiDof(body, 0, bullet.POSITION_CONTROL, **hold)
     bullet.resetJointStateMultiDof(body, 0, _x_first(q0), (given.w0 @ R).tolist())  # rates in its own axes
@@ -99,29 +99,28 @@ def _build_held(bullet, given):
 
 
 def _look_at_held(bullet, body):
-    return bullet.getJointStateMultiDof(body, 0)[:2]  # a link's state has single precision
+    return bullet.getJointStateMultiDof(body, 0)[:2]  # getLinkState has single precision
 
 
 def _to_axes(q, w, given):
-    """Return attitudes and rates in axes F of those in the principal axes about the centre of mass."""
+    """Convert attitudes and rates from the principal axes about the centre of mass to the axes F."""
     back = given.q_com * (1, -1, -1, -1)
     return {"q": _product(q, back), "w": w @ _matrix(given.q_com).T}
 
 
 def _switch_off(bullet, body, part):
-    """Switch off what keeps a body from turning on: damping, which is .04 by default, sleeping, and a limit of 100 rad/s."""
+    """Switch off damping, 0.04 by default, sleeping, and the limit of 100 rad/s."""
     awake = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
     nothing = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e6}
     bullet.changeDynamics(body, part, **nothing, activationState=awake)
 
 
 def _x_first(q):
-    """Return a quaternion, scalar first, as Bullet has it: scalar last."""
     return [*q[1:].tolist(), float(q[0])]
 
 
 def _product(p, q):
-    """Return the product of quaternions, (..., 4), scalar first, with one (4,)."""
+    """Return the products of quaternions (..., 4) with one (4,)."""
     s, v = p[..., :1], p[..., 1:]
     return np.concatenate([s * q[0] - v @ q[1:, None], s * q[1:] + q[0] * v + np.cross(v, q[1:])], axis=-1)
 

@@ -35,7 +35,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one rigid body without colliders, held at the fixed point by a joint; Rapier has no loop of its own."""
+    """Return a run of one body."""
     import rapier3d as rp
 
     place = rp.Rotation3(*map(float, given.q0)).scaled_axis

@@ -34,7 +34,7 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run of one rigid body without shapes, held at the fixed point by a D6 joint; PhysX's loop is one step a call."""
+    """Return a run of one body."""
     import sapien
 
     config = sapien.physx.PhysxSceneConfig()
@@ -69,12 +69,12 @@ def prepare(given):
             q[sample], w[sample] = body.get_pose().q, body.get_angular_velocity()
         return {"q": q, "w_W": w}
 
-    run.scene = scene  # what owns the body
+    run.owner = scene  # of the body
     return run
 
 
 def _hold(sapien, body):
-    """Return a joint between world and body that locks the three translations."""
+    """Return a joint with the world that locks the three translations."""
     joint = sapien.physx.PhysxDriveComponent(body)
     for lock in (joint.set_limit_x, joint.set_limit_y, joint.set_limit_z):
         lock(0, 0)
@@ -82,7 +82,6 @@ def _hold(sapien, body):
 
 
 def _switch_off(body):
-    """Switch off damping, the limit of rates, which is 100 rad/s by default, and sleeping."""
     body.set_angular_damping(0)
     body.set_linear_damping(0)
     body.set_max_angular_velocity(1e6)
