@@ -1,11 +1,9 @@
-"""What every engine's file needs: its version, its module, and the scene in axes an engine can use.
+"""Common functions of engines: version, module, and scenes in axes that every engine supports.
 
-Engines see the body in axes F in which its inertia is diagonal. Going there and back happens here, once in each direction:
+Engines get the body in axes F in which its inertia is diagonal. Both conversions are here:
 
     there       R_WF = R_WB R_BF      w_F = R_BF' w_B
     and back    R_WB = R_WF R_BF'     w_B = R_BF w_F
-
-Source of the mass model: our own, see `mass_model`.
 """
 
 from __future__ import annotations
@@ -28,17 +26,17 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory, finite_prefix
 
 STEP_LIMIT = 10_000_000
-"""Steps that an adaptive engine takes in a run at most: minutes of heyoka, an hour of SciPy."""
+"""Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
 PACE_STEPS = 1000
-"""After as many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` at that pace ends there."""
+"""After so many steps the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
 SHARE = 15 / 16
-"""Of the largest mass that a body about a fixed point can have, the part that it is given: that of the paper's cone."""
+"""Mass of a body about a fixed point, relative to the largest possible one: that of the paper's cone."""
 LONG = 1e5
-"""Turns of a run, rad, from which on heyoka's pace is tried first: shorter ones stay far below the limit."""
+"""Rotation in a run, rad, above which heyoka's pace is checked first. Shorter runs stay far below the limit."""
 
 
 def limit_reason(steps: int, share: float) -> str:
-    """Return why a run that has done a share of its time, 0 to 1 and dimensionless, has to end; "" if it may go on."""
+    """Return why a run has to end after some steps and a share of its time, 0 to 1; "" if it may continue."""
     if steps >= STEP_LIMIT:
         return f"step limit of {STEP_LIMIT} reached"
     if steps % PACE_STEPS == 0 and steps > 10 * STEP_LIMIT * share:
@@ -47,7 +45,7 @@ def limit_reason(steps: int, share: float) -> str:
 
 
 def pace_reason(scene: Scene, integrator: Any, t_end: float) -> str:
-    """Return why heyoka's integrator, at a scene's start, cannot get to t_end, s; "" if it may try. It moves the integrator."""
+    """Return why heyoka's integrator cannot reach t_end, s, from the initial state; "" if it may. The integrator moves."""
     turns = t_end * math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
     if turns < LONG:
         return ""
@@ -59,13 +57,7 @@ def pace_reason(scene: Scene, integrator: Any, t_end: float) -> str:
 
 @lru_cache(maxsize=32)
 def version(package: str, engine: str) -> str:
-    """Return the version of an installed package; the engine itself is not imported.
-
-    Raises
-    ------
-    MissingEngine
-        The package is not installed; the message has the line that installs it.
-    """
+    """Return the version of an installed package, without importing it. Raise `MissingEngine`."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -74,13 +66,7 @@ def version(package: str, engine: str) -> str:
 
 @lru_cache(maxsize=32)
 def load(module: str, package: str, engine: str) -> Any:
-    """Return an engine's module, imported at the first call.
-
-    Raises
-    ------
-    MissingEngine
-        The module cannot be imported.
-    """
+    """Import the module of an engine. Raise `MissingEngine` if that fails."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -89,7 +75,7 @@ def load(module: str, package: str, engine: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """A scene's start in axes F that diagonalise the inertia.
+    """The initial state of a scene in axes F in which the inertia is diagonal.
 
     Attributes
     ----------
@@ -107,17 +93,17 @@ class Axes:
 
     @property
     def R_WF0(self) -> Array:
-        """Attitude at the start (3, 3), F to world."""
+        """Initial attitude (3, 3), F to world."""
         return self.scene.R_WB0 @ self.R_BF
 
     @property
     def q0(self) -> Array:
-        """Attitude at the start: unit quaternion (4,) of `R_WF`, scalar first."""
+        """Initial attitude: unit quaternion (4,) of `R_WF`, scalar first."""
         return to_quaternion(self.R_WF0)
 
     @property
     def w0(self) -> Array:
-        """Rates at the start (3,), rad/s, axes F."""
+        """Initial angular velocity (3,), rad/s, axes F."""
         return self.scene.w_WB_B0 @ self.R_BF
 
     @property
@@ -131,10 +117,10 @@ class Axes:
     ) -> Trajectory:
         """Return the samples in body axes from attitudes (n, 3, 3) and rates (n, 3) in F.
 
-        Samples end before the first that is not finite, or where the engine stopped handing them over: then `reason` says why.
-        Attitudes are not tidied: the norm of an engine's quaternion shows in `R_WB`.
+        Samples end before the first that is not finite or missing; `reason` is the reason. Attitudes are returned unchanged, so
+        the norm error of an engine's quaternion is visible in `R_WB`.
         """
-        # All rows at once: a product for each matrix takes several times as long.
+        # A product for each matrix takes several times as long.
         R_WB, w_WB_B = (R_WF.reshape(-1, 3) @ self.R_BF.T).reshape(R_WF.shape), w @ self.R_BF.T
         good = finite_prefix(R_WB, w_WB_B)
         failure = None if good == grid.n_samples else Diverged(float(grid.t[max(good - 1, 0)]), reason)
@@ -142,39 +128,32 @@ class Axes:
 
 
 def principal_axes(scene: Scene) -> Axes:
-    """Return the start in principal axes; those of a diagonal inertia are the body's own, in their order."""
+    """Return the initial state in principal axes. If the inertia is diagonal, they are the body axes in their order."""
     return Axes(scene, scene.body.R_BP, scene.body.moments)
 
 
 def symmetric_axes(scene: Scene) -> Axes | None:
-    """Return the start in axes whose third is one of symmetry of body and field; None where there is none."""
+    """Return the initial state in axes whose third is an axis of symmetry of body and field; None if there is none."""
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
-    # Not the axes of our kernels: heyoka's tolerance is relative to the state, and others move its errors by some per cent.
+    # heyoka's tolerance is relative to the state: with the axes of our kernels, its errors change by a few per cent.
     R_BF = axes_about(axis, beside=int(np.argmin(np.abs(axis))))
     return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 
 
-def gravity_or_free(scene: Scene) -> str | None:
-    """Return why an engine that knows uniform gravity only cannot do the scene, None if it can."""
-    if scene.potential is None or isinstance(scene.potential, UniformGravity):
-        return None
-    return f"the engine has uniform gravity only, not {type(scene.potential).__name__}"
-
-
 @dataclass(frozen=True, eq=False)
 class MassModel:
-    """A mass, its centre and the inertia about it that together are the scene's body, axes F.
+    """A mass, its centre and the inertia about it that are equivalent to the scene's body, axes F.
 
-    A scene has the product of weight and centre of mass only, and the motion depends on no more. Engines want a mass m and the
+    A scene contains only the product of weight and centre of mass, which determines the motion. Engines need a mass m and the
     inertia about the centre of mass c, J_c = J - m (c'c - c c'). Any m gives the same joint-space inertia J and, with gravity
-    weight/m, the same torque; it only has to leave a J_c that a mass distribution can have.
+    weight/m, the same torque, as long as a mass distribution with J_c exists.
 
     Attributes
     ----------
     mass, com, gravity
-        kg; m, (3,), axes F; downward acceleration, m/s^2.
+        Mass, kg; centre of mass (3,), m; downward acceleration, m/s^2.
     body
         Inertia about the centre of mass, its principal moments and axes.
     """
@@ -189,9 +168,9 @@ def mass_model(axes: Axes) -> MassModel | None:
     """Return a physical mass model, None if there is none.
 
     With the second moments S = tr(J)/2 - J of the mass distribution about the fixed point, those about the centre of mass are
-    S - m c c', which must not be negative: S itself must not be (the triangle inequality), and m c' S^-1 c <= 1. `SHARE` of
-    that largest mass is taken. In joint coordinates any mass does; engines whose joints are constraints between free bodies
-    integrate another body with another mass, and lose far more energy with half of it.
+    S - m c c'. Neither may be negative: the first is the triangle inequality, the second m c' S^-1 c <= 1. The mass is `SHARE`
+    of the largest one. In joint coordinates any mass gives the same motion; engines whose joints are constraints between free
+    bodies lose far more energy with half of it.
     """
     second = axes.J.sum() / 2 - axes.J
     if second.min() < -1e-15 * axes.J.max():
@@ -209,8 +188,10 @@ def mass_model(axes: Axes) -> MassModel | None:
     return MassModel(mass, com, potential.weight / mass, RigidBody(inertia_com))
 
 
-def mass_model_reason(scene: Scene) -> str | None:
-    """Return why the scene's body cannot be given as a mass with a centre and an inertia about it, None if it can."""
+def unsupported_reason(scene: Scene) -> str | None:
+    """Return why an engine with a mass model and uniform gravity does not support a scene; None if it does."""
+    if scene.potential is not None and not isinstance(scene.potential, UniformGravity):
+        return f"the engine has uniform gravity only, not {type(scene.potential).__name__}"
     if mass_model(principal_axes(scene)) is None:
         return "no mass distribution has this inertia and centre of mass: a moment exceeds the sum of the other two"
     return None

@@ -20,7 +20,7 @@ from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..engine import gravity_or_free, load, mass_model_reason, principal_axes, version
+from ..engine import load, principal_axes, unsupported_reason, version
 from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
 from .mujoco_versions import INTEGRATORS, prepare_many_with, prepare_with
 
@@ -81,7 +81,7 @@ class MuJoCo(Method):
         return 4 if self.integrator == "RK4" else 1
 
     def unsupported(self, scene: Scene) -> str | None:
-        return gravity_or_free(scene) or mass_model_reason(scene)
+        return unsupported_reason(scene)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -19,7 +19,7 @@ from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import Axes, gravity_or_free, load, mass_model, mass_model_reason, principal_axes, version
+from ..engine import Axes, load, mass_model, principal_axes, unsupported_reason, version
 from ..environments.plain_numbers import ManySamples, take_axes
 
 SCHEMES = ("Euler", "RK4")
@@ -73,7 +73,7 @@ class Pinocchio(Method):
         return 4 if self.scheme == "RK4" else 1
 
     def unsupported(self, scene: Scene) -> str | None:
-        return gravity_or_free(scene) or mass_model_reason(scene)
+        return unsupported_reason(scene)
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:

@@ -24,7 +24,7 @@ from conservative.method import Method, Role, Run
 from conservative.methods.many import RunMany
 from conservative.scene import Scene
 
-from ..engine import gravity_or_free, mass_model_reason, principal_axes
+from ..engine import principal_axes, unsupported_reason
 from ..worker.client import Worker
 from .environment import Distribution, Environment, find_environment, worker_of
 from .plain_numbers import ManySamples, Samples, describe, describe_many, take_axes
@@ -212,14 +212,15 @@ class EngineMethod(Method):
         return self.data.orders[next(iter(settings.values()))] if self.data.orders else self.data.order
 
     def unsupported(self, scene: Scene) -> str | None:
-        reason = mass_model_reason(scene)
+        reason = unsupported_reason(scene)
         if scene.potential is not None:
-            free_only = self.data.free_only
-            only = free_only if isinstance(free_only, str) else free_only.get(next(iter(self.settings.values())), "")
-            if self.data.gravity:
-                reason = gravity_or_free(scene) or reason or only or None
-            else:
+            only = self.data.free_only
+            if not isinstance(only, str):
+                only = only.get(next(iter(self.settings.values())), "")
+            if not self.data.gravity:
                 reason = only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
+            elif reason is None and only:
+                reason = only
         if reason is None and self.settings.get("as_installed"):
             return rate_limit_reason(scene, self.data.rate_limit)
         return reason

@@ -361,7 +361,7 @@ def test_bodies_without_a_mass_distribution_have_no_mass_model():
     gravity = cv.UniformGravity(2, (0, 0, 1))
     for inertia, potential in (((1, 1, 3), None), ((1, 2, 3), gravity)):  # the second: planar, weight out of its plane
         scene = cv.Scene("odd", cv.RigidBody(inertia), np.eye(3), (1, 2, 3), 1.0, potential)
-        assert "no mass distribution" in engine.mass_model_reason(scene)
+        assert "no mass distribution" in engine.unsupported_reason(scene)
         with pytest.raises(cv.Unsupported, match="no mass distribution"):
             cv.integrate(scene, 0.1, registry.method("mujoco:RK4"))
 
@@ -371,4 +371,4 @@ def test_a_planar_body_with_its_weight_in_its_plane_has_a_mass_model():
     scene = cv.Scene(
         "plate", cv.RigidBody(B @ np.diag((1, 2, 3)) @ B.T), B, (1, 2, 3), 1.0, cv.UniformGravity(2, B @ (0.3, 0.4, 0))
     )
-    assert engine.mass_model_reason(scene) is None
+    assert engine.unsupported_reason(scene) is None
