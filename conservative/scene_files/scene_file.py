@@ -26,7 +26,7 @@ from ..potentials.turning import Orbit, Turning
 from ..potentials.uniform_gravity import UniformGravity
 from ..scene import Scene
 from ..shapes import SHAPES, MassDistribution
-from .toml_reader import Table, keys_of, read
+from .toml_reader import TomlTable, keys_of, read
 
 _TOP = ("name", "t_end", "dt", "body", "potential", "orbit", "start")
 # The keys of a potential or a shape are the parameters of its constructor.
@@ -85,7 +85,7 @@ def load(path: str | Path) -> Scene:
         return Scene(name, body, R_WB0, w_WB_B0, t_end, potential, dt=dt, source=str(top.path))
 
 
-def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
+def _body(table: TomlTable) -> tuple[RigidBody, MassDistribution | None]:
     """Return the body, and its mass and centre of mass if the file has them."""
     sources = ("inertia", "shape", *list_entries(BODY_FILES))
     given = [key for key in table.values if key in sources]
@@ -104,13 +104,13 @@ def _body(table: Table) -> tuple[RigidBody, MassDistribution | None]:
         return mass.body, mass
 
 
-def _shape(table: Table) -> MassDistribution:
+def _shape(table: TomlTable) -> MassDistribution:
     name = table.choice("shape", SHAPES)
     table.only(("shape", *keys_of(SHAPES[name]), *_PLACEMENT))
     return table.call(SHAPES[name]).rotate(_attitude(table, "R_BS"))
 
 
-def _from_file(table: Table, kind: str) -> MassDistribution:
+def _from_file(table: TomlTable, kind: str) -> MassDistribution:
     table.only((kind, "name", "com_B"))
     path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
     name = table.text("name", f"the name of the body in {path}")
@@ -118,7 +118,7 @@ def _from_file(table: Table, kind: str) -> MassDistribution:
         return load_body_reader(kind)(path, name)
 
 
-def _field(top: Table, body: RigidBody, mass: MassDistribution | None) -> AnyPotential | None:
+def _field(top: TomlTable, body: RigidBody, mass: MassDistribution | None) -> AnyPotential | None:
     """Return the potential, turned with the orbit if there is one."""
     if "potential" not in top:
         if "orbit" in top:
@@ -138,7 +138,7 @@ def _field(top: Table, body: RigidBody, mass: MassDistribution | None) -> AnyPot
     return Turning(_potential(table, body, mass), orbit)
 
 
-def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> Potential:
+def _potential(table: TomlTable, body: RigidBody, mass: MassDistribution | None) -> Potential:
     kind = table.choice("kind", _POTENTIALS)
     known = {"kind", *keys_of(_POTENTIALS[kind])}
     if kind == "uniform_gravity":
@@ -151,7 +151,7 @@ def _potential(table: Table, body: RigidBody, mass: MassDistribution | None) -> 
     return table.call(_POTENTIALS[kind])
 
 
-def _gravity(table: Table, mass: MassDistribution | None) -> UniformGravity:
+def _gravity(table: TomlTable, mass: MassDistribution | None) -> UniformGravity:
     if mass is None:
         raise table.bad("g", "an acceleration, but only the inertia is known of the body", "weight, N, and com_B, m")
     if "weight" in table or "com_B" in table:
@@ -159,7 +159,7 @@ def _gravity(table: Table, mass: MassDistribution | None) -> UniformGravity:
     return table.call(mass.gravity)
 
 
-def _start(table: Table) -> tuple[Array, Array]:
+def _start(table: TomlTable) -> tuple[Array, Array]:
     table.only(("R_WB", "w_WB_B"))
     allowed = "three finite rates (3,), rad/s"
     with table.blame():
@@ -167,7 +167,7 @@ def _start(table: Table) -> tuple[Array, Array]:
     return _attitude(table, "R_WB"), rates
 
 
-def _attitude(table: Table, key: str) -> Array:
+def _attitude(table: TomlTable, key: str) -> Array:
     """Return the rotation (3, 3) under `key`: a matrix or a table with another form; by default the identity."""
     if key not in table:
         return np.eye(3)

@@ -32,7 +32,7 @@ class BadFile(BadInput):
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class TomlTable:
     """A table of a TOML file and the lines of its keys.
 
     Attributes
@@ -89,13 +89,13 @@ class Table:
             raise self.bad(key, repr(value), nearest(value, known))
         return value
 
-    def table(self, key: str, allowed: str) -> Table:
+    def table(self, key: str, allowed: str) -> TomlTable:
         """Return the table under `key`."""
         if key not in self.values:
             raise self.bad(key, f"nothing: the table [{key}] is missing", allowed)
         if not isinstance(self.values[key], dict):
             raise self.bad(key, repr(self.values[key]), f"a table: {allowed}")
-        return Table(self.path, (*self.name, key), self.values[key], self.lines)
+        return TomlTable(self.path, (*self.name, key), self.values[key], self.lines)
 
     @contextmanager
     def blame(self, **keys: str) -> Iterator[None]:
@@ -120,11 +120,11 @@ class Table:
 
 
 def keys_of(function: Callable[..., object]) -> list[str]:
-    """Return the names of a function's parameters: the keys that `Table.call` reads."""
+    """Return the names of a function's parameters: the keys that `TomlTable.call` reads."""
     return list(inspect.signature(function).parameters)
 
 
-def read(path: Path) -> Table:
+def read(path: Path) -> TomlTable:
     """Return the top table of a TOML file.
 
     Raises
@@ -153,7 +153,7 @@ def read(path: Path) -> Table:
         line = int(match[1]) if match else source.rstrip().count("\n") + 1
         raise BadFile(path, line, "", f"a text that is not TOML: {error}", "TOML 1.0") from None
     try:
-        return Table(path, (), values, key_lines(source))
+        return TomlTable(path, (), values, key_lines(source))
     except OverflowError as error:
         raise BadFile(path, error.args[0], "", f"a statement of more than {MOST_LINES} lines", "shorter statements") from None
 

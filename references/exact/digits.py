@@ -102,7 +102,7 @@ MOST_PERIODS = 2**60
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class Phase:
     """A phase start + rate t, reduced by its period without loss of digits. The period can be infinite."""
 
     start: Number
@@ -138,9 +138,9 @@ class Clock:
         return np.asarray(np.exp(1j * self.reduce(t)[0]))
 
 
-def rotation_clock(start: Number, rate: Number) -> Clock:
+def rotation_phase(start: Number, rate: Number) -> Phase:
     """Return the clock of an angle, rad."""
-    return Clock(start, rate, 2 * mp.pi)
+    return Phase(start, rate, 2 * mp.pi)
 
 
 def _line(start: Number, rate: Number, t: Array) -> tuple[Array, Array]:

@@ -22,9 +22,9 @@ import numpy as np
 from conservative.attitude import Array
 
 from .digits import (
-    Clock,
     Matrix,
     Number,
+    Phase,
     Vector,
     as_array,
     cross,
@@ -33,9 +33,9 @@ from .digits import (
     mp,
     multiply,
     norm,
-    rotation_clock,
+    rotation_phase,
 )
-from .start import Start
+from .start import InitialState
 from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
 
 
@@ -81,7 +81,7 @@ class OrderedAxes:
         return Lattice.of(m, max(least / L3max**2, mp.mpf(0)))
 
 
-def order_axes(start: Start) -> OrderedAxes:
+def order_axes(start: InitialState) -> OrderedAxes:
     """Return the initial state in ordered axes. The sign of |L|^2 - 2 T J2 determines the axis that the momentum circles."""
     J, axes = start.principal
     w = start.rates(axes)
@@ -104,8 +104,8 @@ class FreeMotion:
     largest: Array
     inverse_J: Array
     lattice: Lattice
-    argument: Clock
-    turn: Clock
+    argument: Phase
+    turn: Phase
     parts: tuple[Quotient, Quotient, Quotient]
     phase: Theta
     R_BP: Array
@@ -125,7 +125,7 @@ class FreeMotion:
         return R_WB, (m * (float(self.size) * self.inverse_J)) @ self.R_BP.T
 
 
-def free_motion(start: Start) -> FreeMotion:
+def free_motion(start: InitialState) -> FreeMotion:
     """Return the motion of an initial state that is not steady."""
     axes = order_axes(start)
     J, L, size, largest, lattice = axes.J, axes.L, axes.size, axes.largest, axes.lattice
@@ -142,8 +142,8 @@ def free_motion(start: Start) -> FreeMotion:
         np.array([float(x / size) for x in largest]),
         np.array([float(1 / x) for x in J]),
         lattice,
-        Clock(v0, omega, 2 * lattice.K),
-        rotation_clock(-mp.arg(phase.value_and_slope(v0)[0]), mu),
+        Phase(v0, omega, 2 * lattice.K),
+        rotation_phase(-mp.arg(phase.value_and_slope(v0)[0]), mu),
         jacobi(lattice),
         phase,
         as_array(axes.R_BP),

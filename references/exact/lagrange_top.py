@@ -26,10 +26,10 @@ import numpy as np
 from conservative.attitude import Array
 
 from .digits import (
-    Clock,
     ComplexArray,
     Matrix,
     Number,
+    Phase,
     as_array,
     cross,
     from_halves,
@@ -38,10 +38,10 @@ from .digits import (
     mp,
     multiply,
     root,
-    rotation_clock,
+    rotation_phase,
     unit,
 )
-from .start import SYMMETRIC, Start
+from .start import SYMMETRIC, InitialState
 from .theta import Lattice, Points, Quotient, jacobi, quotient
 
 _SAME = mp.mpf(10) ** -60
@@ -104,7 +104,7 @@ class Top:
         )
 
 
-def top(start: Start, moment_B: Array, axis_B: Array) -> Top:
+def top(start: InitialState, moment_B: Array, axis_B: Array) -> Top:
     """Return the top of a body symmetric about `axis_B`, which is parallel to the moment m g c."""
     moments, axes = start.principal
     moment = mp.matrix([mp.mpf(float(x)) for x in moment_B])
@@ -121,7 +121,7 @@ def top(start: Start, moment_B: Array, axis_B: Array) -> Top:
     return Top(abs(lever) / J1, J3 * w3 / J1, w3, mp.mpc(w1, w2), alpha, beta, R_BP)
 
 
-def spherical(start: Start) -> bool:
+def spherical(start: InitialState) -> bool:
     """Whether the three moments are equal up to round-off."""
     moments = start.principal[0]
     return bool(max(moments) - min(moments) <= SYMMETRIC * max(moments))
@@ -191,7 +191,7 @@ def snap_to_marks(u: Number, marks: tuple[Number, ...]) -> Number:
 class Factor:
     """exp(i mu t) times a quotient of theta functions."""
 
-    clock: Clock
+    clock: Phase
     shape: Quotient
 
     def at(self, t: Array, points: Points) -> ComplexArray:
@@ -208,14 +208,14 @@ def factor(shape: Quotient, omega: Number, v0: Number, v: Number, rate: Number, 
     mu = rate - omega * (derivative / value).imag
     value, derivative = shape.value_and_slope(v0)
     scale = start / value if abs(omega * start) > abs(slope) else slope / (omega * derivative + mp.mpc(0, mu) * value)
-    return Factor(rotation_clock(mp.mpf(0), mu), shape.times(scale))
+    return Factor(rotation_phase(mp.mpf(0), mu), shape.times(scale))
 
 
 @dataclass(frozen=True, eq=False)
 class TopMotion:
     """The motion of a top: phases and theta functions."""
 
-    argument: Clock
+    argument: Phase
     lattice: Lattice
     alpha: Factor
     beta: Factor
@@ -257,5 +257,5 @@ def top_motion(start: Top) -> TopMotion:
     parts = zip(shapes, rates, values, slopes, strict=True)
     alpha, beta, w = (factor(shape, omega, v0, v, *rest) for shape, *rest in parts)
     R_BP = as_array(start.R_BP)
-    argument = Clock(v0, omega, 2 * lattice.K)
+    argument = Phase(v0, omega, 2 * lattice.K)
     return TopMotion(argument, lattice, alpha, beta, w, float(w_scale), float(start.spin), R_BP, halves_in_double(start.R_BP.T))

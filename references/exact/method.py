@@ -30,7 +30,7 @@ from conservative.trajectory import Bounds, Counters, Trajectory
 from .digits import MP_LOCK
 from .free_body import free_motion
 from .lagrange_top import top, top_motion
-from .start import ClosedForm, Start, in_blocks, steady_turn
+from .start import ClosedForm, InitialState, in_blocks, steady_turn
 
 
 def free_body(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
@@ -143,7 +143,7 @@ class Exact(Method):
         return _reason(_pendulum(scene) or scene.body, scene.potential)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        start = Start(_pendulum(scene) or scene.body, scene.R_WB0, scene.w_WB_B0)
+        start = InitialState(_pendulum(scene) or scene.body, scene.R_WB0, scene.w_WB_B0)
         with MP_LOCK:
             motion = _motion(start, scene.potential)
 
@@ -178,17 +178,19 @@ def _reason(body: RigidBody, potential: AnyPotential | None) -> str | None:
     return None
 
 
-def _start(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike) -> Start:
+def _start(body: RigidBody, R_WB0: ArrayLike, w_WB_B0: ArrayLike) -> InitialState:
     if not isinstance(body, RigidBody):
         raise BadInput("body", describe(body), "a RigidBody")
-    return Start(body, rotation("R_WB0", R_WB0), finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s"))
+    return InitialState(
+        body, rotation("R_WB0", R_WB0), finite_array("w_WB_B0", w_WB_B0, ((3,),), "three finite rates (3,), rad/s")
+    )
 
 
-def _free_motion(start: Start) -> ClosedForm:
+def _free_motion(start: InitialState) -> ClosedForm:
     return steady_turn(start) if start.steady else free_motion(start)
 
 
-def _motion(start: Start, potential: AnyPotential | None) -> ClosedForm:
+def _motion(start: InitialState, potential: AnyPotential | None) -> ClosedForm:
     axis = None if potential is None else axial_direction(start.body, potential)
     if not isinstance(potential, UniformGravity) or axis is None or not np.any(potential.moment_B):
         return _free_motion(start)

@@ -11,7 +11,7 @@ import numpy as np
 from conservative.attitude import Array, to_quaternion
 from conservative.body import RigidBody
 
-from .digits import Clock, Matrix, Vector, as_array, cross, from_halves, mp, norm, rotation_clock
+from .digits import Matrix, Phase, Vector, as_array, cross, from_halves, mp, norm, rotation_phase
 
 _PARALLEL = mp.mpf(10) ** -130
 """Sine of an angle that is round-off: principal axes have 150 digits."""
@@ -21,7 +21,7 @@ SYMMETRIC = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class InitialState:
     """Attitude and rates of a body at t = 0. The doubles of the user are taken as exact numbers."""
 
     body: RigidBody
@@ -90,7 +90,7 @@ class SteadyTurn:
     """A turn about an axis fixed in body and world, or rest."""
 
     axis_B: Array
-    half_turn: Clock
+    half_turn: Phase
     R_WB0: Array
     w_WB_B: Array
 
@@ -101,9 +101,9 @@ class SteadyTurn:
         return self.R_WB0 @ turn, np.broadcast_to(self.w_WB_B, (*t.shape, 3)).copy()
 
 
-def steady_turn(start: Start) -> SteadyTurn:
+def steady_turn(start: InitialState) -> SteadyTurn:
     """Return the motion with the constant rates of a start."""
     w = start.rates(mp.eye(3))
     speed = norm(w)
     axis = np.array([float(x / speed) for x in w]) if speed > 0 else np.array([0.0, 0.0, 1.0])
-    return SteadyTurn(axis, rotation_clock(mp.mpf(0), speed / 2), as_array(start.attitude), start.w_WB_B0)
+    return SteadyTurn(axis, rotation_phase(mp.mpf(0), speed / 2), as_array(start.attitude), start.w_WB_B0)

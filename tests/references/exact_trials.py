@@ -13,7 +13,7 @@ from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.references import precise
 from conservative.references.exact.lagrange_top import top, top_motion
 from conservative.references.exact.method import free_body, lagrange_top
-from conservative.references.exact.start import Start
+from conservative.references.exact.start import InitialState
 
 FREE_BOUND, TOP_BOUND = 1e-13, 1e-12  # claimed at any time: attitudes, rad, and rates relative to the largest one
 # Of the integration, and of one near a separatrix. The motions are integrable: a distance d from the separatrix costs the
@@ -112,7 +112,7 @@ def draw_top(rng, pole=None):
     trial = Trial(body, potential, R_WP @ R_BP.T, R_BP @ w_P, t)
     if pole is None:
         return trial
-    clock = top_motion(top(Start(body, trial.R_WB0, trial.w_WB_B0), potential.moment_B, potential.moment_B)).argument
+    clock = top_motion(top(InitialState(body, trial.R_WB0, trial.w_WB_B0), potential.moment_B, potential.moment_B)).argument
     passages = [float(((n / 2) * clock.period - clock.start) / clock.rate) for n in range(3)]
     passage = min((time for time in passages if time > 0), key=trial.pole_distance)
     return replace(trial, t=np.append(t[t < passage], passage))

@@ -16,7 +16,7 @@ from conservative.attitude import angle_between, from_quaternion, orthonormality
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.invariants import energy, momentum_W
-from conservative.references.exact.digits import Clock, mp, rotation_clock
+from conservative.references.exact.digits import Phase, mp, rotation_phase
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.references.exact.theta import Lattice, Points, jacobi
 
@@ -317,7 +317,7 @@ def test_jacobi_functions_on_the_separatrix_are_hyperbolic():
 
 @pytest.mark.parametrize("period", [2 * mp.pi, mp.mpf("61.7"), mp.mpf("1e-3")])
 def test_a_clock_keeps_its_digits_however_late(period):
-    clock = Clock(mp.mpf(1) / 3, mp.sqrt(2), period)
+    clock = Phase(mp.mpf(1) / 3, mp.sqrt(2), period)
     t = np.array([0.0, -3.3, 1e3 + 0.1, 1e9 + 0.3, -1e12 - 0.7, 123456789012345.6])
     phase, odd = clock.reduce(t)
     for time, found, parity in zip(t, phase, odd, strict=True):
@@ -326,12 +326,12 @@ def test_a_clock_keeps_its_digits_however_late(period):
         assert int(mp.nint(off)) % 2 == parity
         assert abs(found) < 0.5000001 * period
     if period == 2 * mp.pi:
-        turned = rotation_clock(clock.start, clock.rate).phasor(t)
+        turned = rotation_phase(clock.start, clock.rate).phasor(t)
         np.testing.assert_allclose(turned, np.exp(1j * phase), rtol=1e-15)
 
 
 def test_a_clock_refuses_times_that_leave_nothing_of_the_phase():
-    clock = rotation_clock(mp.mpf(0), mp.mpf(1))
+    clock = rotation_phase(mp.mpf(0), mp.mpf(1))
     clock.reduce(np.array([7e18]))
     with pytest.raises(BadInput, match=r"t: got .* periods; expected times of up to 2\^60 periods, 7.24e\+18 s"):
         clock.reduce(np.array([0.0, -7.3e18]))
