@@ -221,9 +221,18 @@ def require_extra(what: str, extra: str, *packages: str) -> None:
         raise MissingExtra(what, ", ".join(missing), extra)
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the known names as the text of a message, the one nearest to `name` first."""
+MOST_LISTED = 12
+"""Number of names that a message lists."""
+
+
+def nearest(name: str, known: Iterable[str], command: str = "") -> str:
+    """Return the known names as the text of a message, the one nearest to `name` first.
+
+    If there are more than `MOST_LISTED`, the text has the nearest ones and the `command` that lists all.
+    """
     known = sorted(known)
-    close = get_close_matches(name, known, n=1)
-    listing = ", ".join(known)
-    return f"{close[0]!r} (nearest), or one of {listing}" if close else f"one of {listing}"
+    close = get_close_matches(name, known, n=3)
+    few = len(known) <= MOST_LISTED or not command
+    others = "" if few else "".join(f", {other!r}" for other in close[1:])
+    everything = f"one of {', '.join(known)}" if few else f"one of {len(known)} names; list them with: {command}"
+    return f"{close[0]!r} (nearest){others}, or {everything}" if close else everything

@@ -1,4 +1,4 @@
-"""Scenes and methods by name. Everybody registers the same way, we too: an entry point in the package's pyproject.
+"""Scenes, methods and engines by name. All are registered as entry points in the pyproject of a package, ours included.
 
     [project.entry-points."conservative.methods"]
     my_method = "my_package.my_file:MyMethod"           # a class derived from conservative.Method
@@ -13,7 +13,7 @@
     my_engine = "my_package.engines:MyEngine"           # a class made by engine_class of conservative.references
 
 A method is named with its settings, `reduced`, `mujoco:RK4`, `heyoka:1e-9` or `heyoka:tol=1e-9,frame=non_spinning`. An engine
-that runs in an environment of its own is named alike, `exudyn:RK44`, with its version if need be: `mujoco@3.6.0:RK4`.
+that runs in an environment of its own is named the same way, with a version if needed: `exudyn:RK44`, `mujoco@3.6.0:RK4`.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ _NAME = "a name with its settings, a text"
 
 
 def list_scenes() -> tuple[str, ...]:
-    """Return the names of all registered scenes, in their order; none is imported."""
+    """Return the names of all registered scenes, sorted; none is imported."""
     return tuple(list_entries(SCENES))
 
 
 def list_methods() -> tuple[str, ...]:
-    """Return the names of all registered methods, in their order; none is imported."""
+    """Return the names of all registered methods, sorted; none is imported."""
     return tuple(list_entries(METHODS))
 
 
 def list_engines() -> tuple[str, ...]:
-    """Return the names of all engines that run in environments of their own, in their order; none is imported."""
+    """Return the names of all engines that run in environments of their own, sorted; none is imported."""
     return tuple(list_entries(ENGINES))
 
 
@@ -54,7 +54,7 @@ def engine(name: str) -> Any:
     BadInput
         The name is unknown.
     NotLoadable
-        It is registered, but importing what is registered fails.
+        The import of the engine fails.
     """
     return load_entry(ENGINES, "engine", name)
 
@@ -65,10 +65,9 @@ def scene(text: str) -> Scene:
     Raises
     ------
     BadInput
-        The name or a parameter is unknown, a value cannot be used, or the file cannot: see
-        `conservative.scene_files.scene_file`.
+        The name or a parameter is unknown, or a value or the file cannot be used; see `conservative.scene_files.scene_file`.
     NotLoadable
-        It is registered, but importing what is registered fails.
+        The import of the scene fails.
     """
     if printable_text("scene", text, _NAME).endswith(".toml"):
         from .scene_files.scene_file import load
@@ -85,9 +84,9 @@ def method(text: str) -> Method:
     Raises
     ------
     BadInput
-        The name or a setting is unknown, a value cannot be used, or the class has another name than it is registered with.
+        The name or a setting is unknown, a value cannot be used, or the class is registered under another name.
     NotLoadable
-        It is registered, but importing what is registered fails.
+        The import of the method fails.
     MissingEngine
         The engine is not installed.
     """
@@ -100,30 +99,28 @@ def method(text: str) -> Method:
 
 
 def _load_method(name: str) -> type[Method]:
-    """Return the class that runs in this process, or in an environment: where a version is named, or there is no other."""
+    """Return the class that runs in this process, or in an environment if a version is named or there is no other."""
     base, at, version = name.partition("@")
     engines = list_entries(ENGINES)
     known = set(engines) if at else {*engines, *list_entries(METHODS)}
     if base not in known or bool(at) != bool(version):
-        raise BadInput("method", repr(name), nearest(base, known) + (", with @ and a version" if at else ""))
-    found: type[Method]
+        allowed = nearest(base, known, "conservative list, and conservative engines list")
+        raise BadInput("method", repr(name), allowed + (", with @ and a version" if at else ""))
     if at:
-        found = engine(base).at_version(version)
-    else:
-        found = load_entry(METHODS if name in list_entries(METHODS) else ENGINES, "method", name)
-    return found
+        versioned: type[Method] = engine(base).at_version(version)
+        return versioned
+    family: type[Method] = load_entry(METHODS if name in list_entries(METHODS) else ENGINES, "method", name)
+    return family
 
 
 def list_families() -> dict[str, type[Method]]:
-    """Return the registered classes of methods by name; what cannot be loaded, or is no method of that name, is left out."""
-    found = {name: _load_family(name) for name in list_methods()}
-    return {name: family for name, family in found.items() if family is not None}
-
-
-def _load_family(name: str) -> type[Method] | None:
-    try:
-        family = load_entry(METHODS, "method", name)
-    except (MissingEngine, NotLoadable):
-        return None
-    whole = isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name
-    return family if whole else None
+    """Return the registered classes of methods by name, without those that cannot be loaded or have another name."""
+    families = {}
+    for name in list_methods():
+        try:
+            family = load_entry(METHODS, "method", name)
+        except (MissingEngine, NotLoadable):
+            continue
+        if isinstance(family, type) and issubclass(family, Method) and getattr(family, "family", None) == name:
+            families[name] = family
+    return families

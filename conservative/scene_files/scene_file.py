@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array, from_quaternion, rotation_about
 from ..body import RigidBody
 from ..check import describe, finite_array, finite_number, rotation
-from ..deferred_imports import BODY_FILES, list_entries, load_body_reader
+from ..deferred_imports import BODY_FILES, list_entries, load_entry
 from ..errors import BadInput
 from ..potentials.gravity_gradient import GravityGradient
 from ..potentials.point_to_point import LinearSpring, PointAttraction
@@ -115,7 +115,7 @@ def _from_file(table: TomlTable, kind: str) -> MassDistribution:
     path = table.path.parent / table.text(kind, "the path of a file, from this file's folder")
     name = table.text("name", f"the name of the body in {path}")
     with table.blame(path=kind):
-        return load_body_reader(kind)(path, name)
+        return load_entry(BODY_FILES, "kind of file", kind)(path, name)
 
 
 def _field(top: TomlTable, body: RigidBody, mass: MassDistribution | None) -> AnyPotential | None:

@@ -200,9 +200,9 @@ def test_bad_input_is_named(written, tmp_path, case):
 
 def test_loaders_are_registered_and_unknown_kinds_named():
     assert list(deferred_imports.list_entries(deferred_imports.BODY_FILES)) == ["mjcf", "urdf"]
-    assert deferred_imports.load_body_reader("mjcf") is body_from_mjcf
+    assert deferred_imports.load_entry(deferred_imports.BODY_FILES, "kind of file", "mjcf") is body_from_mjcf
     with pytest.raises(cv.BadInput) as caught:
-        deferred_imports.load_body_reader("urfd")
+        deferred_imports.load_entry(deferred_imports.BODY_FILES, "kind of file", "urfd")
     assert (caught.value.argument, caught.value.got) == ("kind of file", "'urfd'")
     assert "'urdf' (nearest)" in caught.value.allowed
 
