@@ -18,7 +18,12 @@ def test_every_method_is_a_frozen_value_that_is_read_back_from_its_name(name):
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"), [("brickflip", "'brick_flip' (nearest)"), ("lagrange", "'lagrange_top' (nearest)"), ("zzz", "one of 39 names; list them with: conservative list")]
+    ("text", "hint"),
+    [
+        ("brickflip", "'brick_flip' (nearest)"),
+        ("lagrange", "'lagrange_top' (nearest)"),
+        ("zzz", "one of 39 names; list them with: conservative list"),
+    ],
 )
 def test_an_unknown_scene_is_answered_with_the_nearest(text, hint):
     with pytest.raises(cv.BadInput) as caught:
