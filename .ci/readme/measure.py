@@ -105,14 +105,12 @@ def _date(path: Path) -> str:
 def draw(report: Path, picture: Path) -> None:
     """Draw time against error on the Lagrange top, for a few methods of a report; `picture` ends in .svg."""
     from conservative.reports.charts import figures
-    from conservative.reports.labels import with_names
     from conservative.reports.report import save_picture
-    from conservative.reports.tables import work_precision
-    from conservative.reports.tables.classes import without_solutions
+    from conservative.reports.rows.names import with_names, without_solutions
+    from conservative.reports.rows.points import front
+    from conservative.reports.rows.points import points as points_of
 
     table = _read(report / "measurements.csv")
     few = table[(table["scene"] == "lagrange_top") & table["series"].isin(PICTURED)]
-    points = work_precision.points(with_names(few))
-    save_picture(
-        figures.work_precision(points, work_precision.front(without_solutions(points)), "lagrange_top"), picture, png=False
-    )
+    points = points_of(with_names(few))
+    save_picture(figures.work_precision(points, front(without_solutions(points)), "lagrange_top"), picture, png=False)

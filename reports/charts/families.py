@@ -8,7 +8,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from ..tables.classes import MethodClass
+from ..rows.names import MethodClass
 from .figures import log_channel
 from .style import HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of
 

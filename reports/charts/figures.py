@@ -34,7 +34,7 @@ def _line_look(families: Families, title: str) -> dict[str, Any]:
 
 
 def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any:
-    """Return time against error, from `work_precision.points` of a scene and their `front`, which is the bold line."""
+    """Return time against error, from `rows.points` of a scene and their `front`, which is the bold line."""
     data, best_points = (rows.assign(microseconds=rows["time"] * 1e6) for rows in (points, front))
     look = _line_look(families_of(data), "method")
     x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
@@ -75,7 +75,7 @@ def _drift_panel(data: pd.DataFrame, title: str, families: Families) -> Any:
 
 
 def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any:
-    """Return error against step, from `orders.errors` of a scene and `orders.fit_ends`; the fits are the bold stretches."""
+    """Return error against step, from `lines.errors` of a scene and `lines.fit_ends`; the fits are the bold stretches."""
     x = alt.X(**log_channel("dt", "step, s", errors["dt"]))
     y = alt.Y(**log_channel("error", "largest attitude error over the run, rad", errors["error"]))
     look = _line_look(families_of(errors), "method (observed order)")

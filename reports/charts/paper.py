@@ -11,7 +11,7 @@ import pandas as pd
 from conservative.benchmarks.studies.paper_figures import ENERGY, MOMENTUM, PAPER_MAP, RATES, REDUCED_MAP, X1, X2
 
 from ..document.model import LegendEntry
-from ..tables.lines import ANALYTICAL
+from ..rows.lines import ANALYTICAL
 from . import vega_embed
 from .style import BLACK, BLUE, HEIGHT, SKY, VERMILION, WIDTH, apply_style
 

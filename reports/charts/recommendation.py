@@ -11,7 +11,7 @@ import pandas as pd
 from conservative.benchmarks.recommendation.recommend import Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..labels import method_text, setting_text
+from ..rows.names import method_text, setting_text
 from .figures import log_channel
 from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale, svg_text
 

@@ -7,7 +7,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 
-from ..tables.cells import tolerance
+from ..document.cells import tolerance
 from .figures import log_channel
 from .style import HEIGHT, WIDTH, apply_style, colour_scale, dash_scale, families_of
 

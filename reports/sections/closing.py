@@ -11,11 +11,10 @@ from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.method import Role
 
+from ..document.cells import DASH, factor, number, tolerance
 from ..document.model import Table
-from ..tables.cells import DASH, factor, number, tolerance
-from ..tables.classes import OF_ENGINES, MethodClass, of_classes
-from ..tables.rows import of_measure, of_study
-from ..tables.summary import MIDDLE
+from ..rows.names import OF_ENGINES, MethodClass, of_classes, of_measure, of_study
+from .summary import MIDDLE
 
 HEADER = ("method", "energy", "momentum", "attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
 LEGEND = (
@@ -35,7 +34,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: str) -> Table:
     table
         Measurements with names (see `labels.with_names`).
     points
-        Errors and times of the scene (see `work_precision.points`).
+        Errors and times of the scene (see `rows.points`).
     scene
         Name of the scene.
     """

@@ -14,6 +14,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, judge
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
+from ..document.cells import DASH, number
 from ..document.model import (
     Cell,
     Check,
@@ -30,7 +31,6 @@ from ..document.model import (
     Table,
     filled,
 )
-from ..tables.cells import DASH, number
 
 HEADER = (
     "scene",

@@ -21,10 +21,10 @@ from conservative.scene import Scene
 
 from ..charts import engines as chart
 from ..charts import vega_embed
+from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
-from ..tables import work_precision
-from ..tables.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
-from ..tables.rows import of_measure, of_study, outcomes, with_outcome
+from ..rows.names import of_measure, of_study, outcomes, with_outcome
+from ..rows.points import points as points_over
 from .measured import Measured, of_scene
 from .provenance import lock_sections
 
@@ -130,7 +130,7 @@ class EngineRow:
 def section(measured: Measured) -> Section:
     """Return the section of the engines that the report names."""
     table = measured.rows[measured.rows["study"].isin(ENGINES)]
-    points = work_precision.points(table, OVER_STEPS)
+    points = points_over(table, OVER_STEPS)
     words = (
         "Engines in their own environments, and those installed with this package. Each runs in its own loop and "
         "process, one process at a time. At its best: the setting with the smallest error at the scene's step. As "
@@ -199,7 +199,7 @@ def _versions(measured: Measured) -> Table:
 def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[EngineRow]:
     """Return the measurements of engines on a scene, accurate ones first, those that did not run last.
 
-    `table` contains the named rows of the studies of engines, `points` their `work_precision.points`.
+    `table` contains the named rows of the studies of engines, `points` their `rows.points.points`.
     """
     at_step, over_steps = of_study(table, ONE_STEP, scene), of_study(table, OVER_STEPS, scene)
     lines = {str(name): rows for name, rows in over_steps.groupby("series", sort=False)}

@@ -9,9 +9,9 @@ from conservative.benchmarks.studies.studies import ENGINES, HARD
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
+from ..document.cells import number, outcome_text
 from ..document.model import Paragraph, Section, Style, Table, filled
-from ..tables.cells import number, outcome_text
-from ..tables.rows import of_study, outcomes, with_outcome, without_outcome
+from ..rows.names import of_study, outcomes, with_outcome, without_outcome
 
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 _ELSEWHERE = (*HARD, *ENGINES)

@@ -8,9 +8,9 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 
+from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Cell, Grade, Paragraph, Row, Section, Style, Table
-from ..tables.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
-from ..tables.rows import of_measure, of_study, outcomes, without_outcome
+from ..rows.names import of_measure, of_study, outcomes, without_outcome
 
 RIGHT, USABLE = 1e-3, 0.1
 """Largest attitude errors, rad, of a motion that is called right, and usable."""

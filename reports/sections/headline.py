@@ -11,11 +11,11 @@ import pandas as pd
 from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.studies.each_step import ERROR
 
-from ..tables.cells import factor, tolerance
-from ..tables.classes import OF_ENGINES, MethodClass, of_classes
-from ..tables.scene_contests import EachStep, sides
-from ..tables.work_precision import DECADES
+from ..document.cells import factor, tolerance
+from ..rows.names import OF_ENGINES, MethodClass, of_classes
+from ..rows.points import DECADES
 from .random_bodies import ANY, RandomRatios, count_bodies
+from .scene_contests import EachStep, sides
 
 TIE = 1.1
 """Ratio of two times below which neither is called faster: reports differ by as much."""

@@ -15,9 +15,9 @@ from conservative.outcome import OutcomeKind
 
 from ..charts import throughput, vega_embed
 from ..charts.style import families_of
+from ..document.cells import DASH, number, tolerance
 from ..document.model import Cell, Figure, Items, Layout, Paragraph, Role, Section, Style, Table, filled
-from ..tables.cells import DASH, number, tolerance
-from ..tables.classes import OF_ENGINES, MethodClass, class_of
+from ..rows.names import OF_ENGINES, MethodClass, class_of
 from .random_bodies import grade, ratio_text
 
 TERMS = (

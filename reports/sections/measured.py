@@ -7,13 +7,15 @@ from functools import cached_property
 
 import pandas as pd
 
+from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import ENGINES, RANDOM, THROUGHPUT
+from conservative.outcome import OutcomeKind
 
-from ..labels import with_names
+from ..rows import points
+from ..rows.names import of_study, with_names, with_outcome, without_outcome
 from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
-from ..tables import overview, work_precision
 from . import random_bodies
 
 
@@ -27,7 +29,7 @@ class Measured:
 
     @cached_property
     def rows(self) -> pd.DataFrame:
-        """All rows with the names of their methods (see `labels.with_names`)."""
+        """All rows with the names of their methods (see `names.with_names`)."""
         return with_names(self.measurements.table)
 
     @cached_property
@@ -42,13 +44,13 @@ class Measured:
 
     @cached_property
     def points(self) -> pd.DataFrame:
-        """Errors and times on the scenes (see `work_precision.points`)."""
-        return work_precision.all_points(self.rows)
+        """Errors and times on the scenes (see `rows.points`)."""
+        return points.all_points(self.rows)
 
     @cached_property
     def long_drifts(self) -> pd.DataFrame:
-        """The largest drifts of long runs (see `overview.long_run_drifts`)."""
-        return overview.long_run_drifts(self.scene_rows)
+        """The largest drifts of long runs (see `long_run_drifts`)."""
+        return long_run_drifts(self.scene_rows)
 
     @cached_property
     def ratios(self) -> tuple[random_bodies.RandomRatios, ...]:
@@ -59,3 +61,22 @@ class Measured:
 def of_scene(rows: pd.DataFrame, scene: str) -> pd.DataFrame:
     """Return the rows of one scene, numbered from 0."""
     return rows[rows["scene"] == scene].reset_index(drop=True)
+
+
+def long_run_drifts(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the largest drift of each quantity in long runs; orthonormality counts as a quantity."""
+    rows = of_study(table, "long_runs")
+    rows = rows[rows["measure"].isin([Measure.DRIFT_MAX.text, Measure.ORTHONORMALITY.text])]
+    return rows.assign(quantity=rows["quantity"].mask(rows["quantity"] == "", "orthonormality"))
+
+
+_NO_TROUBLE = (OutcomeKind.OK, OutcomeKind.NO_ORDER, OutcomeKind.SKIPPED, OutcomeKind.MISSING)
+
+
+def scenes_in_trouble(table: pd.DataFrame) -> pd.DataFrame:
+    """Return failed runs, and scenes that a method does not support: columns scene, method, family, outcome."""
+    rows = table[table["study"] != "stability"]
+    runs = set(with_outcome(rows, OutcomeKind.OK)[["scene", "method"]].itertuples(index=False, name=None))
+    bad = without_outcome(rows, *_NO_TROUBLE)[["scene", "method", "family", "outcome"]].drop_duplicates()
+    real = [row.outcome != OutcomeKind.UNSUPPORTED or (row.scene, row.method) not in runs for row in bad.itertuples()]
+    return bad[pd.Series(real, index=bad.index, dtype=bool)]

@@ -8,8 +8,8 @@ from conservative.benchmarks.measures.measure import Measure
 
 from ..charts import paper
 from ..document.model import Figure, Layout, Section, Table, filled
-from ..tables import lines
-from ..tables.rows import of_study
+from ..rows import lines
+from ..rows.names import of_study
 
 _MEASURES = (Measure.PERIOD, Measure.PERIOD_X1, Measure.PERIOD_DISTANCE)
 

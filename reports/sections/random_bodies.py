@@ -18,14 +18,11 @@ from conservative.method import Role as Side
 from conservative.outcome import OutcomeKind
 
 from ..charts import random_ratios, vega_embed
+from ..document.cells import DASH, factor, finite_or_none, number, tolerance
 from ..document.model import Cell, Figure, Grade, Items, Layout, Paragraph, Role, Row, Section, Style, Table, filled
-from ..labels import display_name
-from ..tables.cells import DASH, factor, finite_or_none, number, tolerance
-from ..tables.classes import OF_ENGINES, MethodClass, of_classes
-from ..tables.families import first_names, joined
-from ..tables.rows import without_outcome
-from ..tables.summary import ERRORS, HEADER, MIDDLE, Summary, keeps, microseconds
-from ..tables.work_precision import points
+from ..rows.names import OF_ENGINES, MethodClass, display_name, of_classes, without_outcome
+from ..rows.points import first_names, joined, points
+from .summary import ERRORS, HEADER, MIDDLE, Summary, keeps, microseconds
 
 ANY = "cheapest engine"
 """Stands for all engines: on each body, the cheapest of them."""
@@ -219,7 +216,7 @@ def count_bodies(count: int) -> str:
 def summary(table: pd.DataFrame, found: Sequence[RandomRatios], drifts: pd.DataFrame) -> Summary:
     """Return the summary of named rows of the study, and of their ratios: costs in the geometric mean over bodies.
 
-    `drifts` are those of long runs (see `overview.long_run_drifts`).
+    `drifts` are those of long runs (see `measured.long_run_drifts`).
     """
     rows = _rows(table)
     bodies = int(rows["scene"].nunique())

@@ -12,7 +12,7 @@ from conservative.benchmarks.recommendation.recommend import Advice, Recommendat
 from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..document.model import Block, Document, Items, Paragraph, Role, Section, Table
-from ..labels import method_text, setting_text
+from ..rows.names import method_text, setting_text
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
 FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+from ..document.cells import DASH
 from ..document.model import Block, Document, Facts, Table
-from ..tables.cells import DASH
 
 
 def build(summaries: Sequence[dict[str, Any]]) -> Document:

@@ -15,15 +15,15 @@ from conservative.scene import Scene
 
 from ..charts import families, figures, spheres, vega_embed
 from ..charts.style import colours, families_of
+from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Block, Figure, Layout, LegendEntry, Paragraph, Role, Row, Section, Style, Table, filled
-from ..tables import lines, orders, overview, scene_contests, work_precision
-from ..tables.cells import CONSERVED, DASH, SMALL, number, tolerance
-from ..tables.classes import without_solutions
-from ..tables.families import under
-from ..tables.rows import of_measure, of_study
-from ..tables.summary import Summary
-from ..tables.summary import of_scene as summary_of_scene
-from .measured import Measured, of_scene
+from ..rows import lines
+from ..rows.names import of_measure, of_study, outcomes, without_solutions
+from ..rows.points import front, under
+from . import scene_contests
+from .measured import Measured, long_run_drifts, of_scene, scenes_in_trouble
+from .summary import Summary
+from .summary import of_scene as summary_of_scene
 
 
 def summarize(measured: Measured, scene: Scene) -> Summary:
@@ -31,7 +31,7 @@ def summarize(measured: Measured, scene: Scene) -> Summary:
     return summary_of_scene(
         _points(measured, scene),
         of_scene(measured.long_drifts, scene.name),
-        of_scene(overview.scenes_in_trouble(measured.scene_rows), scene.name),
+        of_scene(scenes_in_trouble(measured.scene_rows), scene.name),
         scene.integrable,
         scene_contests.each_step(measured.scene_rows, scene.name),
     )
@@ -40,8 +40,8 @@ def summarize(measured: Measured, scene: Scene) -> Summary:
 def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     """Return the section of a scene."""
     name, rows = scene.name, measured.scene_rows
-    errors = of_scene(orders.errors(rows, Measure.ATTITUDE_MAX), name)
-    fits, rate_fits = (orders.fits(found) for found in (errors, of_scene(orders.errors(rows, Measure.RATES_MAX), name)))
+    errors = of_scene(lines.errors(rows, Measure.ATTITUDE_MAX), name)
+    fits, rate_fits = (lines.fits(found) for found in (errors, of_scene(lines.errors(rows, Measure.RATES_MAX), name)))
     contests = scene_contests.as_table(_points(measured, scene), _interval(scene), scene_contests.each_step(rows, name))
     sample = f"A sample is one of {step_ladder.SAMPLES} in the duration; in the last rows, each of the scene's own steps."
     classes = replace(summary.classes, caption=f"{name}: µs of computing per simulated second, by class of methods")
@@ -63,7 +63,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     work: list[Block] = [_work_figure(measured, scene, summary), classes]
     if decades.rows:
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))
-    drifts = filled(_drift_figure(measured, name), Paragraph(drift_words), overview.conservation(rows, name))
+    drifts = filled(_drift_figure(measured, name), Paragraph(drift_words), conservation(rows, name))
     curves = _sphere_figure(measured, scene)
     return Section(
         name,
@@ -118,7 +118,7 @@ def _entry(line: str, members: pd.DataFrame, shown: bool) -> LegendEntry:
 
 def _work_figure(measured: Measured, scene: Scene, summary: Summary) -> Figure:
     points, name = _points(measured, scene), scene.name
-    picture = figures.work_precision(points, work_precision.front(without_solutions(points)), name)
+    picture = figures.work_precision(points, front(without_solutions(points)), name)
     return families_figure(summary, f"work_precision_{name}", name, picture)
 
 
@@ -140,8 +140,8 @@ def _drift_figure(measured: Measured, name: str) -> Figure:
 
 
 def _convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> Figure:
-    named = orders.with_slopes(errors, fits)
-    picture = figures.convergence(named, orders.fit_ends(orders.with_slopes(fits, fits)), name)
+    named = lines.with_slopes(errors, fits)
+    picture = figures.convergence(named, lines.fit_ends(lines.with_slopes(fits, fits)), name)
     return Figure(
         f"convergence_{name}",
         f"{name}: attitude error against step",
@@ -235,7 +235,7 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
 
 
 def order(attitude: pd.DataFrame, rates: pd.DataFrame, scene: str) -> Table:
-    """Return observed orders of attitude and rates, from `orders.fits`, and the window of steps of the attitude's fit."""
+    """Return observed orders of attitude and rates, from `lines.fits`, and the window of steps of the attitude's fit."""
     header = ["method", "order, attitude", "order, rates", "fit window, s", "points", "floor, rad"]
     of_rates = dict(zip(rates["name"], rates["text"], strict=True))
     fits = [fit for _, fit in attitude.iterrows()]
@@ -274,3 +274,24 @@ def time(table: pd.DataFrame, scene: str) -> Table:
 def _times(row: pd.Series[float], unit: float) -> Row:
     steps = number(_value(row, Measure.TIME_PER_STEP) / unit, 3)
     return [steps, *(number(_value(row, measure) * scale, 3) for measure, scale, _ in _TIMES)]
+
+
+def conservation(table: pd.DataFrame, scene: str) -> Table:
+    """Return the drift of every quantity with every method in the long runs, the best methods first, and the outcomes."""
+    rows = long_run_drifts(table)
+    rows = rows[rows["scene"] == scene]
+    quantities = list(rows["quantity"].unique())
+    members = sorted((group for _, group in rows.groupby("method", sort=False)), key=_worst)
+    body = [_conservation(group, quantities) for group in members]
+    return Table(["method", *quantities, "run"], body, f"{scene}: largest drift in long runs", Style.FILTERED)
+
+
+def _worst(rows: pd.DataFrame) -> tuple[bool, float]:
+    """Return the rank of a method: complete runs first, then the largest drift."""
+    return bool(rows["value"].isna().any()), float(rows["value"].max())
+
+
+def _conservation(rows: pd.DataFrame, quantities: list[str]) -> Row:
+    first, values = rows.iloc[0], rows.set_index("quantity")["value"]
+    cells = [grade_drift(float(values.get(quantity, math.nan))) for quantity in quantities]
+    return [first["name"], *cells, outcome_cell(outcomes(rows)[0])]

@@ -11,11 +11,10 @@ import pandas as pd
 from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
+from ..document.cells import DASH, number
 from ..document.model import Document, Facts, Items, Paragraph, Row, Section, Table, filled
-from ..labels import with_names
+from ..rows.names import prefix_quantity, with_names
 from ..run.measure import Measurements
-from ..tables.cells import DASH, number
-from ..tables.rows import prefix_quantity
 from . import many_bodies, random_bodies
 from .report import records
 

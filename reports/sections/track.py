@@ -6,17 +6,20 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from conservative.benchmarks.measures.drift_class import DriftClass, classify
-from conservative.benchmarks.versions.changes import Transition, list_transitions
-from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Spread, ratio
+from conservative.benchmarks.measures.drift_class import SMALL, DriftClass, classify
+from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
+from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Fit, Observation, Spread, ratio
 from conservative.outcome import Outcome, OutcomeKind
 
+from ..document.cells import DASH, number, outcome_cell, outcome_text
 from ..document.model import Cell, Check, Document, Facts, Grade, Items, Paragraph, Role, Row, Section, Style, Table, filled
-from ..tables.cells import DASH, number, outcome_cell
-from ..tables.changes import drift_text, order_text, sentence
 
 NOTHING_CHANGED = "No conclusion changed."
 NO_END = "no setting reaches the end of a run"
+PERCENT = 0.01
+"""Smallest relative drift that is written in percent."""
+WHOLE = 0.25
+"""An order within this distance of a whole number is written as that number."""
 _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
 _WORDS = (
     "Orders are over shorter and shorter steps; everything else is at the step of the scene. A time ratio is relative to "
@@ -170,3 +173,64 @@ def _change_record(transition: Transition) -> dict[str, Any]:
     names = {"scene": now.scene, "setting": now.setting, "from": was.version, "to": now.version}
     aspects = [{"aspect": each.aspect.value, "quantity": each.quantity, "lost": each.lost} for each in transition.changes]
     return {**names, "sentence": sentence(transition), "lost": bool(transition.lost), "changes": aspects}
+
+
+def sentence(transition: Transition) -> str:
+    """Return the changes of a transition in one sentence; empty if there are none."""
+    if not transition.changes:
+        return ""
+    now = transition.now
+    texts = [_phrase(change, f"at dt = {now.dt:g} s") for change in transition.changes]
+    attitude, rates = Aspect.ATTITUDE_ORDER.value, Aspect.RATES_ORDER.value
+    if attitude in texts[0] and [texts[0].replace(attitude, rates)] == texts[1:2]:  # both orders changed in the same way
+        texts[:2] = [texts[0].replace(f"the {attitude}", "the orders of attitude and rates")]
+    head = f"{now.setting or 'default'} on {now.scene}: from {transition.was.version} to {now.version} "
+    return head + ", ".join(texts)
+
+
+def order_text(order: float) -> str:
+    """Return an order as text: 2 for 1.98, 2.3 for 2.31."""
+    whole = round(order)
+    return str(whole) if abs(order - whole) < WHOLE else f"{order:.1f}"
+
+
+def drift_text(drift: float) -> str:
+    """Return a relative drift as text, in percent from `PERCENT` on."""
+    return f"{100 * drift:.2g} %" if PERCENT <= abs(drift) < math.inf else number(drift, 1)
+
+
+def _phrase(change: Change, at: str) -> str:
+    match change.was, change.now:
+        case Outcome() as was, Outcome() as now:
+            return _outcome_change(was, now, at)
+        case Fit() as was, Fit() as now:
+            return _order_change(was, now, change.aspect.value)
+        case Spread(), Spread(value, low, high) if change.aspect is Aspect.TIME:
+            return f"a step takes {number(value)} times as long ({number(low)} to {number(high)})"
+        case Spread(before), Spread(after) if change.aspect is Aspect.ERROR:
+            verb = "rose" if after > before else "fell"
+            return f"the attitude error {at} {verb} from {number(before)} to {number(after)} rad"
+        case Spread(before), Spread(after):
+            turned = before * after < 0 and min(abs(before), abs(after)) > SMALL
+            verb = "turned" if turned else "rose" if abs(after) > abs(before) else "fell"
+            texts = [("+" if turned and value > 0 else "") + drift_text(value) for value in (before, after)]
+            return f"the {change.quantity} drift {at} {verb} from {texts[0]} to {texts[1]}"
+    raise AssertionError(change)
+
+
+def _outcome_change(was: Outcome, now: Outcome, at: str) -> str:
+    text = str(now) if now.kind is OutcomeKind.CRASHED else outcome_text(now)
+    if was.kind is OutcomeKind.UNSUPPORTED:
+        return "it appeared" + ("" if now.ok else f", {text} {at}")
+    if now.kind is OutcomeKind.UNSUPPORTED:
+        return "it disappeared"
+    return f"the outcome {at} went from {outcome_text(was)} to {text}"
+
+
+def _order_change(was: Fit, now: Fit, name: str) -> str:
+    if math.isnan(now.slope):
+        return f"no {name} can be fitted any more, which was {order_text(was.slope)} ({now.reason})"
+    if math.isnan(was.slope):
+        return f"an {name} can be fitted, {order_text(now.slope)}, which was not so before ({was.reason})"
+    verb = "rose" if now.slope > was.slope else "fell"
+    return f"the {name} {verb} from {order_text(was.slope)} to {order_text(now.slope)}"

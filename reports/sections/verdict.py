@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..document.model import Item, Items, Paragraph, Role, Section, filled
-from ..tables import summary as summaries
-from ..tables.scene_contests import each_step
-from ..tables.summary import Summary
 from . import headline, random_bodies
+from . import summary as summaries
 from .measured import Measured
+from .scene_contests import each_step
 from .scenes import families_figure
+from .summary import Summary
 
 
 def section(measured: Measured, of_scenes: dict[str, Summary]) -> Section:

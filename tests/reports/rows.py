@@ -5,7 +5,7 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import Measurement
 from conservative.method import Role
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.reports.labels import with_names
+from conservative.reports.rows.names import with_names
 
 
 def row(study, method, measure, value, dt=0.1, **fields):

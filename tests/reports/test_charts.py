@@ -13,7 +13,8 @@ from conservative.benchmarks.measures.measure import Measure
 from conservative.reports.charts import figures, recommendation, spheres
 from conservative.reports.charts.style import _OTHERS, PALETTE, power_axis
 from conservative.reports.document.contrast import DARK_PAPER, LEAST, LIGHT_PAPER, colours_in, contrast, stand_ins
-from conservative.reports.tables import orders, work_precision
+from conservative.reports.rows import lines
+from conservative.reports.rows import points as work_precision
 
 from .rows import frame, point, row, table
 
@@ -46,8 +47,8 @@ def test_time_against_error_is_in_microseconds_and_radians():
 
 def test_convergence_is_in_seconds_and_radians():
     rows = [row("convergence", "a", Measure.ATTITUDE_MAX, dt**2, dt) for dt in (0.4, 0.2, 0.1)]
-    errors = orders.errors(frame(rows), Measure.ATTITUDE_MAX)
-    spec = figures.convergence(errors, orders.fit_ends(orders.fits(errors)), "made_up").to_dict()
+    errors = lines.errors(frame(rows), Measure.ATTITUDE_MAX)
+    spec = figures.convergence(errors, lines.fit_ends(lines.fits(errors)), "made_up").to_dict()
     assert set(axes(spec)) == {("x", "dt", "step, s"), ("y", "error", "largest attitude error over the run, rad")}
 
 

@@ -29,7 +29,7 @@ from conservative.reports.document.model import (
     Table,
     filled,
 )
-from conservative.reports.tables.work_precision import front, points
+from conservative.reports.rows.points import front, points
 
 from .made_up import table
 

@@ -12,13 +12,13 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.cli.completion import engine_lists
 from conservative.reports.cli.options import split_list
 from conservative.reports.document.model import Grade
+from conservative.reports.rows.names import OF_ENGINES, of_classes
+from conservative.reports.rows.points import all_points, points
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.run.terms import differences, terms
 from conservative.reports.sections.closing import verdict
 from conservative.reports.sections.engines import OVER_STEPS, beside, engine_rows, every_setting, figure, picture_points
-from conservative.reports.tables.classes import OF_ENGINES, of_classes
-from conservative.reports.tables.work_precision import all_points, points
 
 from .made_up import SCENE, STEPS, at_step, over_steps
 from .rows import point, table

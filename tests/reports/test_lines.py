@@ -13,9 +13,9 @@ from conservative.benchmarks.measures.measurement import Measurement, Samples
 from conservative.benchmarks.studies import sphere_curves, studies
 from conservative.benchmarks.studies.study import Study
 from conservative.method import Role
-from conservative.reports.labels import with_names
+from conservative.reports.rows import lines
+from conservative.reports.rows.names import with_names
 from conservative.reports.sections import paper
-from conservative.reports.tables import lines
 
 from .made_up import curves
 

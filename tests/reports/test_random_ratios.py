@@ -9,6 +9,7 @@ from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
 from conservative.reports.charts.random_ratios import ratios as draw_ratios
+from conservative.reports.document.cells import tolerance
 from conservative.reports.document.model import Table, walk
 from conservative.reports.report import render
 from conservative.reports.run.measure import Measurements
@@ -18,7 +19,6 @@ from conservative.reports.run.terms import terms
 from conservative.reports.sections import random_bodies
 from conservative.reports.sections.random_bodies import ANY, ratios
 from conservative.reports.sections.report import build
-from conservative.reports.tables.cells import tolerance
 from conservative.scenes.random_body import name_of
 
 from .made_up import measurements

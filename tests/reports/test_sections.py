@@ -17,11 +17,11 @@ from conservative.reports.document import html
 from conservative.reports.document import json as json_renderer
 from conservative.reports.document.model import Figure, Section, Table, walk
 from conservative.reports.report import render
+from conservative.reports.rows import lines
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import Plan, plan_report
 from conservative.reports.run.provenance import Lock, provenance
 from conservative.reports.sections.report import build
-from conservative.reports.tables import lines
 
 from .made_up import at_step, convergence, curves, measurements, over_steps
 from .rows import frame, parts, point, row

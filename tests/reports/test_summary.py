@@ -7,12 +7,11 @@ import pytest
 
 from conservative import registry
 from conservative.benchmarks.measures import measurement
-from conservative.reports.labels import with_names
-from conservative.reports.sections import random_bodies
+from conservative.reports.rows import points as families
+from conservative.reports.rows.names import MethodClass, class_of, with_names
+from conservative.reports.rows.points import points
+from conservative.reports.sections import random_bodies, summary
 from conservative.reports.sections.headline import first_lost, of_points, of_random_bodies
-from conservative.reports.tables import families, summary
-from conservative.reports.tables.classes import MethodClass, class_of
-from conservative.reports.tables.work_precision import points
 
 from .rows import frame, point, row
 from .test_random_ratios import ENGINE_ALONE, SLOWER, TWICE

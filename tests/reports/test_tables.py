@@ -11,15 +11,15 @@ import conservative as cv
 from conservative.benchmarks.measures.measure import Measure
 from conservative.errors import Diverged
 from conservative.outcome import OK, Outcome, OutcomeKind
-from conservative.reports import labels
-from conservative.reports.document import markdown
+from conservative.reports.document import cells, markdown
+from conservative.reports.document.cells import grade_drift
 from conservative.reports.document.model import Cell, Grade, Table
+from conservative.reports.rows import lines, names
+from conservative.reports.rows.points import points
 from conservative.reports.run import single_run
-from conservative.reports.sections import failures, hard_cases, recommendation, scenes
+from conservative.reports.sections import failures, hard_cases, recommendation, scene_contests, scenes
 from conservative.reports.sections import run as single
-from conservative.reports.tables import cells, orders, overview, scene_contests
-from conservative.reports.tables.cells import grade_drift
-from conservative.reports.tables.work_precision import points
+from conservative.reports.sections.measured import scenes_in_trouble
 from conservative.trajectory import Trajectory
 
 from . import made_up, rows
@@ -53,7 +53,7 @@ def test_number(value, text):
     ],
 )
 def test_what_a_method_is_called(parts, text):
-    assert labels.display_name(*parts) == text
+    assert names.display_name(*parts) == text
 
 
 def test_rows_have_the_names_of_their_method_and_of_their_line():
@@ -112,7 +112,7 @@ def test_errors_have_the_unit_that_they_are_measured_in():
 
 def order_table(found):
     table = frame(found)
-    fits = (orders.fits(orders.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
+    fits = (lines.fits(lines.errors(table, measure)) for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
     return scenes.order(*fits, "made_up")
 
 
@@ -242,7 +242,7 @@ def test_methods_are_ranked_by_what_they_keep():
         made_up.row("long_runs", "mujoco", "energy drift max", 1e-2, role="engine"),
         made_up.row("long_runs", "reduced", "energy drift max", 1e-15),
     ]
-    body = overview.conservation(frame(found), "brick_flip").rows
+    body = scenes.conservation(frame(found), "brick_flip").rows
     assert [line[0] for line in body] == ["reduced", "mujoco", "b"]
 
 
@@ -251,8 +251,8 @@ def test_a_step_that_a_method_does_not_have_is_no_failure_on_the_scene():
         made_up.row("convergence", "a", "attitude error max", math.nan, outcome="unsupported"),
         made_up.row("long_runs", "a", "energy drift max", 1e-15),
     ]
-    assert overview.scenes_in_trouble(frame(found)).empty
-    assert len(overview.scenes_in_trouble(frame(found[:1]))) == 1
+    assert scenes_in_trouble(frame(found)).empty
+    assert len(scenes_in_trouble(frame(found[:1]))) == 1
 
 
 @pytest.mark.parametrize(
@@ -316,4 +316,4 @@ def test_longest_steps_are_a_matrix():
     ]
     body = hard_cases.stability(frame(found)).rows
     assert [str(line[1]) for line in body] == ["≈ 1 rad, then not converged", "✓ 10 rad and more", "– unsupported"]
-    assert overview.scenes_in_trouble(frame(found)).empty
+    assert scenes_in_trouble(frame(found)).empty

@@ -8,14 +8,13 @@ import pytest
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.throughput import EXACT
-from conservative.reports.labels import with_names
 from conservative.reports.report import render
+from conservative.reports.rows.names import MethodClass, with_names
 from conservative.reports.run.measure import Measurements
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 from conservative.reports.sections import many_bodies as throughput
 from conservative.reports.sections.report import build
-from conservative.reports.tables.classes import MethodClass
 
 from .made_up import measurements
 from .rows import row

@@ -7,10 +7,10 @@ import pytest
 from conservative.benchmarks.contest import Cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.paper import APPROXIMATE
-from conservative.reports.sections import headline
-from conservative.reports.tables import scene_contests, summary, work_precision
-from conservative.reports.tables.classes import MethodClass
-from conservative.reports.tables.work_precision import points
+from conservative.reports.rows import points as work_precision
+from conservative.reports.rows.names import MethodClass
+from conservative.reports.rows.points import points
+from conservative.reports.sections import headline, scene_contests, summary
 
 from .rows import frame, point, row, table
 

@@ -1,9 +1,17 @@
-"""Errors and times of runs over steps and tolerances: the points of lines, whose costs are in `benchmarks.contest`."""
+"""Errors and times of runs over steps and tolerances, and the picture of the best of each family.
+
+A picture has the columns `name` (of the family), `class`, `single` (whether a line is that of one setting), `line` (its name),
+`setting` (of a point), `error` (rad), `time` (s per simulated second), `sample` (s per sample, of a scene), `dt` (s), and
+`within` (on how many bodies the error is reached, if there are several).
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
 
+import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
@@ -11,8 +19,7 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from .classes import class_of
-from .rows import of_study, with_outcome
+from .names import OF_ENGINES, MethodClass, class_of, display_name, of_study, with_outcome
 
 DECADES = tuple(10.0**-k for k in range(1, 14))
 _NAMES = ["family", "version", "setting", "series_setting", "name", "line"]
@@ -78,3 +85,62 @@ def front(points: pd.DataFrame) -> pd.DataFrame:
     ordered = points.sort_values(["time", "error"])
     best_before = ordered["error"].cummin().shift(fill_value=math.inf)
     return ordered[ordered["error"] < best_before]
+
+
+COLUMNS = ("name", "family", "class", "single", "line", "setting", "error", "time", "sample", "dt", "within")
+AT_FIRST = 8
+"""Largest number of lines that a picture shows at first."""
+SAME = 0.01
+"""Relative difference of two values that a picture does not show."""
+
+
+def picture(points: pd.DataFrame) -> pd.DataFrame:
+    """Return the picture of the points of one scene: of each family the front, and all single settings."""
+    named = points.assign(
+        name=[_family_name(*row) for row in zip(points["family"], points["version"], points["class"], strict=True)],
+        line=points["name"],
+        setting=points["method"],
+        within="",
+    )
+    best = [front(members).assign(single=False, line=name) for name, members in named.groupby("name", sort=False)]
+    return joined([*best, named.assign(single=True)])
+
+
+def joined(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Return parts of a picture as one, with the columns of a picture."""
+    filled = [part.reindex(columns=list(COLUMNS)) for part in parts if len(part)]
+    return pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(COLUMNS))
+
+
+def _family_name(family: str, version: str, kind: str) -> str:
+    name = display_name(family, version, "")
+    return f"{name}, integrable motions only" if kind == MethodClass.SOLUTION else name
+
+
+def first_names(picture: pd.DataFrame) -> tuple[str, ...]:
+    """Return the families that a picture shows at first: the best of ours and of engines in turn."""
+    best = picture[~picture["single"].astype(bool)]
+    ranked = sorted((_rank(line), str(name)) for name, line in best.groupby("name", sort=False))
+    classes = dict(zip(best["name"], best["class"], strict=True))
+    sides = [[name for _, name in ranked if (classes[name] in OF_ENGINES) is engine] for engine in (False, True)]
+    return tuple(name for pair in zip_longest(*sides) for name in pair if name)[:AT_FIRST]
+
+
+def _rank(line: pd.DataFrame) -> tuple[int, float]:
+    """Return the smallest decade of error that a line reaches, and its median time."""
+    return -int(-math.log10(max(float(line["error"].min()), 1e-16)) // 3), float(line["time"].median())
+
+
+def under(lines: Iterable[tuple[str, pd.DataFrame]], x: str, y: str) -> Iterator[str]:
+    """Yield a sentence for each line under which others lie exactly; lines have columns x and y, numbers above 0."""
+    left = dict(lines)
+    while left:
+        name, line = left.popitem()
+        hidden = [other for other, points in left.items() if _same(points, line, x, y)]
+        if hidden:
+            yield f"Exactly under {name}: {', '.join(hidden)}."
+        left = {other: points for other, points in left.items() if other not in hidden}
+
+
+def _same(one: pd.DataFrame, other: pd.DataFrame, x: str, y: str) -> bool:
+    return len(one) == len(other) and all(np.allclose(one[c], other[c], rtol=SAME, atol=0) for c in (x, y))

@@ -14,11 +14,10 @@ from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind
 
+from ..document.cells import DASH, factor, number, tolerance
 from ..document.model import Cell, Row, Style, Table
-from .cells import DASH, factor, number, tolerance
-from .classes import OF_ENGINES, MethodClass, of_classes
-from .families import first_names, picture
-from .rows import without_outcome
+from ..rows.names import OF_ENGINES, MethodClass, of_classes, without_outcome
+from ..rows.points import first_names, picture
 from .scene_contests import EachStep
 
 ERRORS = (1e-3, 1e-6, 1e-9)

@@ -12,9 +12,9 @@ from conservative.benchmarks.contest import Cheapest, Contest, contests, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.each_step import ERROR
 
-from .cells import DASH, Row, Table, factor, tolerance
-from .classes import OF_ENGINES, MethodClass, of_classes
-from .work_precision import DECADES, points
+from ..document.cells import DASH, Row, Table, factor, tolerance
+from ..rows.names import OF_ENGINES, MethodClass, of_classes
+from ..rows.points import DECADES, points
 
 STUDY = "each_step"
 """Name of the study with every step stored."""
@@ -69,7 +69,7 @@ def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DE
 def as_table(points: pd.DataFrame, interval: float, each: EachStep = NO_STEPS) -> Table:
     """Return the cheapest method of each class of ours and of the engines, and how many times as fast ours is.
 
-    A row for each decade, then two with the samples of `each`. `points` are those of one scene (see `work_precision.points`),
+    A row for each decade, then two with the samples of `each`. `points` are those of one scene (see `rows.points`),
     whose samples are `interval` s apart.
     """
     body = [[tolerance(error), *row] for error, row in _rows(costs(points, DECADES), interval, DECADES)]

@@ -1,0 +1,1 @@
+"""What sections and charts read from rows: names, classes, points and lines."""

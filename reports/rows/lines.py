@@ -1,0 +1,136 @@
+"""Lines of pictures: samples over time, and errors over steps with their fitted orders."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from conservative.attitude import Array
+from conservative.benchmarks.measures.convergence_order import Order, observed_order
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies import long_runs, sphere_curves
+from conservative.benchmarks.studies.paper_figures import BRICK, ENERGY, EXACT, MOMENTUM, RATES, TOP, X1, X2
+from conservative.outcome import OutcomeKind
+
+from .names import of_measure, of_study, with_outcome
+
+ERROR_COLUMNS = ("scene", "method", "family", "name", "dt", "error")
+ANALYTICAL = "analytical"
+"""Name of the exact motion in the paper's figure 2."""
+THIN = 40
+"""Samples of a line of drift on the page; a few are enough, as it only grows."""
+
+
+def _samples_of(samples: pd.DataFrame, study: str) -> pd.DataFrame:
+    return samples[samples["study"] == study]
+
+
+def drifts(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the drifts over time: columns scene, family, name, t (s), quantity, drift (relative, the largest so far).
+
+    Of methods that differ only in tolerance, those with the loosest and the tightest are included.
+    """
+    rows = _extremes(_samples_of(samples, "long_runs")).rename(columns={"value": "drift"})
+    return rows[["scene", "family", "name", "t", "quantity", "drift"]].reset_index(drop=True)
+
+
+def _extremes(rows: pd.DataFrame) -> pd.DataFrame:
+    names = rows.groupby(["scene", "line"])["name"]
+    return rows[(rows["name"] == names.transform("first")) | (rows["name"] == names.transform("last"))]
+
+
+def thin(drifts: pd.DataFrame) -> pd.DataFrame:
+    """Return drifts with about `THIN` samples of each line, including its last."""
+    every = max(1, long_runs.SAMPLES // THIN)
+    left = drifts.groupby(["scene", "name", "quantity"], sort=False).cumcount(ascending=False)
+    return drifts[left % every == 0].reset_index(drop=True)
+
+
+def curves(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the curves on spheres: columns scene, method, family, name, t (s), and the point x, y, z in radii."""
+    keys = ["scene", "method", "family", "name", "t"]
+    return _points(_samples_of(samples, "sphere_curves"), keys, sphere_curves.AXES)
+
+
+def _points(rows: pd.DataFrame, keys: list[str], quantities: tuple[str, ...]) -> pd.DataFrame:
+    """Return a row for each point, with a column for each quantity, in the order of measurement."""
+    wide = rows[rows["quantity"].isin(quantities)].pivot(index=keys, columns="quantity", values="value").reset_index()
+    order = rows[keys].drop_duplicates()
+    return order.merge(wide, on=keys).reindex(columns=[*keys, *quantities])
+
+
+def body_rates(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return the paper's figure 1(a): columns t (s), component, rate (rad/s) of the brick's body rates."""
+    rows = _of_figure(samples, BRICK)
+    rows = rows[rows["quantity"].isin(RATES)].rename(columns={"quantity": "component", "value": "rate"})
+    return rows[["t", "component", "rate"]].reset_index(drop=True)
+
+
+def conservation_errors(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return figures 1(b) and 1(c): columns t (s), method, energy and momentum, errors of energy and |L|, relative, signed."""
+    return _points(_of_figure(samples, BRICK), ["t", "method"], (ENERGY, MOMENTUM))
+
+
+def centre_of_mass(samples: pd.DataFrame) -> pd.DataFrame:
+    """Return figures 2(b) and 2(c): columns t (s), run, x1, x2 (m), the top's centre of mass for two steps, and exact."""
+    rows = _of_figure(samples, TOP)
+    runs = [_run(method, dt) for method, dt in zip(rows["method"], rows["dt"], strict=True)]
+    return _points(rows.assign(run=pd.Series(runs, index=rows.index, dtype="string")), ["t", "run"], (X1, X2))
+
+
+def _of_figure(samples: pd.DataFrame, scene: str) -> pd.DataFrame:
+    rows = _samples_of(samples, "paper_figures")
+    return rows[rows["scene"] == scene]
+
+
+def _run(method: str, dt: float) -> str:
+    return ANALYTICAL if method == EXACT else f"Δt = {dt:g} s"
+
+
+def errors(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
+    """Return the errors of the convergence study: columns scene, method, family, name, dt (s), error (unit of the measure)."""
+    rows = with_outcome(of_measure(of_study(table, "convergence"), measure), OutcomeKind.OK)
+    return rows.rename(columns={"value": "error"})[list(ERROR_COLUMNS)].reset_index(drop=True)
+
+
+def fits(errors: pd.DataFrame) -> pd.DataFrame:
+    """Return the order of each line of `errors`.
+
+    Columns scene, method, family, name, slope, stderr, floor, points, coarse and fine (the window, s), error_coarse and
+    error_fine (of the fit at its ends), text (slope and its standard error), reason (why there is no fit); NaN without a fit.
+    """
+    keys = list(ERROR_COLUMNS[:4])
+    groups = errors.groupby(keys, sort=False)
+    return pd.DataFrame([dict(zip(keys, key, strict=True)) | _fit(line) for key, line in groups], columns=[*keys, *_FIT])
+
+
+def with_slopes(rows: pd.DataFrame, fits: pd.DataFrame) -> pd.DataFrame:
+    """Return errors or fits of one scene with the slope in each name: `reduced (2.00 ± 0.01)`."""
+    slopes = dict(zip(fits["name"], fits["text"], strict=True))
+    return rows.assign(name=[f"{name} ({slopes[name]})" for name in rows["name"]])
+
+
+def fit_ends(fits: pd.DataFrame) -> pd.DataFrame:
+    """Return the two ends of each fitted line as points: columns name, dt (s), error (rad)."""
+    ends = [fits.rename(columns={end: "dt", f"error_{end}": "error"})[["name", "dt", "error"]] for end in ("coarse", "fine")]
+    return pd.concat(ends, ignore_index=True).dropna()
+
+
+_FIT = ("slope", "stderr", "floor", "points", "text", "reason", "coarse", "fine", "error_coarse", "error_fine")
+
+
+def _fit(line: pd.DataFrame) -> dict[str, object]:
+    steps, values = line["dt"].to_numpy(), line["error"].to_numpy()
+    order = observed_order(steps, values)
+    used = list(order.used)
+    ends = _ends(order, np.log(steps[used]), np.log(values[used])) if used else (math.nan,) * 4
+    text = "no order" if order.reason else f"{order.slope:.2f} ± {order.stderr:.2f}"
+    return dict(zip(_FIT, (order.slope, order.stderr, order.floor, len(used), text, order.reason, *ends), strict=True))
+
+
+def _ends(order: Order, x: Array, y: Array) -> tuple[float, float, float, float]:
+    """Return the coarse and the fine step of the fit, and the fitted errors there."""
+    heights = y.mean() + order.slope * (x[[0, -1]] - x.mean())
+    return float(np.exp(x[0])), float(np.exp(x[-1])), float(np.exp(heights[0])), float(np.exp(heights[1]))

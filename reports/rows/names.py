@@ -1,0 +1,133 @@
+"""Names and classes of methods, and the selection of rows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from enum import StrEnum
+from functools import lru_cache
+
+import pandas as pd
+
+from conservative import registry
+from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import outcome_of
+from conservative.benchmarks.recommendation.probe import Probe
+from conservative.benchmarks.recommendation.recommend import Advice
+from conservative.benchmarks.studies.case import names_of
+from conservative.benchmarks.studies.selection import tolerance_setting
+from conservative.errors import BadInput, MissingEngine, NotLoadable
+from conservative.method import Method, Role
+from conservative.outcome import Outcome, OutcomeKind
+from conservative.scene import Scene
+from conservative.scenes.random_body import random_body
+
+_PADDED = re.compile(r"(?<=\de)-0(?=\d)")
+
+
+def display_name(family: str, version: str, setting: str) -> str:
+    """Return the name of a method in tables and pictures: `mujoco 4.0.0 RK4`, with tolerances such as 1e-6 instead of 1e-06."""
+    return " ".join(filter(None, (family, "" if "@" in family else version, _PADDED.sub("-", setting))))
+
+
+def with_names(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return measurements or samples with two more columns: `name` of the method, and `line`, the name of its series."""
+    return rows.assign(name=_names(rows, "setting"), line=_names(rows, "series_setting"))
+
+
+def _names(rows: pd.DataFrame, setting: str) -> pd.Series[str]:
+    parts: Iterable[tuple[str, ...]] = zip(*(rows[column] for column in ("family", "version", setting)), strict=True)
+    return pd.Series([display_name(*part) for part in parts], index=rows.index, dtype="string")
+
+
+def setting_text(probe: Probe) -> str:
+    """Return the step or the tolerance of a probe."""
+    name = tolerance_setting(probe.method)
+    return f"dt = {probe.dt:.7g} s" if name is None else f"{name} = {probe.setting:.0e}"
+
+
+def method_text(advice: Advice) -> str:
+    """Return the name of a method with the version of its engine, without the searched setting."""
+    if advice.best is None:
+        return advice.line.replace(":", " ")
+    names = names_of(advice.best.method)
+    return display_name(names["family"], names["version"], names["series_setting"])
+
+
+class MethodClass(StrEnum):
+    """The class in which a method is compared, in the order of tables."""
+
+    GENERAL = "our general integrators"
+    SOLUTION = "our solutions of integrable motions"
+    SOLVER = "ODE solvers"
+    ENGINE = "physics engines"
+
+
+OF_ENGINES = (MethodClass.SOLVER, MethodClass.ENGINE)
+"""Classes of engines."""
+
+
+def class_of(role: str, method: str) -> MethodClass:
+    """Return the class of a method; one that cannot be loaded is a general integrator or a physics engine.
+
+    A method of ours is a general integrator if it supports a random body in a field, whose motion has no closed form. A solver
+    has a tolerance, a physics engine a step size.
+    """
+    loaded = _load(method)
+    if role == Role.OURS:
+        return MethodClass.SOLUTION if loaded and loaded.unsupported(_body()) else MethodClass.GENERAL
+    return MethodClass.SOLVER if loaded and tolerance_setting(loaded) else MethodClass.ENGINE
+
+
+def of_classes(points: pd.DataFrame, *kinds: MethodClass) -> pd.DataFrame:
+    """Return the points of methods of some classes."""
+    return points[points["class"].isin(kinds)]
+
+
+def without_solutions(points: pd.DataFrame) -> pd.DataFrame:
+    """Return the points except those of our closed forms."""
+    return points[points["class"] != MethodClass.SOLUTION]
+
+
+@lru_cache(maxsize=1024)
+def _load(method: str) -> Method | None:
+    try:
+        return registry.method(method)
+    except (BadInput, MissingEngine, NotLoadable):
+        return None
+
+
+@lru_cache(maxsize=1)
+def _body() -> Scene:
+    return random_body()
+
+
+def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.DataFrame:
+    """Return the rows of a study about methods, without the agreement of the reference solutions."""
+    rows = table[(table["study"] == study) & (table["measure"] != Measure.AGREEMENT.text)]
+    return rows if scene is None else rows[rows["scene"] == scene]
+
+
+def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.DataFrame:
+    """Return the rows of a measure; of a drift, those of one quantity."""
+    return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
+
+
+def prefix_quantity(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows with the quantity before the measure: `energy drift max`."""
+    return rows.assign(measure=(rows["quantity"] + " " + rows["measure"]).str.lstrip())
+
+
+def outcomes(rows: pd.DataFrame) -> list[Outcome]:
+    """Return the outcome of each row."""
+    return [outcome_of(row) for _, row in rows.iterrows()]
+
+
+def with_outcome(rows: pd.DataFrame, *kinds: OutcomeKind) -> pd.DataFrame:
+    """Return the rows with one of some outcomes."""
+    return rows[rows["outcome"].isin([kind.value for kind in kinds])]
+
+
+def without_outcome(rows: pd.DataFrame, *kinds: OutcomeKind) -> pd.DataFrame:
+    """Return the rows with none of some outcomes."""
+    return rows[~rows["outcome"].isin([kind.value for kind in kinds])]
