@@ -1,4 +1,4 @@
-"""One scene, one method, one grid: run it, whatever happens, and write rows about it."""
+"""A case: one scene, one method, one grid. It runs, and its result or failure becomes rows."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Case:
 
     @cached_property
     def _subject(self) -> dict[str, Any]:
-        """Columns that all rows share, looked up once: the version of an engine can be in a file."""
+        """Columns that all rows share. Cached, because the version of an engine can be in a file."""
         subject = {"study": self.study, "scene": self.scene.name, **self.drawn._asdict(), **names_of(self.method)}
         return subject | {"role": Role(self.method.role), "dt": self.grid.dt}
 
@@ -70,13 +70,13 @@ class Case:
         return Samples(**self._subject, quantity=quantity, t=t, value=value)
 
     def blanks(self, values: Iterable[Value], outcome: Outcome) -> list[Measurement]:
-        """Return a row without a value for each: what could not be measured is in the table, too."""
+        """Return a row without a value for each measure of a failed case."""
         return [self.row(value.blank, outcome) for value in values]
 
 
 def names_of(method: Method) -> dict[str, str]:
     """Return the columns with names of a method; see `Measurement`."""
-    if isinstance(method, Missing):  # as it was asked for: the engine that knows its version and settings is not there
+    if isinstance(method, Missing):  # version and settings of a missing engine are unknown
         family, _, setting = method.wanted.partition(":")
         texts = {"label": method.wanted, "family": family, "engine": family, "version": "", "setting": setting}
         return {"method": method.wanted, **texts, "series": series(method), "series_setting": setting}
@@ -98,7 +98,7 @@ def names_of(method: Method) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Success:
-    """A case that reached its end: the run, which can be called again, its first trajectory and what both cost."""
+    """A case that reached its end: the run, which can be called again, its first trajectory, and the cost of both."""
 
     run: Run
     trajectory: Trajectory
@@ -107,26 +107,26 @@ class Success:
 
 @dataclass(frozen=True)
 class Failure:
-    """A case that did not: the outcome that its rows carry."""
+    """A case that failed, with the outcome of its rows."""
 
     outcome: Outcome
 
 
 def drop_step(row: Measurement) -> Measurement:
-    """Return a row that belongs to no single step."""
+    """Return the row without a step size."""
     return replace(row, dt=float("nan"))
 
 
 def fail_unsupported(reason: str) -> Failure:
-    """Return the failure of a case that the method cannot do."""
+    """Return the failure of a case that the method does not support."""
     return Failure(Outcome(OutcomeKind.UNSUPPORTED, reason))
 
 
 def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Prepare and run a case once, and check what it gave (`Method.check`); calls of the run afterwards are not checked.
+    """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
 
-    Failures of the integration, scenes and steps that the method cannot do and exceptions out of an engine become an outcome.
-    Exceptions out of our own methods are bugs and are not caught.
+    Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome. Exceptions of our
+    methods are bugs and are not caught.
 
     Raises
     ------

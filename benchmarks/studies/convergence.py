@@ -1,4 +1,4 @@
-"""The study of convergence: errors over shorter and shorter steps, and the order that they show."""
+"""The study of convergence: errors over decreasing step sizes, and the observed order."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ ORDERS = {
     Measure.ATTITUDE_MAX: (Measure.ORDER, Measure.ORDER_STDERR),
     Measure.RATES_MAX: (Measure.ORDER_RATES, Measure.ORDER_RATES_STDERR),
 }
-"""What an order is fitted to, and the measures of the order and of its standard error."""
+"""The measure to which an order is fitted, and the measures of the order and of its standard error."""
 ERRORS = (Measure.ATTITUDE_MAX, Measure.ATTITUDE_FINAL, Measure.RATES_MAX)
-"""What is measured at every step."""
+"""Measures at every step size."""
 FEWEST_POINTS = 4
-"""Points that even a slow method gets, as far as `LINE_LIMIT` allows."""
+"""Smallest number of points, as far as `LINE_LIMIT` allows."""
 LINE_LIMIT = 8
-"""Time for all the points of a slow method's line, in units of the longest single run that a study plans for."""
+"""Time for all points of a slow method, in units of the time budget of a run."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield errors over shorter and shorter steps, and the observed order, of every method that has a step."""
+    """Yield errors over decreasing step sizes, and the observed order, of every method with a step size."""
     methods = study.competitors
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
@@ -45,7 +45,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def no_order(case: Case, skip_missing: bool) -> Failure | None:
-    """Return why a method has no order on a scene; None where it may have one."""
+    """Return the failure of a method that has no order on a scene, otherwise None."""
     if isinstance(case.method, Missing):
         missing = attempt(case, skip_missing)
         return missing if isinstance(missing, Failure) else None
@@ -60,7 +60,7 @@ def without_order(case: Case, failed: Failure) -> list[Measurement]:
 
 
 def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
-    """Yield the errors of one method at all its steps, then the orders they show."""
+    """Yield the errors of one method at all step sizes, then the observed orders."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     found: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
@@ -77,10 +77,10 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
 
 
 def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Success | Failure]]:
-    """Yield the outcome of each case, coarse to fine; what there is no time for is skipped and says so.
+    """Yield the outcome of each case, coarse to fine. Cases beyond the time budget are skipped.
 
-    A slow method gets fewer points: the coarsest `FEWEST_POINTS`, where all together fit into its time, and of finer ones those
-    that the study's longest run has room for. After a run that was ended there is none that is finer.
+    A slow method gets fewer points: the coarsest `FEWEST_POINTS` if their total time allows it, and finer ones within the time
+    budget of a run. After a run that was stopped, no finer one is made.
     """
     times: list[float] = []
     per_step = 0.0
@@ -101,13 +101,13 @@ def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Su
 
 
 def fits(study: Study, times: list[float], expected: float) -> bool:
-    """Whether a run that is expected to take a time, s, is made after others that took `times`, s."""
+    """Whether a run with an expected time, s, is within the budget after runs that took `times`, s."""
     needed = len(times) < FEWEST_POINTS and sum(times) + expected <= LINE_LIMIT * study.longest_run
     return needed or expected <= study.longest_run
 
 
 def cost_of_run(study: Study, case: Case, done: Success, first: bool) -> float:
-    """Return the wall time, s, of a run: of another call where the very first one may have included compilation."""
+    """Return the wall time, s, of a run: of a second call if the first may have included compilation."""
     if not first or done.cost.first_call < study.longest_run / 4:
         return done.cost.first_call
     again = attempt_within(study.hang_limit, case, study.skip_missing)

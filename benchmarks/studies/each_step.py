@@ -1,14 +1,14 @@
-"""The study of samples at each of a scene's own steps: what a method takes that keeps them all within an error.
+"""The study of runs that store every step of a scene: the time for an attitude error.
 
-`work_precision` reads a dozen samples, and one step leads from one to the next where a solution or a high order allows that.
-Who wants the motion at short intervals pays for each: a method with a step takes one or more to an interval, one with a
-tolerance evaluates between its own steps, which can be longer.
+`work_precision` reads twelve samples, so a method of high order can take one step from sample to sample. Samples at short
+intervals cost more: a method with a step size takes one or more steps per interval, and a method with a tolerance interpolates
+within its longer steps.
 
-* A method is taken at the coarsest of its settings whose largest attitude error, over all samples, is at most `ERROR`: so many
-  steps to an interval, or a tolerance. One that gets there at none has errors and no time.
-* It is timed twice, interleaved with all others: with all samples kept, attitude matrices and rates as a run returns them,
-  which for an engine includes the conversion from its own state (of heyoka's 0.4 to 0.7 µs a sample on the brick about
-  0.2 are its own, measured); and with the end alone kept, as all other studies do.
+* The setting of a method is the coarsest whose largest attitude error over all samples is at most `ERROR`. A method without
+  such a setting has errors and no time.
+* It is timed twice, interleaved with all others: with all samples stored as attitude matrices and rates, which for an engine
+  includes the conversion of its state (heyoka takes 0.4 to 0.7 µs per sample on the brick, of which about 0.2 are its own); and
+  with the final state only, as in all other studies.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from .time_limit import attempt_here
 from .work_precision import ROUNDS, one_of_each_series
 
 ERROR = 1e-6
-"""Largest attitude error, rad, of a method that is timed."""
+"""Attitude error, rad, that a timed method has to reach."""
 STEPS = (1, 2, 4, 8)
-"""Steps to an interval."""
+"""Steps per interval."""
 TOLERANCES = tuple(10.0**-k for k in range(4, 13))
 
 
 def keep_each(grid: Grid, times: int = 1) -> Grid:
-    """Return a grid of `times` as many steps with a sample as often as before."""
+    """Return a grid with `times` as many steps and as many samples."""
     return Grid(grid.dt, grid.n_steps * times, grid.every)
 
 
 KEPT: dict[Measure, Extend] = {Measure.TIME_SAMPLED: keep_each, Measure.TIME: keep_end}
-"""What is timed, and the grid of its runs: that of a case, with so many times as many steps."""
+"""The timed measures, and the functions that lengthen the grid of their runs."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield the errors of every method up to the setting that gets to `ERROR`, and both times of that."""
+    """Yield the errors of every method up to the setting that reaches `ERROR`, and both times of that setting."""
     methods = one_of_each_series(study)
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
@@ -65,7 +65,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the settings of a method, coarse to fine; the one whose row says so of a method that cannot do the scene."""
+    """Return the settings of a method, coarse to fine; a single case if the method does not support the scene."""
     setting, grid = tolerance_setting(method), grid_for(scene, scene.dt)
     if method.unsupported(scene) or (setting is None and method.order is None):
         return [Case(study.name, scene, method, grid)]
@@ -77,7 +77,7 @@ def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
 
 
 def coarsest(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
-    """Yield the errors of a method's settings; return the first that gets to `ERROR`, alone in a list, or none."""
+    """Yield the errors of a method's settings; return a list of the first setting that reaches `ERROR`, or an empty list."""
     for case, outcome in attempt_each(study, settings):
         if isinstance(outcome, Failure):
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)

@@ -1,4 +1,4 @@
-"""Which engines, and which settings of them, the studies of engines take."""
+"""Engines and settings of the studies of engines."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from conservative.scene import Scene
 from .selection import Missing
 
 ALL = "all"
-"""Stands for every engine that is installed: beside us, or, in its newest version there, in an environment."""
+"""The name of all installed engines: those of this environment, and the newest version of each in an environment of its own."""
 
 
 @dataclass(frozen=True)
 class MissingVersion(Missing):
-    """Stands in a table for an engine that has no environment, or none of the version `wanted_version`."""
+    """Placeholder for an engine without an environment, or without one of the version `wanted_version`."""
 
     wanted_version: str = ""
 
@@ -31,19 +31,19 @@ class MissingVersion(Missing):
 
 
 def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
-    """Return the settings of engines by name: what each is as installed, then its variants.
+    """Return the settings of engines by name: as installed, then their variants.
 
     Parameters
     ----------
     names
-        `NAME`, for the engine beside us, or else the newest version that is installed; `NAME==VERSION`; or `ALL`.
+        `NAME` for the engine in this environment, or else the newest installed version; `NAME==VERSION`; or `ALL`.
     skip_missing
         A `Missing` method for each name that is not installed, instead of an error.
 
     Raises
     ------
     BadInput
-        A name is unknown or cannot be read, or nothing is installed that `ALL` could stand for.
+        A name is unknown or malformed, or `ALL` is given and no engine is installed.
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
@@ -55,9 +55,9 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
 
 
 def list_installed() -> tuple[str, ...]:
-    """Return the engines that are installed: those beside us, then the newest version of each in an environment.
+    """Return the installed engines: those in this environment, then the newest version of each in an environment of its own.
 
-    An environment with the version that is also beside us is left out: the numbers are the same.
+    If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """
     here = {name: _version_here(family) for name, family in registry.list_families().items() if family.role == Role.ENGINE}
     newest = {environment.engine: environment for environment in _environments()}
@@ -72,7 +72,7 @@ def _environments() -> Iterator[Environment]:
 
 
 def _version_here(family: type[Method]) -> str | None:
-    """Return the version of an engine beside us; None where it is not installed."""
+    """Return the version of an engine in this environment; None if it is not installed."""
     try:
         return family().maker.version
     except MissingEngine:
@@ -95,7 +95,7 @@ def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
 
 
 def _family(engine: str, version: str) -> type[Method]:
-    """Return the class of an engine: of a version, in an environment; otherwise beside us, where it is registered so."""
+    """Return the class of an engine: in an environment if there is a version, otherwise in this environment."""
     beside_us = {name for name, family in registry.list_families().items() if family.role == Role.ENGINE}
     known = {*registry.list_engines(), *(() if version else beside_us)}
     if engine not in known:

@@ -1,7 +1,7 @@
-"""The study of engines at one and the same step, the scene's own: errors, drifts, turns over, and the time of a step.
+"""The study of engines at the scene's step size: errors, drifts, flips and the time per step.
 
-Times are taken within each engine's own process, in rounds that are interleaved across all of them; one computes at a time. A
-process that crashes or hangs costs the rows of its own method, which say so.
+Times are measured in the process of each engine, in rounds interleaved across all engines, one engine at a time. A crash or a
+hang affects the rows of one method only.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from .study import Progress, Study
 from .time_limit import attempt_here
 
 AS_INSTALLED = "as installed"
-"""Detail of the rows about an engine with nothing set but the step."""
+"""Detail of the rows of an engine as installed."""
 FIRST_LIMIT = 180.0
 """Time, s, that the first run of a setting may take: importing and compiling an engine can take a minute."""
 TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield what each engine is, its errors and drifts with every step a sample, and its times with a few samples."""
+    """Yield the properties of each engine, its errors and drifts with every step stored, and its times with a few samples."""
     methods = study.competitors
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
@@ -57,7 +57,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def facts(case: Case, outcome: Outcome) -> list[Measurement]:
-    """Return what is known of an engine, however its run ended: bits of its numbers, and the order that is expected, or nan."""
+    """Return the properties of an engine: bits of its numbers, and the expected order or nan."""
     method = case.method
     if isinstance(method, Missing):
         return []
@@ -69,7 +69,7 @@ def facts(case: Case, outcome: Outcome) -> list[Measurement]:
 
 
 def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, TimedRun | None]:
-    """Yield the rows of one engine but for its times; return the run to be timed, None where there is none."""
+    """Yield the rows of one engine except its times; return the run to be timed, or None."""
     outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
     yield from facts(case, outcome.outcome if isinstance(outcome, Failure) else OK)
     yield from accuracy(case, outcome, truth)
@@ -85,17 +85,17 @@ def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measuremen
 
 
 def keep_few(grid: Grid, share: float) -> Grid:
-    """Return the same steps, of a slow run only the first `share`, with as many samples as runs over several steps have."""
+    """Return the same steps (the first `share` of a slow run) with few samples."""
     n_steps = math.ceil(grid.n_steps * min(1.0, share))
     return Grid(grid.dt, n_steps, math.ceil(n_steps / SAMPLES))
 
 
 def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
-    """Return errors and drifts, of a free body also how often it turned over; without values where the run failed."""
+    """Return errors, drifts and, for a free body, the number of flips; without values if the run failed."""
     counted = TURNS if case.scene.free else ()
     if isinstance(outcome, Failure):
         return case.blanks([*errors.blanks(case.scene), *blanks(*counted)], outcome.outcome)
-    with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
         values = errors.measure_errors(outcome.trajectory, truth)
         found = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
     turns = (count_turns_over(outcome.trajectory), count_turns_over(truth)) if counted else ()
@@ -103,7 +103,7 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
 
 
 def direction(value: Value, trajectory: Trajectory) -> str:
-    """Return whether energy was gained or lost at the end of a run, for the row of its drift; empty for other rows."""
+    """Return whether the energy drift is a gain or a loss; empty for other quantities."""
     energy = find_energy(trajectory.scene.invariants)
     if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
         return ""

@@ -1,6 +1,6 @@
-"""The study of engines over shorter and shorter steps, or tolerances: errors, the order that they show, and wall times.
+"""The study of engines over decreasing step sizes or tolerances: errors, observed order, and wall times.
 
-Impulse-based engines in single precision get worse as steps get shorter: there is no order then, and the row says so.
+Impulse-based engines in single precision become less accurate with smaller steps. They have no order.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from .study import Progress, Study
 from .work_precision import ROUNDS, one_of_each_series, points
 
 WORSE = "worse with smaller steps"
-"""Reason of an outcome without an order: the error rises as steps get shorter."""
-DEAR = 1.0
-"""Preparation, s, from which on a method gets every second step only: some engines compile for each."""
+"""Reason of an outcome without an order: the error increases as steps get shorter."""
+SLOW_PREPARATION = 1.0
+"""Time of a preparation, s, above which a method gets only every second step size: some engines compile for each."""
 PREPARATIONS = 30.0
-"""Time, s, for all preparations of a method on a scene; steps for which none is left are skipped."""
-TOO_DEAR = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
-"""Outcome of what is left out for that."""
+"""Time, s, for all preparations of a method on a scene. Step sizes beyond it are skipped."""
+SKIPPED = Outcome(OutcomeKind.SKIPPED, "its engine takes long to prepare a run, so that it has fewer steps")
+"""Outcome of skipped step sizes."""
 TIMED = 1.0
-"""Largest attitude error, rad, of a run that is timed: beyond it the motion is another one."""
+"""Largest attitude error, rad, of a timed run. A run with a larger error is another motion."""
 CALL = 0.002
 """Shortest sample of timed calls, s."""
 
@@ -50,7 +50,7 @@ class Point:
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield the errors of every engine at all its steps, the order that they show, and the times of the same runs."""
+    """Yield the errors of every engine at all step sizes, the observed order, and the times of the same runs."""
     methods = one_of_each_series(study)
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
@@ -66,7 +66,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the cases of a method, cheap to dear: all its steps, or what `work_precision` has for what has no step."""
+    """Return the cases of a method, coarse to fine: all step sizes, or the cases of `work_precision` if it has none."""
     if method.order is None or method.unsupported(scene):
         return points(study, scene, method)
     grids = step_ladder.steps(scene, method)[:: 2 if study.quick else 1]
@@ -79,32 +79,32 @@ def converge(study: Study, scene: Scene, method: Method) -> Generator[Measuremen
     found: list[Point] = []
     cases = cases_of(study, scene, method)
     tried: list[Case] = []
-    for case, outcome in attempt_each(study, drop_dear(cases, found)):
+    for case, outcome in attempt_each(study, limit_preparation(cases, found)):
         tried.append(case)
         if isinstance(outcome, Failure):
             yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
             continue
-        with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is finite for a while
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
             values = errors.measure_errors(outcome.trajectory, truth)
         error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
         found.append(Point(case, outcome, error.value))
         yield case.row(error)
-    yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), TOO_DEAR) for case in cases if case not in tried)
+    yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), SKIPPED) for case in cases if case not in tried)
     return found
 
 
-def drop_dear(cases: list[Case], found: list[Point]) -> Iterator[Case]:
-    """Yield the first case, then the others as long as there is time; every second where preparing the first was dear."""
+def limit_preparation(cases: list[Case], found: list[Point]) -> Iterator[Case]:
+    """Yield the first case, then the others within the time limit; every second one if preparing the first was slow."""
     yield cases[0]
-    dear = bool(found) and found[0].done.cost.prepare > DEAR
-    for case in cases[2::2] if dear else cases[1:]:
+    is_slow = bool(found) and found[0].done.cost.prepare > SLOW_PREPARATION
+    for case in cases[2::2] if is_slow else cases[1:]:
         if sum(point.done.cost.prepare for point in found) > PREPARATIONS:
             return
         yield case
 
 
 def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:
-    """Return the observed order and its standard error, or why there is none."""
+    """Return the observed order and its standard error, or the reason why there is no order."""
     case = Case(study.name, scene, method, step_ladder.samples(scene, method))
     failed = no_order(case, study.skip_missing)
     if failed:
@@ -118,7 +118,7 @@ def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -
 
 
 def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
-    """Yield the times of all points of a scene, in interleaved rounds; of a run longer than planned for, that of this run."""
+    """Yield the times of all points of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
     quick = [point for point in found if point.done.cost.first_call <= study.longest_run]
     runs = {str(i): point.done.run for i, point in enumerate(quick)}
     with time_limit(study.hang_limit):
@@ -131,7 +131,7 @@ def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
 
 
 def time_row(point: Point, spent: float, outcome: Outcome, detail: str) -> Measurement:
-    """Return the row of a run that took so long, s."""
+    """Return the row of a run that took `spent` s."""
     grid = point.case.grid
     value = Value(Measure.TIME, spent / (grid.dt * grid.n_steps))
     return point.case.row(value, outcome, detail if outcome.ok else "")

@@ -1,14 +1,12 @@
-"""Ensembles that nobody chose: thousands of random bodies of one kind, which all differ.
+"""Ensembles of thousands of different random bodies of one kind.
 
-Body number i is the same however many are drawn. Drawn with NumPy's PCG64 from (seed, number of the kind):
+Body number i does not depend on the number of bodies. Bodies are drawn with NumPy's PCG64 from (seed, number of the kind):
 
-* second moments about the principal axes 0.1 to 1, log-uniform, so that a mass distribution has them; of the moments of inertia
-  that they make the mean is 1 kg m^2 and the condition at most 5.5;
-* principal axes, and the attitude at the start, turned by rotations that are uniform on the group: inertias are full matrices;
-* rates at the start normal, 2 rad/s along each axis, which is 3.2 rad/s at the median;
-* heavy tops: the centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform.
-
-Source: ours.
+* second moments about the principal axes 0.1 to 1, log-uniform, so that a mass distribution exists. The mean moment of inertia
+  is 1 kg m^2 and the condition at most 5.5;
+* principal axes and initial attitude: rotations uniform on the group, so inertias are full matrices;
+* initial rates: normal, 2 rad/s along each axis, with a median of 3.2 rad/s;
+* heavy tops: centre of mass in a uniform direction, weight times distance 1.8 to 12 N m, uniform.
 """
 
 from __future__ import annotations
@@ -30,13 +28,7 @@ MOMENT = (1.8, 12.0)
 
 
 def draw(kind: str, n: int, seed: int = 0) -> Batch:
-    """Return the first n bodies of a kind that a seed gives.
-
-    Raises
-    ------
-    BadInput
-        The kind is none of `KINDS`.
-    """
+    """Return the first n bodies of a seed, of one of the `KINDS`."""
     choice("kind", kind, KINDS)
     tables = [np.random.Generator(np.random.PCG64((seed, KINDS.index(kind), column))) for column in range(6)]
     second = 10 ** -tables[0].random((n, 3))
@@ -58,6 +50,6 @@ def _rotations(normal: Array) -> Array:
 
 
 def _points(normal: Array, u: Array) -> Array:
-    """Return centres of mass (n, 3) of bodies that weigh 1 N, m."""
+    """Return centres of mass (n, 3), m, of bodies with a weight of 1 N."""
     low, high = MOMENT
     return normal * ((low + (high - low) * u) / np.linalg.norm(normal, axis=1))[:, None]

@@ -1,7 +1,7 @@
 """The study of the hard cases: every registered scene with every method, one or two settings of each.
 
-Rows are errors of attitude and rates, and drifts of all that the scene conserves, over `TURN` rad of the motion at
-the scene's own step. Nothing is left out because a method looks bad on it; what a method cannot do has rows that say so.
+Rows are errors of attitude and rates and drifts of all invariants over `TURN` rad at the scene's step size. Cases that a method
+does not support have rows with that outcome.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from .study import HANG_FACTOR, Progress, Study
 from .time_limit import attempt_apart
 
 TURN = 60.0
-"""Length of the runs, rad turned at the rate of the start. Limited, because multi-precision truth costs seconds."""
+"""Length of the runs, rad at the initial rate. Limited, because multi-precision reference solutions take seconds."""
 LIMIT = 20.0
-"""Wall-time limit of a run, s, compilation included; more where a study plans for runs of more than a tenth of it."""
+"""Wall-time limit of a run, s, including compilation; longer if the time budget is more than a tenth of it."""
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -34,7 +34,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
-    """Return one or two settings of each family: of ours the first and the last one listed, of an engine the first two."""
+    """Return one or two settings of each family: the first and the last for our methods, the first two for an engine."""
     families: dict[str, list[Method]] = {}
     for method in methods:
         if method.role != Role.TRUTH:
@@ -43,7 +43,7 @@ def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
 
 
 def _second(members: list[Method]) -> Method:
-    """Return the other setting that stands for a family, which may be the first again."""
+    """Return the second setting of a family, which can be the first again."""
     return members[-1] if members[0].role == Role.OURS else members[:2][-1]
 
 

@@ -1,4 +1,4 @@
-"""The study of long runs: drift over time, far beyond the scene's own duration."""
+"""The study of long runs: drift over ten times the scene's duration."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .time_limit import attempt_within
 DURATIONS = 10.0
 """Length of a run in durations of its scene."""
 SAMPLES = 120
-"""Samples of a line at most."""
+"""Largest number of samples of a line."""
 ORTHONORMALITY = "orthonormality"
-"""What is sampled beside the invariants of the scene."""
+"""A sampled quantity in addition to the invariants of the scene."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
-    """Yield drifts of every method at the scene's step, and the largest so far over time (relative), a line an invariant."""
+    """Yield drifts of every method at the scene's step size, and the running maximum over time of each relative drift."""
     methods = study.competitors
     total = len(study.scenes) * len(methods)
     for i, scene in enumerate(study.scenes):
@@ -58,6 +58,6 @@ def long_run(case: Case, outcome: Success | Failure) -> Iterator[Finding]:
 
 
 def every_drift(trajectory: Trajectory) -> dict[str, Array]:
-    """Return what is sampled, by name: (n,) or (n, 3), no unit."""
+    """Return the sampled quantities (n,) or (n, 3) by name, dimensionless."""
     invariants = {invariant.name: trajectory.drift(invariant) for invariant in trajectory.scene.invariants}
     return invariants | {ORTHONORMALITY: orthonormality(trajectory.R_WB)}

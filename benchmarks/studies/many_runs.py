@@ -1,4 +1,4 @@
-"""Ways of running many bodies: at once as a method offers it, or one at a time; on one thread or on several."""
+"""Ways of running many bodies: at once or one at a time, on one thread or on several."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from ..measures.timing import wall_time
 from .selection import takes_exact_steps
 
 BLOCK = 1024
-"""Bodies that are prepared, and run, at a time."""
+"""Bodies that are prepared and run at a time."""
 COMPILED = 1.0
-"""Time, s, of a preparation that is done again: it may have compiled."""
+"""Time, s, above which a preparation is repeated, because it may have compiled."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Way:
     method
         The method.
     together
-        Whether bodies run at once as `Method.prepare_many` has them; else each has a run of its own, in a loop.
+        Whether `Method.prepare_many` runs the bodies at once; otherwise each body has its own run.
     threads
-        How many of ours blocks of bodies are spread over; an engine's own threads are a setting of it.
+        Number of our threads for blocks of bodies; the threads of an engine are one of its settings.
     """
 
     method: Method
@@ -47,25 +47,25 @@ class Way:
 
     @property
     def text(self) -> str:
-        """How it differs from the usual: "" for bodies at once, on one thread."""
+        """Text of the way, "" for bodies at once on one thread."""
         alone = [] if self.together else ["one at a time"]
         return ", ".join([*alone, *([f"{self.threads} threads"] if self.threads > 1 else [])])
 
 
 def list_ways(method: Method) -> tuple[Way, ...]:
-    """Return the ways of a method that are compared: of ours one at a time and two threads as well."""
+    """Return the compared ways of a method; for our methods also one body at a time, and two threads."""
     if not takes_many(method):
         return (Way(method, together=False),)
     return (Way(method), Way(method, together=False), Way(method, threads=2)) if method.role == Role.OURS else (Way(method),)
 
 
 def takes_many(method: Method) -> bool:
-    """Return whether a method offers to run many bodies at once, at least those of some scenes."""
+    """Return whether a method can run many bodies at once."""
     return bool(method.card.many)
 
 
 class RunBlocks:
-    """The run of many bodies, block by block, which keeps what the last block gave."""
+    """A run of many bodies, block by block, which stores the result of the last block."""
 
     def __init__(self, way: Way, runs: list[RunMany]) -> None:
         self._way, self._runs = way, runs
@@ -79,7 +79,7 @@ class RunBlocks:
         return list(self._pool.map(_call, self._runs))[-1]
 
     def wall_time(self, calls: int) -> float:
-        """Return the wall time of calls, s, without the way to engines in other processes."""
+        """Return the wall time of calls, s, without the communication with engines in other processes."""
         if self._pool is None:
             return sum(wall_time(run, calls) for run in self._runs)
         return wall_time(self.__call__, calls)
@@ -90,7 +90,7 @@ def _call(run: RunMany) -> Block:
 
 
 def prepare_blocks(way: Way, bodies: Batch, grid: Grid) -> RunBlocks:
-    """Return the run of bodies, which is prepared block by block."""
+    """Return the run of bodies, prepared block by block."""
     blocks = (bodies[first : first + BLOCK] for first in range(0, len(bodies), BLOCK))
     return RunBlocks(way, [_prepare_block(way, block, grid) for block in blocks])
 
@@ -115,7 +115,7 @@ class _Loop:
         return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)))
 
     def wall_time(self, calls: int) -> float:
-        """Return the wall time of calls, s, without the way to engines in other processes."""
+        """Return the wall time of calls, s, without the communication with engines in other processes."""
         own = [run for run in self._runs if hasattr(run, "wall_time")]
         return sum(wall_time(run, calls) for run in own) if own else _time_here(self, calls)
 
@@ -126,7 +126,7 @@ def _time_here(run: Callable[[], Any], calls: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ManyDone:
-    """A run of many bodies, which can be called again: what it gave, and what its preparation and a call cost, s."""
+    """A run of many bodies that can be called again: its result, and the cost of its preparation and of a call, s."""
 
     run: RunBlocks
     block: Block
@@ -135,9 +135,9 @@ class ManyDone:
 
 
 def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
-    """Return the run of bodies after a first call and a second, which is timed; or how that ends.
+    """Return the run of bodies after two calls, the second one timed, or the outcome of its failure.
 
-    Exceptions out of our own methods are bugs and are not caught.
+    Exceptions of our methods are bugs and are not caught.
 
     Raises
     ------
@@ -170,15 +170,14 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
 
 
 def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings that a family's name stands for, where throughput is compared; none of what runs single bodies."""
+    """Return the settings of a family whose throughput is compared; none if it runs single bodies only."""
     return method.settings_for("many")
 
 
 def families(methods: tuple[Method, ...], quick: bool = False) -> Iterator[Method]:
-    """Yield those settings of each family among some methods, once.
+    """Yield these settings of each family once.
 
-    If it is to be quick, one setting stands for a family: one without truncation error if there is one, since that gets to
-    every error, otherwise the first.
+    If `quick`, each family has one setting: one without truncation error if there is one, otherwise the first.
     """
     for family in dict.fromkeys(type(method) for method in methods):
         found = settings(next(method for method in methods if type(method) is family))

@@ -1,7 +1,7 @@
-"""Studies on a Dask cluster: a task for each scene, and the findings in the order of the scenes, as without one.
+"""Studies on a Dask cluster: a task for each scene, with the findings in the order of the scenes.
 
-Only studies of accuracy: a time means something only where nothing else runs, and on one machine. How many points a slow engine
-gets in a study of convergence depends on what its runs take; what they find does not.
+Only studies of accuracy run on a cluster, because times are comparable on one idle machine only. The number of points of a slow
+engine in a study of convergence depends on the time of its runs; their values do not.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from . import studies
 from .study import Finding, Progress, Study, Truths
 
 UNTIMED = ("paper", "convergence", "long_runs", "sphere_curves", "paper_figures", "stability", "hard_cases")
-"""Studies whose findings are no times."""
+"""Studies without times."""
 
 
 def require_untimed(name: str) -> None:
-    """Raise `BadInput` unless a study is one without times."""
+    """Raise `BadInput` if a study measures times."""
     if name not in UNTIMED:
         allowed = f"none for a study of times, which share a machine with nothing; with one, {', '.join(UNTIMED)}"
         raise BadInput("scheduler", f"one for the study {name!r}", allowed)
 
 
 def find_on_cluster(client: Any, study: Study, progress: Progress) -> Iterator[Finding]:
-    """Yield what `studies.findings` yields of a study, found by the workers of a `dask.distributed.Client`.
+    """Yield the findings of a study from the workers of a `dask.distributed.Client`; see `studies.findings`.
 
     Raises
     ------
     BadInput
-        The study is one of times, or the cluster has no workers, or some with another version of this package, or was lost.
+        The study measures times, or the cluster has no workers, has workers with another version of this package, or was lost.
     MissingEngine
-        An engine is not installed there, and the study does not skip what is missing.
+        An engine is not installed there, and `skip_missing` is False.
     """
     require_untimed(study.name)
     parts = [replace(study, scenes=(scene,), truth=reference) for scene in study.scenes]
@@ -53,5 +53,5 @@ def find_on_cluster(client: Any, study: Study, progress: Progress) -> Iterator[F
 
 
 def _find_all(study: Study) -> list[Finding]:
-    """Return all findings of a study, whose truths are found where it runs."""
+    """Return all findings of a study; the worker computes the reference solutions."""
     return list(studies.findings(replace(study, truth=Truths())))

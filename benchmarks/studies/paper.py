@@ -20,11 +20,11 @@ from .time_limit import attempt_within
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
 APPROXIMATE = "approximate"
-"""Detail of the row of an agreement where nothing below it is known."""
+"""Detail of the agreement of a reference solution that is not known more accurately."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield drifts, errors and work of every method at the paper's steps; every step is a sample."""
+    """Yield drifts, errors and work of every method at the paper's step sizes, with every step stored."""
     total = len(study.scenes) * len(study.methods)
     for i, scene in enumerate(study.scenes):
         grids = [grid_for(scene, scene.dt * fraction) for fraction in FRACTIONS]
@@ -38,11 +38,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
                 outcome = attempt_within(study.hang_limit, case, study.skip_missing)
                 yield from accuracy(case, outcome, truth.trajectory)
                 if method.order is None:
-                    break  # accuracy does not depend on dt, nor does what the samples show
+                    break  # neither accuracy nor samples depend on dt
 
 
 def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
-    """Return how well the two truths agree: a row of no one method, with the labels of both."""
+    """Return the agreement of the two reference solutions, in a row with both labels."""
     return Measurement(
         study=study.name,
         scene=scene.name,
@@ -58,7 +58,7 @@ def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
 
 
 def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
-    """Return a row for every measure, and for the work done; without values where the run did not reach its end."""
+    """Return a row for every measure and counter; without values if the run failed."""
     if isinstance(outcome, Failure):
         return case.blanks(errors.blanks(case.scene), outcome.outcome)
     found = errors.measure_errors(outcome.trajectory, truth) + work(outcome.trajectory.counters)
@@ -66,7 +66,7 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
 
 
 def work(counters: Counters) -> list[Value]:
-    """Return the counters that the method has."""
+    """Return the counters that the method provides."""
     counts = (
         (Measure.STEPS, counters.steps),
         (Measure.NEWTON_ITERATIONS, counters.iterations),

@@ -1,7 +1,8 @@
-"""The study of the paper's figures 1 and 2, integrated anew: the brick that flips, and the top.
+"""The study of the paper's figures 1 and 2, the brick that flips and the top.
 
-Lines, by quantity. Figure 1, of the brick: ω1, ω2, ω3 are its body rates, rad/s; energy and momentum the signed relative errors
-of the energy and of the length of the angular momentum. Figure 2, of the top: x1, x2 are coordinates of its centre of mass, m.
+Lines by quantity: in figure 1, ω1, ω2, ω3 are the body rates of the brick, rad/s, and energy and momentum the signed relative
+errors of the energy and of the length of the angular momentum. In figure 2, x1, x2 are coordinates of the centre of mass of the
+top, m.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ from .case import Case
 from .study import Finding, Progress, Study
 
 BRICK, TOP = "brick_flip", "lagrange_top"
-"""Scenes of the figures; a study without one of them is one without its figure."""
+"""Scenes of the figures. A study without a scene omits its figure."""
 PAPER_MAP, REDUCED_MAP, EXACT = Convected().name, Reduced().name, Exact().name
-"""Methods of the figures: the paper's map, the same in three unknowns, and the analytical solution."""
+"""Methods of the figures: the paper's map with 18 and with three unknowns, and the exact solution."""
 BRICK_STEP = 0.01
 TOP_STEPS = (0.01, 0.005, 0.0025)
-"""Steps, s; of the top the figure shows the first two."""
+"""Step sizes, s. The figure of the top shows the first two."""
 RATES = ("ω1", "ω2", "ω3")
 ENERGY, MOMENTUM = "energy", "momentum"
 X1, X2 = "x1", "x2"
@@ -47,7 +48,7 @@ class PaperFigure:
     scene: Scene
 
     def run(self, name: str, dt: float) -> tuple[Case, Trajectory]:
-        """Return the case and the trajectory of a method by name, at a step, s; raise what a run raises that failed."""
+        """Return the case and the trajectory of a method at a step size, s, or raise the failure of its run."""
         method: Method = registry.method(name)
         case = Case(self.study, self.scene, method, grid_for(self.scene, dt))
         trajectory = method.solve(self.scene, case.grid)
@@ -57,9 +58,9 @@ class PaperFigure:
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
-    """Yield the lines of those figures whose scene is in the study, and the errors of the top's position as rows.
+    """Yield the lines of the figures whose scene is in the study, and the position errors of the top as rows.
 
-    Scenes, methods and steps are the paper's, whatever the methods of the study.
+    Methods and step sizes are those of the paper and do not depend on the study.
     """
     figures = {BRICK: yield_brick, TOP: yield_top}
     names = [scene.name for scene in study.scenes if scene.name in figures]
@@ -90,7 +91,7 @@ def yield_top(figure: PaperFigure) -> Iterator[Finding]:
 
 
 def position_errors(ours: Trajectory, exact: Trajectory, step: int) -> tuple[Value, Value, Value]:
-    """Return the time of a step, and the errors of the centre of mass there: of the coordinate x1, and the distance."""
+    """Return the time of a step and the errors of the centre of mass: of the coordinate x1, and the distance."""
     gap = com_W(ours.scene, ours.R_WB[step] - exact.R_WB[step])
     return (
         Value(Measure.PERIOD, float(ours.t[step])),
