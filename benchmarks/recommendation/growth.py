@@ -23,7 +23,7 @@ FASTER_THAN_LINEAR = 10.0
 
 
 @dataclass(frozen=True)
-class Drift:
+class ExpectedDrift:
     """Change of an invariant relative to its reference scale.
 
     `measured` is the largest in the run, `expected` the largest over the duration: proportional to time if the drift is
@@ -37,7 +37,7 @@ class Drift:
     secular: bool
 
 
-def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, ...]:
+def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[ExpectedDrift, ...]:
     """Return the drift of every invariant of a run, measured and expected over `duration`, s."""
     drifts = []
     for invariant in trajectory.scene.invariants:
@@ -47,7 +47,7 @@ def extrapolate_drifts(trajectory: Trajectory, duration: float) -> tuple[Drift, 
         length = float(trajectory.t[-1])
         secular = abs(slope) > SIGNIFICANT * stderr and abs(slope) * length > TREND * largest
         factor = max(1.0, duration / length) if secular else 1.0
-        drifts.append(Drift(invariant.name, largest, largest * factor, slope, secular))
+        drifts.append(ExpectedDrift(invariant.name, largest, largest * factor, slope, secular))
     return tuple(drifts)
 
 

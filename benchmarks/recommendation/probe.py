@@ -34,7 +34,7 @@ from ..studies.case import Case, Success
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_within
-from .growth import Amplification, Drift, ErrorLaw, extrapolate_drifts, fit_law
+from .growth import Amplification, ErrorLaw, ExpectedDrift, extrapolate_drifts, fit_law
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0
 """Length of short probes, rad, with a closed form and with multi-precision, which takes a second for ten radians."""
@@ -91,7 +91,7 @@ class Probe:
     law: str
     holds: float
     error_law: ErrorLaw | None
-    drifts: tuple[Drift, ...]
+    drifts: tuple[ExpectedDrift, ...]
     cost: float
     outcome: Outcome
 

@@ -31,7 +31,7 @@ from conservative.scene import Scene
 from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Success, fail_unsupported
+from ..studies.case import Case, Success, fail_unsupported, names_of
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_here
@@ -129,7 +129,7 @@ def list_engines(names: Iterable[str] | None = None) -> tuple[Method, ...]:
     """
     wanted = [method for method in selection.methods(skip_missing=True) if method.role == Role.ENGINE]
     if names is not None:
-        known = {method.name.partition(":")[0] for method in wanted}
+        known = {names_of(method)["family"] for method in wanted}
         for name in names:
             if name.partition(":")[0] not in known:
                 raise BadInput("engine", repr(name), nearest(name, known))

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from conservative import registry
+from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
 from conservative.invariants import Invariant, sizes
@@ -262,7 +263,7 @@ def plan_versions(
     if not settings:  # those of the methods that tables show, and of the engine as installed
         family: type[EngineMethod] = registry.engine(engine).at_version(versions[-1].name)
         shown = (*family.settings_for("variants"), *family.settings_for("as_installed"))
-        settings = tuple(dict.fromkeys(method.name.partition(":")[2] for method in shown))
+        settings = tuple(dict.fromkeys(settings_text(method) for method in shown))
     methods = [tuple(registry.method(f"{engine}@{each.name}:{setting}") for setting in settings) for each in versions]
     every = tuple(method for row in methods for method in row)
     scenes = selection.scenes(scene_names or selection.DEFAULT_SCENES)

@@ -191,9 +191,8 @@ class Memory:
         n, m = len(bodies), grid.n_samples
         most = most_samples() * SAMPLE_BYTES // KEPT_BYTES
         if n * m > most:
-            got = f"{grid.every}, for {n * m} samples of {n} bodies"
-            allowed = f"a larger one, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory"
-            raise BadInput("sample_every", got, allowed)
+            allowed = f"more steps between samples, or a path: {most:.3g} samples of {KEPT_BYTES} bytes fit in memory"
+            raise BadInput("sample_every", f"{n * m} samples of {n} bodies", allowed)
         self.R_WB, self.w_WB_B = np.empty((n, m, 3, 3)), np.empty((n, m, 3))
         self.drifts = np.empty((n, len(list_drifts(bodies))))
         self.failures: dict[int, IntegrationFailed] = {}

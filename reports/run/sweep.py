@@ -166,8 +166,10 @@ def _in_options(error: BadInput) -> BadInput:
     allowed = error.allowed.replace("resume=True", "--resume")
     argument = _OPTIONS.get(error.argument, error.argument)
     if argument == "samples":
-        allowed = allowed.replace("a larger one, or a path", "fewer samples or starts, or a folder for them, --out")
-        return BadInput(argument, str(error.got).partition("for ")[2], allowed)
+        allowed = allowed.replace(
+            "more steps between samples, or a path", "fewer samples or starts, or a folder for them, --out"
+        )
+        return BadInput(argument, error.got, allowed)
     if isinstance(error, NotWritten):
         return NotWritten(argument, error.path, error.cause, allowed)
     return BadInput(argument, error.got, allowed)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from conservative.benchmarks.recommendation.growth import Drift
+from conservative.benchmarks.recommendation.growth import ExpectedDrift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
@@ -149,7 +149,7 @@ def _expected(probe: Probe) -> str:
     return f"{probe.expected:.1e}" if probe.expected < math.pi else "lost"
 
 
-def drift_text(drifts: Sequence[Drift]) -> str:
+def drift_text(drifts: Sequence[ExpectedDrift]) -> str:
     """Return the relative drifts to expect; an arrow marks a steady drift, `kept` stands for a few rounding units."""
     large = [f"{d.name} {d.expected:.0e}{' ↗' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
     return ", ".join(large) or "kept"

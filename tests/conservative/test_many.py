@@ -565,7 +565,7 @@ OTHERS = {
         {"scene": scene(), "parameters": {"weight": [1.0]}},
         r"^parameters: got 'weight'; expected none: .* no potential",
     ),
-    "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 1, for 2000001000 samples of 1000 bodies"),
+    "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 2000001000 samples of 1000 bodies"),
     "two inertias": (
         {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
         r"^parameters: got None; expected .* an inertia of its own",
