@@ -1,19 +1,20 @@
-"""The study of random bodies: errors and times of our methods and of engines on bodies that nobody chose.
+"""The study of random bodies: errors and times of our methods and of engines.
 
-The bodies are those of `conservative.scenes.random_body`, whose docstring is the distribution. On each of them a method is
-taken at up to 17 settings, the same steps for every method with a step, the same tolerances for every one without.
+`conservative.scenes.random_body` describes the distribution of the bodies. Each method has up to 17 settings per body, with the
+same step sizes for every method with a step and the same tolerances for every adaptive method.
 
-* The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, spread over the motion
-  of the scene: 12 rad at the rate of the start, 11 to 49 rad turned in fact (nine in ten of 120 bodies). Asymmetric bodies in a
-  field amplify errors: a relative one of the start 15 times at the median, 300 times and more on one body in ten. Over a longer
-  time, on many bodies no method in double precision would reach 1e-12.
-* The time of a setting is that of a whole call of a prepared run, over a motion `DURATIONS` times as long in the same steps, of
-  which only the end is kept: what a call costs before its first step is then a few per cent, and decides nothing. A run that
-  takes longer than `LONG` already is timed over the motion itself. All runs of a body are timed in interleaved rounds.
-* Not timed, as that would cost more than all else, is what cannot decide anything: see `worth_timing`.
+* The error of a setting is the largest attitude error at `SAMPLES` instants, the same for all methods, over 12 rad at the
+  initial rate (11 to 49 rad of actual rotation for nine in ten of 120 bodies). Asymmetric bodies in a field amplify errors: an
+  initial relative error by a factor of 15 at the median, and of 300 or more on one body in ten. Over longer times, no method in
+  double precision reaches 1e-12 on many bodies.
+* The time of a setting is that of a call of a prepared run over a motion `DURATIONS` times as long with the same step size,
+  final state only. The overhead of the call is then a few percent. A run longer than `LONG` is timed over the motion itself.
+  All runs of a body are timed in interleaved rounds.
+* Settings that cannot be the fastest are not timed, to save time: see `worth_timing`.
 
-Truth is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16 bodies). No second
-truth is asked for on each body, as that takes as long as all else: where methods of both sides reach an error, they confirm it.
+The reference solution is `Precise` in `BITS` bits, which agrees with 128 bits to the last digit of doubles (measured on 16
+bodies). It is not checked by a second solution for each body, which would take as long as the study; methods of both sides
+confirm it.
 """
 
 from __future__ import annotations
@@ -49,32 +50,32 @@ from .time_limit import attempt_here
 DECADES = tuple(10.0**-k for k in range(2, 13))
 """Attitude errors, rad, at which methods are compared."""
 SAMPLES = 12
-"""Instants at which errors are read; the longest step is the time between two of them."""
+"""Instants of the error. The longest step is the time between two of them."""
 STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50, 60))
 """Steps of the motion, long to short."""
 TOLERANCES = (0.5, *(10.0**-k for k in range(1, 17)))
 """Tolerances of adaptive methods; heyoka has its lowest order, 2, at the first."""
 FEW = slice(None, None, 2)
-"""What a quick study takes of them."""
+"""Step sizes and tolerances of a quick study."""
 ORDER = 4
-"""Least order: a method of a lower one takes thousands of steps where these take a dozen."""
+"""Smallest order of a method. Methods of lower order take thousands of steps instead of a dozen."""
 FLOOR = DECADES[-1] / 10
-"""A method that is below this error twice gets no shorter steps: there is no decade left."""
+"""A method that is below this error twice gets no shorter steps, because no decade is left."""
 DURATIONS = 50
-"""How many times longer the motion is that is timed."""
+"""Factor by which the timed motion is longer."""
 LONG = 0.002
-"""Time, s, of a run over the motion itself that is timed as it is."""
+"""Time, s, of a run over the motion above which the motion itself is timed."""
 CALL = 1e-4
-"""Least duration of a timed sample, s: mostly one call, since a short sample is seldom interrupted."""
+"""Smallest duration of a timed sample, s: mostly one call, because short samples are rarely interrupted."""
 MARGIN = 3.0
-"""How many times dearer than the cheapest of its side a setting may look before it is timed."""
+"""Largest ratio of an estimated time to that of the fastest setting of its side for a setting that is timed."""
 BITS = 96
 SLOW, EVERY = 0.01, 3
-"""Time, s, of a run from which on a line gets one setting of so many."""
+"""Time, s, of a run above which a line gets one setting of so many."""
 ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
-"""Rounds of timing, those of a quick study, and the time, s, of all rounds of one setting: slow ones get fewer."""
+"""Rounds of timing, rounds of a quick study, and the time budget, s, for all rounds of one setting."""
 TIME = Value(Measure.TIME, math.nan)
-UNTIMED = Outcome(OutcomeKind.SKIPPED, f"looked more than {MARGIN:g} times as dear as another that reaches the error")
+UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times that of another setting with this error")
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class RandomStudy(Study):
 def random_study(
     methods: tuple[Method, ...], bodies: int, seed: int, quick: bool = False, skip_missing: bool = False
 ) -> RandomStudy:
-    """Return the study of that many random bodies in each field; the first ones are the same whatever the number.
+    """Return the study of `bodies` random bodies in each field. The first bodies do not depend on the number.
 
     Raises
     ------
@@ -102,9 +103,9 @@ def random_study(
 
 
 def settings(method: Method) -> tuple[Method, ...]:
-    """Return the settings that a family's name stands for, of order `ORDER` at least.
+    """Return the settings of a family, of order `ORDER` or more.
 
-    Of ours they are those that the automatic choice probes, and those with a tolerance; of engines all.
+    For our methods these are the candidates of the automatic choice and those with a tolerance, for engines all settings.
     """
     found = method.settings_for("variants")
     if method.role == Role.OURS:
@@ -114,19 +115,19 @@ def settings(method: Method) -> tuple[Method, ...]:
 
 
 def select(methods: Iterable[Method]) -> tuple[Method, ...]:
-    """Return those of some methods that the study takes where nobody has named them; see `settings`."""
+    """Return the default methods of the study; see `settings`."""
     return tuple(method for method in methods if isinstance(method, Missing) or method in settings(method))
 
 
 def precise(scene: Scene, grid: Grid) -> Truth:
-    """Return the motion in `BITS` bits, rounded to double."""
+    """Return the reference solution in `BITS` bits, rounded to double."""
     method = Precise(BITS)
     return Truth(method.solve(scene, grid), 0.0, (method.label, ""), float(grid.t[-1]))
 
 
 @dataclass(frozen=True)
 class Point:
-    """A setting that reaches its end: its error, rad, and about what a run costs, s per simulated second."""
+    """A setting whose run succeeded: its error, rad, and its estimated time, s per simulated second."""
 
     case: Case
     done: Success
@@ -135,7 +136,7 @@ class Point:
 
     @property
     def side(self) -> str:
-        """What it stands for: ours, or an engine in all of its forms."""
+        """The side of the setting: ours, or the name of an engine."""
         return Role.OURS if self.case.method.role == Role.OURS else self.case.method.family
 
 
@@ -200,15 +201,15 @@ def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Gener
 
 
 def estimate(done: Success) -> float:
-    """Return about what a run costs, s: the least of a few calls, of two where it is slow; the very first may have compiled."""
+    """Return the estimated time of a run, s: the smallest of a few calls, of two if it is slow. The first may compile."""
     spent = min(wall_time(done.run) for _ in range(2))
     return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
 
 
 def worth_timing(lines: Iterable[Line]) -> list[Point]:
-    """Return the points that may decide what the cheapest way to a decade is, of ours or of an engine.
+    """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
 
-    Those are, of each line that looks at most `MARGIN` times as dear as the cheapest of its side, the coarsest point that is
+    Of each line whose estimated time is at most `MARGIN` times that of the fastest of its side, these are the coarsest point
     credited with the decade (see `cost_at_error`), and the one before it.
     """
     sides: dict[str, list[Line]] = {}
@@ -245,9 +246,9 @@ def time_rows(study: Study, points: list[Point]) -> Iterator[Measurement]:
 
 
 def prepare_unchecked(case: Case) -> Run | Outcome:
-    """Return the run, or how it ends before its time; it may drift, since its errors are those of the motion itself.
+    """Return the run, or the outcome of its failure. Its drift is not checked, because its errors are measured.
 
-    Were it to be conserved as well, loose tolerances would be lost to engines that reach a loose error with them.
+    With a check of the drift, engines would lose loose tolerances that reach a large error.
     """
     try:
         run = case.method.prepare(case.scene, case.grid)
@@ -262,6 +263,6 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
 
 
 def longer(point: Point) -> Case:
-    """Return the case whose run is timed: the motion, `DURATIONS` times as long where that is quick, sampled at its end."""
+    """Return the case whose run is timed, final state only: the motion, `DURATIONS` times as long if it is fast."""
     quick = point.spent * point.case.scene.t_end < LONG
     return replace(point.case, grid=keep_end(point.case.grid, DURATIONS if quick else 1))

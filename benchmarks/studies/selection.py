@@ -1,4 +1,4 @@
-"""Which scenes and methods a study takes: by name, or everything that is registered."""
+"""Scenes and methods of a study, by name or all registered ones."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from conservative.scene import Scene
 
 DEFAULT_SCENES = ("brick_flip", "lagrange_top")
 TOLERANCES = ("tol", "rtol", "tolerance")
-"""Settings that adaptive methods trade accuracy with, in place of dt."""
+"""Settings that control the accuracy of adaptive methods instead of dt."""
 
 Settings = Callable[[Method], tuple[Method, ...]]
-"""Takes a method to the settings of its family that stand for it."""
+"""Maps a method to settings of its family."""
 
 
 def all_variants(method: Method) -> tuple[Method, ...]:
-    """Return all settings that a method's family offers."""
+    """Return all variants of a method's family."""
     return method.settings_for("variants")
 
 
 @dataclass(frozen=True)
 class Missing(Method):
-    """Stands in a table for a method whose engine is not installed: every run raises `MissingEngine`.
+    """Placeholder for a method whose engine is not installed: every run raises `MissingEngine`.
 
-    Attributes: `wanted` (what was asked for), and `engine` and `package` as the error has them.
+    Attributes: `wanted` (the name as the user wrote it), and `engine` and `package` of the error.
     """
 
     wanted: str
@@ -56,7 +56,7 @@ class Missing(Method):
 
 
 def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
-    """Return scenes by name, with parameters where a name has them.
+    """Return scenes by name, which can include parameters.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
 def methods(
     names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = all_variants
 ) -> tuple[Method, ...]:
-    """Return methods by name, ours first; a family's bare name, such as `mujoco`, stands for all its variants.
+    """Return methods by name, ours first. The name of a family, such as `mujoco`, means all its variants.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def methods(
     skip_missing
         A `Missing` method for each name whose engine is not installed, instead of an error.
     settings
-        Which settings a family's bare name stands for; by default all its variants.
+        Settings that the name of a family means; by default all variants.
 
     Raises
     ------
@@ -112,21 +112,21 @@ def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method,
         if not skip_missing:
             raise
         return (Missing(name, error.engine, error.package),)
-    except NotLoadable as error:  # another package's method, registered but not whole
+    except NotLoadable as error:  # a broken entry point of another package
         if not skip_missing:
             raise
         return (Missing(name, name, error.place),)
 
 
 def tolerance_setting(method: Method) -> str | None:
-    """Return the name of the setting that an adaptive method trades accuracy with; None where it has none."""
+    """Return the name of the setting that controls the accuracy of an adaptive method, or None."""
     if method.order is not None:
         return None
     return next((field.name for field in fields(_value(method)) if field.name in TOLERANCES), None)
 
 
 def takes_exact_steps(method: Method) -> bool:
-    """Return whether steps have no truncation error: neither a step nor a tolerance trades accuracy for time."""
+    """Return whether steps have no truncation error: neither a step size nor a tolerance controls the accuracy."""
     return method.order is None and tolerance_setting(method) is None
 
 
@@ -137,7 +137,7 @@ def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
 
 
 def series(method: Method) -> str:
-    """Return what one line of a picture is called: the method's name without its tolerance."""
+    """Return the name of a line in a chart: the method's name without its tolerance."""
     setting = tolerance_setting(method)
     if setting is None:
         return method.name
@@ -148,8 +148,8 @@ def series(method: Method) -> str:
 def identifier(scene: Scene, method: Method, dt: float) -> str:
     """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
 
-    A setting is in the id if it is not the default. The first setting always is where it is a text, as the name of an engine's
-    integrator is.
+    The id contains the settings that differ from the default, and the first setting if it is a text, such as the name of an
+    engine's integrator.
     """
     settings = [(field.name, getattr(method, field.name), field.default) for field in fields(_value(method))]
     shown = [
@@ -161,7 +161,7 @@ def identifier(scene: Scene, method: Method, dt: float) -> str:
 
 
 def _short(name: str, setting: object) -> str:
-    """Return a setting as part of an id: texts speak for themselves, numbers say what they are of."""
+    """Return a setting as part of an id: texts as they are, numbers with the name of the setting."""
     if isinstance(setting, str):
         return setting.lower()
     return {"order": "o", "stages": "s"}.get(name, name) + str(setting)

@@ -1,7 +1,7 @@
 """The study of speed: wall time of every method at the scene's step, and the time to prepare a run.
 
-Preparation and first call are measured with compiled code warm: a report runs other studies first, in the same process, and
-what they compiled is not compiled again. Preparation is then the conversion of the scene.
+Preparation and first call do not include compilation: a report runs other studies first, in the same process. Preparation is
+then the conversion of the scene.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ MEASURES = (
     Measure.FIRST_CALL,
 )
 CALL = 0.004
-"""Target duration of a timed call, s: long enough that the overhead of a call stays a few per cent."""
+"""Target duration of a timed call, s, for which the overhead of a call is a few percent."""
 TRIAL = 8
-"""Steps of the run that tells how slow a foreign method is."""
+"""Steps of the run that determines the speed of a foreign method."""
 LONGEST = 2**16
-"""Largest factor by which the number of steps of a timed run is raised."""
+"""Largest factor by which the number of steps of a timed run increases."""
 Extend = Callable[[Grid, int], Grid]
-"""Takes a grid to one of so many times as many steps."""
+"""Maps a grid and a factor to a grid with that many times as many steps."""
 UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
 
 
 def keep_end(grid: Grid, times: int = 1) -> Grid:
-    """Return a grid of `times` as many steps that keeps the start and the end alone."""
+    """Return a grid with `times` as many steps, initial and final state only."""
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
 def shorten(study: Study, case: Case) -> Case:
-    """Return the case with as many steps as the study plans to wait for; fewer than asked for only of a slow foreign method."""
+    """Return the case, with fewer steps if a foreign method would exceed the time budget."""
     few = replace(case, grid=keep_end(replace(case.grid, n_steps=min(TRIAL, case.grid.n_steps))))
     if is_known_to_end(case.method):
         return case
@@ -60,10 +60,10 @@ def shorten(study: Study, case: Case) -> Case:
 
 
 def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Extend = keep_end) -> tuple[Case, Success]:
-    """Return the case with more steps, so that a call lasts about `CALL` s, or as many as the method takes without failing.
+    """Return the case with so many steps that a call takes about `CALL` s, or with the most steps that do not fail.
 
-    No run may take more than `limit` s, and `extend` says which samples it keeps. The number is found in several rounds,
-    because a short call is mostly overhead and says little of its steps.
+    No run may take more than `limit` s. `extend` determines the samples. The number is found in several rounds, because a short
+    call is mostly overhead.
     """
     bare, times = case, 1
     while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
@@ -77,14 +77,14 @@ def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Exten
 
 
 def _shortest(run: Run) -> float:
-    """Return the wall time of a call, s, the least of three unless the first is far too long: one may be interrupted."""
+    """Return the wall time of a call, s: the smallest of three, or the first if it is far too long."""
     spent = wall_time(run)
     return spent if spent > 10 * CALL else min(spent, wall_time(run), wall_time(run))
 
 
 @dataclass(frozen=True)
 class TimedRun:
-    """A case to be timed: as it is timed, and as it was at the first call."""
+    """A case to be timed: the timed case, and the first call."""
 
     case: Case
     done: Success
@@ -97,7 +97,7 @@ class TimedRun:
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield wall times at the scene's own step: each method in its own loop, all interleaved, sampled at the end only."""
+    """Yield wall times at the scene's step size, final state only: each method in its own loop, all interleaved."""
     methods = study.competitors
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):

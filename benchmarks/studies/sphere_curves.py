@@ -1,7 +1,7 @@
-"""The study of what a motion looks like: a curve on a sphere for each method that is drawn.
+"""The study of curves on a sphere, one for each method in the charts.
 
-The run is that of the drift over time. Of a free body the curve is its polhode: the angular momentum in principal axes,
-relative to its length at the start. Of a body in a field it is the trace of its axis, as a unit vector in world axes.
+The runs are those of `long_runs`. The curve of a free body is its polhode: the angular momentum in principal axes, relative to
+its initial length. The curve of a body in a field is the trace of an axis, a unit vector in world axes.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from .study import Progress, Study
 from .time_limit import attempt_within
 
 SAMPLES = 700
-"""Samples of a curve at most."""
+"""Largest number of samples of a curve."""
 AXES = ("x", "y", "z")
 """Quantities of a curve, in units of the sphere's radius."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Samples]:
-    """Yield three lines for each curve, one a coordinate; methods that cannot do the scene, or fail, have none.
+    """Yield three lines for each curve, one per coordinate; none for methods that do not support the scene or fail.
 
-    The first truth among the methods that can do the scene comes first.
+    The first reference method that supports the scene comes first.
     """
     drawn = select_methods(study.methods)
     pairs = [(scene, method) for scene in study.scenes for method in [*truth(scene, study.methods), *drawn]]
@@ -44,7 +44,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:
-    """Return the methods that are drawn: of each family those of `Card.pictures`, or the first where it has none of those."""
+    """Return the methods in the charts: of each family those of `Card.pictures`, or else the first."""
     competitors = [method for method in methods if method.role != Role.TRUTH]
     preferred = [method for method in competitors if method in method.settings_for("pictures")]
     firsts = {method.family: method for method in reversed(competitors)}
@@ -52,7 +52,7 @@ def select_methods(methods: Sequence[Method]) -> list[Method]:
 
 
 def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
-    """Return the first truth that can do a scene, if there is one."""
+    """Return the first reference method that supports a scene, if there is one."""
     return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
 
 
@@ -73,7 +73,7 @@ def project_on_sphere(trajectory: Trajectory) -> Array:
 
 
 def traced_axis(scene: Scene) -> Array:
-    """Return the unit vector (3,) that is traced, body axes: towards the centre of mass where there is one, else the third."""
+    """Return the traced unit vector (3,), body axes: towards the centre of mass if there is one, else the third axis."""
     com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)
     length = float(np.linalg.norm(com_B))
     return com_B / length if length else np.eye(3)[2]

@@ -1,18 +1,18 @@
-"""The study of stability: how long a step each method can take on the hard cases, and what happens at the first it cannot.
+"""The study of stability: the longest step size of each method on the hard cases, and the failure at the next longer one.
 
-A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| that of the scene's start, until one does not work:
+A method takes `STEPS` steps of each of `STEP_SIZES`, |w| dt with |w| the initial rate of the scene, until one fails:
 
     ok               the run reached its end, and nothing below applies
     not converged    the equations of a step could not be solved, as the method itself reports
     wrong branch     the method reports that the equations have only solutions which the state does not lead to continuously;
                      or, of any method and while the body turns by no more than pi, where angles are not ambiguous: the first
                      step ends further from the true attitude than a body that did not move
-    diverged         the state is not finite from a time on, or the energy is off by more than its own scale
-    timeout          the run of an engine took longer than `LIMIT` s, or than the study plans for, and was ended
-    unsupported      the method does not have the scene, or not the step
-    crashed          an engine raised an exception of its own
+    diverged         the state is no longer finite, or the energy drift exceeds its reference scale
+    timeout          the run of an engine exceeded `LIMIT` s or the time budget and was stopped
+    unsupported      the method does not support the scene or the step size
+    crashed          an engine raised an exception
 
-Accuracy is not asked for: a step of 3 rad that stays on the right branch is as inaccurate as its order makes it.
+Accuracy does not matter here: a step of 3 rad on the right branch passes.
 """
 
 from __future__ import annotations
@@ -52,23 +52,23 @@ SCENES = (
     "kovalevskaya_top",
     "sprung_body",
 )
-"""Free bodies and bodies in fields on which a long step is hard in different ways; one of each kind."""
+"""One free body or body in a field for each kind of difficulty with long steps."""
 
 UNIT = 0.1
 STEP_SIZES = (1, 2, 3, 5, 7, 10, 15, 20, 25, 30, 40, 50, 70, 100)
 """|w| dt in units of `UNIT` rad, short to long."""
 STEPS = 24
 LIMIT, FIRST_LIMIT = 1.0, 60.0
-"""Wall-time limits, s: of a run, unless the study plans for longer ones, and of the first run of a method on a scene, which
-may compile."""
+"""Wall-time limits, s: of a run, unless the time budget is longer, and of the first run of a method on a scene, which may
+compile."""
 TOLERANCE = 1e-6
 """Tolerance, rad, when comparing two angles: round-off turns even a body at rest."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield two rows for each method with a step on each scene: the largest |w| dt that works, and the first that does not.
+    """Yield two rows for each method with a step size on each scene: the largest |w| dt that works, and the first that fails.
 
-    The outcome of the second is how that run ended; that of the first is the same where no step works.
+    The second row has the outcome of the failure, and so does the first row if no step size works.
     """
     methods = [method for method in study.methods if method.order is not None or isinstance(method, Missing)]
     total = len(study.scenes) * len(methods)
@@ -81,7 +81,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 @dataclass(frozen=True, eq=False)
 class TrueMotion:
-    """A scene, its rate |w| at the start (rad/s), and its true attitudes (n, 3, 3) at whole units of |w| t, for half a turn."""
+    """A scene, its initial rate |w| (rad/s), and its exact attitudes (n, 3, 3) at whole units of |w| t, for half a turn."""
 
     scene: Scene
     rate: float
@@ -89,7 +89,7 @@ class TrueMotion:
 
     @classmethod
     def of(cls, study: Study, scene: Scene) -> TrueMotion:
-        """Return what is known of a scene. One at rest is measured in its own steps."""
+        """Return the exact motion of a scene. A scene at rest is measured in units of its step size."""
         rate = float(np.linalg.norm(scene.w_WB_B0)) or UNIT / scene.dt
         truth = study.truth(scene, Grid(UNIT / rate, math.floor(math.pi / UNIT))).trajectory
         turn = np.cumsum(np.linalg.norm(truth.w_WB_B, axis=1)) * UNIT / rate

@@ -11,22 +11,22 @@ from conservative.method import Method
 from conservative.scene import Scene
 
 SAMPLES = 12
-"""Intervals between samples: errors are read at these times, so that no lucky zero at the end passes for accuracy."""
+"""Intervals between samples. Errors are read at all of them, because the final error can be small by chance."""
 RADIANS = 1.0
 """Turn of the body in the longest step, rad."""
 LENGTH, FIRST_ORDER_LENGTH = 8, 12
-"""Number of steps, each half of the one before. First-order methods begin to converge late."""
+"""Number of step sizes, each half of the previous one. First-order methods need many."""
 HIGH_ORDER = 6
-"""From this order on one halving can go from no accuracy to round-off, so steps are spaced closer and start longer."""
+"""Order from which halving a step can lead from no accuracy to round-off. Such step sizes are closer and start larger."""
 HIGH_LENGTH = 14
-"""Number of such steps, by sqrt 2, of which the first is one to an interval. Where the motion between two samples is slow, a
-method of high order is near round-off at that: it has no order then, and no cheaper way to a coarse error either."""
+"""Number of such step sizes, by a factor of sqrt 2, starting with one step per interval. If the motion between two samples is
+slow, a method of high order is close to round-off with the first one. It then has no observed order."""
 TOLERANCES = (0.5, 0.1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
-"""Tolerances of adaptive methods, beside their own."""
+"""Tolerances of adaptive methods in addition to their own."""
 
 
 def samples(scene: Scene, method: Method) -> Grid:
-    """Return the grid of the samples with the fewest steps the method can take: of the truth, and of what has no order."""
+    """Return the grid of the samples with the fewest steps of the method: for reference solutions and adaptive methods."""
     finer = math.ceil(scene.t_end / SAMPLES / method.longest_step(scene)) or 1
     return _grid(scene, finer)
 

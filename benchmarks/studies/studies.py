@@ -1,4 +1,4 @@
-"""The table of studies by name, and those that a report is made of.
+"""The studies by name, and the studies of a report.
 
 for study in studies.cross_studies(studies.MAIN, selection.scenes(), selection.methods()):
     for finding in studies.findings(study): ...
@@ -49,19 +49,19 @@ MAKERS: Mapping[str, Maker] = {
     "random": random.findings,
     "throughput": throughput.findings,
 }
-"""What makes each study, by its name, which is that of its file."""
+"""Function of each study, by the name of its file."""
 HARD = ("stability", "hard_cases")
-"""Studies of the hard cases: of scenes chosen for it, and of every registered scene."""
+"""Studies of the hard cases: of selected scenes, and of every registered scene."""
 ENGINES = ("engines_at_one_step", "engines_over_steps")
-"""Studies of the scenes that are chosen, and of engines alone."""
+"""Studies of the selected scenes with engines only."""
 RANDOM = "random"
-"""Study of bodies that are drawn for it."""
+"""Study of random bodies."""
 THROUGHPUT = "throughput"
-"""Study of many bodies, which are drawn for it."""
+"""Study of many random bodies."""
 MAIN = ("paper", "convergence", "speed", "work_precision", "long_runs")
-"""Studies of the scenes and methods that are chosen: what every report measures."""
+"""Studies of the selected scenes and methods in every report."""
 MORE = ("each_step", "sphere_curves", "paper_figures")
-"""Studies of the same scenes and methods that only a full report measures."""
+"""Studies of the same scenes and methods in a full report only."""
 
 
 def cross_studies(
@@ -89,7 +89,7 @@ def list_hard_studies(
 
 
 def _silent(done: int, total: int, what: str) -> None:
-    """Report to nobody."""
+    """Report no progress."""
 
 
 def findings(study: Study, progress: Progress = _silent) -> Iterator[Finding]:
@@ -100,12 +100,12 @@ def findings(study: Study, progress: Progress = _silent) -> Iterator[Finding]:
     BadInput
         There is no study of this name.
     MissingEngine
-        An engine is not installed, and the study does not skip what is missing.
+        An engine is not installed, and `skip_missing` is False.
     """
     choice("name", study.name, tuple(MAKERS))
     return MAKERS[study.name](study, progress)
 
 
 def rows(study: Study, progress: Progress = _silent) -> Iterator[Measurement]:
-    """Yield the rows of a study alone; see `findings`."""
+    """Yield only the rows of a study; see `findings`."""
     return (finding for finding in findings(study, progress) if isinstance(finding, Measurement))

@@ -1,4 +1,4 @@
-"""What a study is: which rows to make, of scenes x methods x steps, and whom to tell how far it is."""
+"""A study: scenes x methods x step sizes whose rows are measured."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from conservative.scene import Scene
 from ..measures.measurement import Measurement, Samples
 
 Progress = Callable[[int, int, str], None]
-"""Called before each piece of work: pieces done, pieces in all, and what comes next."""
+"""Called before each piece of work with the number of finished pieces, of all pieces, and a description of the next."""
 MOST_TRUTHS = 32
-"""Motions that `Truths` keeps: some six for each scene of a report."""
+"""Number of reference solutions in `Truths`: about six for each scene of a report."""
 HANG_LIMIT = 60.0
-"""Shortest time, s, after which a run that does not end is ended: a first run may compile."""
+"""Shortest time limit of a run, s: a first run may compile."""
 HANG_FACTOR = 10.0
-"""How many times longer than what a study plans with a run may take before it is ended."""
+"""Ratio of the time limit of a run to the time budget."""
 FindTruth = Callable[[Scene, Grid], Truth]
 Finding = Measurement | Samples
-"""What a study yields: rows of the table, and lines of pictures."""
+"""A result of a study: a row of the table, or the samples of a line in a chart."""
 
 
 class Truths:
-    """A cache of exact motions, which studies of the same scenes share: it keeps the last `MOST_TRUTHS` that were asked for.
+    """A cache of the last `MOST_TRUTHS` reference solutions, shared by studies of the same scenes.
 
-    `find` gives the motion of a scene at the samples of a grid, by default from two independent truths that agree.
+    `find` returns the reference solution of a scene at the samples of a grid.
     """
 
     def __init__(self, find: FindTruth = reference) -> None:
         self._find = lru_cache(maxsize=MOST_TRUTHS)(find)
 
     def __call__(self, scene: Scene, grid: Grid) -> Truth:
-        """Return the motion of a scene at the samples of a grid."""
+        """Return the reference solution of a scene at the samples of a grid."""
         return self._find(scene, grid)
 
 
@@ -51,20 +51,20 @@ class Study:
     name
         One of those in `conservative.benchmarks.studies.studies`.
     scenes, methods
-        What is crossed; methods that cannot do a scene get rows that say so.
+        Scenes and methods. Unsupported combinations have rows with that outcome.
     quick
         Fewer points and rounds.
     skip_missing
         Rows with the outcome "missing" instead of `MissingEngine`.
     truth
-        Where the exact motion comes from; studies of the same scenes can share what they find.
+        Source of reference solutions; studies of the same scenes can share it.
     time_limit
-        Longest single run, s, that the study plans for; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
+        Time budget of a run, s; default 0.6, or 0.15 with `quick`. A slower method gets fewer points.
 
     Raises
     ------
     BadInput
-        There is nothing to cross, or the limit is not a finite duration above 0.
+        There are no scenes or no methods, or the limit is not a finite duration above 0.
     """
 
     name: str
@@ -82,22 +82,22 @@ class Study:
 
     @property
     def timing_budget(self) -> float:
-        """Time, s, for all rounds of one run, at most that of the longest run; slow ones get fewer rounds."""
+        """Time budget, s, for all rounds of one run; slow runs get fewer rounds."""
         return min(0.06 if self.quick else 0.6, self.longest_run)
 
     @property
     def longest_run(self) -> float:
-        """Time, s, of the longest single run that the study plans for: on the way to shorter steps, and of a timed call."""
+        """Time budget, s, of a single run and of a timed call."""
         return self.time_limit or (0.15 if self.quick else 0.6)
 
     @property
     def hang_limit(self) -> float:
-        """Time, s, after which a run is ended."""
+        """Time limit of a run, s."""
         return max(HANG_LIMIT, HANG_FACTOR * self.longest_run)
 
     @property
     def competitors(self) -> tuple[Method, ...]:
-        """The methods without those that the others are measured against."""
+        """The methods except reference solutions."""
         return tuple(method for method in self.methods if method.role != Role.TRUTH)
 
     def __post_init__(self) -> None:
@@ -109,4 +109,4 @@ class Study:
 
 
 Maker = Callable[[Study, Progress], Iterator[Finding]]
-"""What makes the findings of a study."""
+"""A function that yields the findings of a study."""

@@ -1,16 +1,15 @@
-"""The study of throughput: what a body costs among many, of ours and of engines that run many at once.
+"""The study of throughput: the time per body in batches, for our methods and for engines with batches.
 
-The bodies are those of `conservative.benchmarks.studies.ensembles`: they all differ. A method is taken at a ladder of steps, or
-of tolerances, and run in every way it has: many at once, on one thread and on two, and, of ours, one at a time.
+`conservative.benchmarks.studies.ensembles` draws the bodies, which all differ. Each method runs with several step sizes or
+tolerances and in every way it has: many bodies at once, on one thread and on two, and for our methods also one body at a time.
 
-* The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Of the first `bodies` of a kind the
-  median counts, and the 95th percentile. Truth is heyoka in double precision, at a tolerance below round-off; a row says how
-  well another formulation agrees with it.
-* Times are those of a prepared run over the same motion of which only the start and the end are kept, in interleaved rounds; a
-  row apart has what preparing costs. They are taken of the settings that decide what each of `ERRORS` costs (see
-  `cost_at_error`): the coarsest credited with it, and the one before it; and of exact solutions, which take any step.
-* From one number of bodies to the next a setting is left out, with a row that says so, as soon as a call would take longer than
-  the study plans for.
+* The error of a setting on a body is the largest attitude error at `SAMPLES` instants. Rows contain the median and the 95th
+  percentile over the first `bodies` of a kind. The reference solution is heyoka in double precision with a tolerance below
+  round-off; another row contains its agreement with another formulation.
+* The time is that of a prepared run over the same motion, final state only, in interleaved rounds. The time of the preparation
+  has its own row. Only settings that determine the cost at one of `ERRORS` are timed: the coarsest that reaches it and the one
+  before it, and exact solutions.
+* With increasing numbers of bodies, a setting is skipped as soon as a call would exceed the time budget.
 """
 
 from __future__ import annotations
@@ -45,25 +44,25 @@ from .study import Progress, Study
 ERRORS = (1e-3, 1e-6, 1e-9)
 """Attitude errors, rad, at which methods are compared."""
 SAMPLES = 12
-"""Instants at which errors are read."""
+"""Instants of the errors."""
 STEPS = tuple(
     SAMPLES * k for k in (1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, 128, 181, 256, 362, 512, 724, 1024, 1448, 2048)
 )
 """Steps of the motion, long to short."""
 EXACT_STEPS = 120
-"""Steps of exact solutions, whose length is free."""
+"""Number of steps of exact solutions, which is arbitrary."""
 TOLERANCES = tuple(10.0**-k for k in range(1, 14))
 FEW = slice(1, None, 3)
-"""What a quick study takes of both."""
+"""Step sizes and tolerances of a quick study."""
 SIZES, QUICK_SIZES = tuple(10**k for k in range(7)), (1, 100)
 """Numbers of bodies."""
 BODIES, QUICK_BODIES = 64, 8
-"""Bodies whose errors are read."""
+"""Number of bodies whose errors are measured."""
 PREPARATION = 8.0
-"""How many times longer than a call its preparation may take."""
+"""Largest ratio of the time of a preparation to that of a call."""
 ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
-"""Which error of the bodies a value is of."""
+"""Statistics of the errors of the bodies."""
 EXACT = "closed form"
 """Detail of errors that do not depend on the step."""
 
@@ -75,14 +74,14 @@ class ThroughputStudy(Study):
     Attributes
     ----------
     sizes
-        Numbers of bodies that are timed.
+        Numbers of bodies in timed runs.
     bodies, seed
-        Number of bodies whose errors are read, and where they are drawn from.
+        Number of bodies whose errors are measured, and the seed of all bodies.
 
     Raises
     ------
     BadInput
-        As `Study` does, and where a size or `bodies` is not an integer of 1 or more.
+        As for `Study`, or a size or `bodies` is not an integer of 1 or more.
     """
 
     sizes: tuple[int, ...] = SIZES
@@ -91,7 +90,7 @@ class ThroughputStudy(Study):
 
     @property
     def longest_errors(self) -> float:
-        """Longest run, s, on the way to smaller errors."""
+        """Time budget, s, of a run for errors."""
         return 4 * self.longest_run
 
     def __post_init__(self) -> None:
@@ -118,7 +117,7 @@ def throughput_study(methods: tuple[Method, ...], quick: bool = False, **extent:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Bodies of one kind: as many as are timed, and the exact attitudes (n, samples, 3, 3) of those whose errors are read."""
+    """Bodies of one kind, and the exact attitudes (n, samples, 3, 3) of those whose errors are measured."""
 
     study: ThroughputStudy
     bodies: Batch
@@ -126,15 +125,15 @@ class Kind:
 
     @property
     def few(self) -> Batch:
-        """The bodies whose errors are read."""
+        """The bodies whose errors are measured."""
         return self.bodies[: len(self.truth)]
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A setting that reaches its end, in one way: errors, rad, by which one they are, and what a body costs, s.
+    """A setting and a way whose run succeeded: errors, rad, by statistic, and the time per body, s.
 
-    That is a share of a call, and of its preparation with what is compiled at hand.
+    The time is a share of a call and of its preparation without compilation.
     """
 
     way: Way
@@ -145,7 +144,7 @@ class Point:
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield errors of all settings on a few bodies of each kind, and times of those that decide on more and more bodies."""
+    """Yield errors of all settings on a few bodies of each kind, and times of the deciding ones for all numbers of bodies."""
     assert isinstance(study, ThroughputStudy)
     ways = [way for method in study.competitors for way in list_ways(method)]
     pieces = len(ways) + len(study.sizes)
@@ -169,7 +168,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def find_kind(study: ThroughputStudy, name: str) -> Generator[Measurement, None, Kind]:
-    """Yield how well two formulations of the truth agree, rad, on the worst body; return the bodies."""
+    """Yield the largest difference of two formulations of the reference solution, rad; return the bodies."""
     bodies = draw(name, max(*study.sizes, study.bodies), study.seed)
     grid, few = Grid(DURATION / SAMPLES, SAMPLES), bodies[: study.bodies]
     methods = [Heyoka(SMALLEST_TOL, frame) for frame in ("base_vectors", "body")]
@@ -205,7 +204,7 @@ def _grid(n: int) -> Grid:
 
 
 def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Point]]:
-    """Yield the errors of a line, coarse to fine, to the last of `ERRORS` or the longest run planned for; return its points."""
+    """Yield the errors of a line, coarse to fine, down to the last of `ERRORS` or to the time budget; return its points."""
     line: list[Point] = []
     for case in list_cases(kind, way.method):
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
@@ -228,15 +227,15 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
 
 
 def read_errors(found: ManyDone, truth: Array) -> dict[str, float]:
-    """Return the median and the 95th percentile, rad, of the bodies' errors; a body that did not get there is off by pi."""
-    with np.errstate(all="ignore"):  # too long a step may leave the range of floats
+    """Return the median and the 95th percentile, rad, of the bodies' errors; a failed body has an error of pi."""
+    with np.errstate(all="ignore"):  # too long a step can overflow
         off = angle_between(truth, found.block.R_WB).max(axis=1)
     off = np.where(found.block.finished & np.isfinite(off), off, math.pi)
     return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 
 
 def decide(line: list[Point]) -> list[Point]:
-    """Return the points of a line that decide what an error costs."""
+    """Return the points of a line that determine the cost at an error."""
     if line and takes_exact_steps(line[0].case.method):
         return line
     chosen: set[int] = set()
@@ -248,7 +247,7 @@ def decide(line: list[Point]) -> list[Point]:
 
 
 def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measurement, None, list[Point]]:
-    """Yield the times of points on so many bodies; return those for which more bodies do not take too long, either."""
+    """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
     study, ready = kind.study, {}
     for i, point in enumerate(points):
         if reason := too_long(point, size, study.longest_run):
@@ -272,7 +271,7 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
 
 
 def too_long(point: Point, size: int, limit: float) -> Outcome | None:
-    """Return why so many bodies are not run, if a call would take longer than `limit`, s."""
+    """Return the outcome of a skipped run if a call with `size` bodies would take longer than `limit`, s."""
     for what, seconds, most in (("a call", point.spent, limit), ("preparing a call", point.prepare, PREPARATION * limit)):
         if size > 1 and seconds * size > most:
             return Outcome(OutcomeKind.SKIPPED, f"{what} would take {seconds * size:.2g} s; --time-limit raises that")
@@ -280,7 +279,7 @@ def too_long(point: Point, size: int, limit: float) -> Outcome | None:
 
 
 def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
-    """Yield what a body costs among so many: the time, s per simulated second, steps per second, and the preparation, s."""
+    """Yield the cost of a body in a batch: time, s per simulated second, steps per second, and preparation, s."""
     case, a_body = point.case, timing.minimum / size
     values = {
         Measure.TIME: a_body / DURATION,

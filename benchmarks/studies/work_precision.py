@@ -1,4 +1,4 @@
-"""The study of work against precision: error and wall time over steps, and over tolerances of adaptive methods."""
+"""The work-precision study: error and wall time over step sizes, and over tolerances of adaptive methods."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from .time_limit import attempt_here
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 ROUNDS = 5
-"""Rounds at most for each of the hundreds of points of a picture over many decades."""
+"""Largest number of rounds for each of the hundreds of points."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
-    """Yield error and time of every point; rows of one point share scene, method and dt, those of one line their series."""
+    """Yield error and time of every point. Rows of a point share scene, method and dt; those of a line share their series."""
     methods = one_of_each_series(study)
     pieces = len(methods) + 1
     for i, scene in enumerate(study.scenes):
@@ -43,17 +43,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
 
 
 def one_of_each_series(study: Study) -> list[Method]:
-    """Return one method for each line of the picture: variants that differ in tolerance alone are one line."""
+    """Return one method for each line of the chart. Variants that differ only in their tolerance are one line."""
     return list({series(method): method for method in study.competitors}.values())
 
 
 def points(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the cases of one line, cheap to dear: steps, or tolerances of an adaptive method."""
+    """Return the cases of one line, coarse to fine: step sizes, or tolerances of an adaptive method."""
     setting = tolerance_setting(method)
     if method.unsupported(scene):
-        return [Case(study.name, scene, method, step_ladder.samples(scene, method))]  # its one row says so
+        return [Case(study.name, scene, method, step_ladder.samples(scene, method))]  # unsupported: a single row
     if method.order is not None:
-        longest = step_ladder.LENGTH if method.order == 1 else None  # what comes after is dear and still far off
+        longest = step_ladder.LENGTH if method.order == 1 else None  # finer steps are slow and still inaccurate
         grids = step_ladder.steps(scene, method)[:longest][:: 2 if study.quick else 1]
         return [Case(study.name, scene, method, grid) for grid in grids]
     grid = step_ladder.samples(scene, method)
@@ -64,7 +64,7 @@ def points(study: Study, scene: Scene, method: Method) -> list[Case]:
 
 
 def error_rows(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
-    """Return the errors of one point; of one that failed the time as well, all without values."""
+    """Return the errors of one point, or all its rows without values if it failed."""
     if isinstance(outcome, Failure):
         return case.blanks(blanks(*ERRORS, Measure.TIME), outcome.outcome)
     found = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
@@ -72,7 +72,7 @@ def error_rows(case: Case, outcome: Success | Failure, truth: Trajectory) -> lis
 
 
 def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
-    """Yield the times of all points of a scene, interleaved; the runs timed keep no sample but the last."""
+    """Yield the times of all points of a scene, interleaved, final state only."""
     ready: dict[str, TimedRun] = {}
     for case in cases:
         bare = replace(case, grid=keep_end(case.grid))
