@@ -1,16 +1,47 @@
-"""Pictures of the measurements of a scene: error against time, drift over time, convergence. Tidy columns in, a chart out."""
+"""Charts of measurements: tidy columns in, an Altair chart out."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import altair as alt
 import pandas as pd
 
-from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, dash_scale, families_of, power_axis, shape_scale
+from ..document.cells import tolerance
+from ..rows.names import MethodClass
+from .style import (
+    HEIGHT,
+    PALETTE,
+    SHAPES,
+    WIDTH,
+    Families,
+    apply_style,
+    colour_scale,
+    dash_scale,
+    families_of,
+    power_axis,
+    shape_scale,
+)
 
 FLOOR = 1e-17
-"""What a logarithmic axis shows for an error of zero: below any round-off of a relative error in double precision."""
+"""Replaces an error of zero on a logarithmic axis; below any round-off of a relative error in double precision."""
+SINGLE = "single"
+"""Parameter of a chart of families: whether single settings are drawn."""
+_CLASSES: Mapping[str, tuple[str, list[int]]] = {
+    MethodClass.GENERAL.value: ("circle", [1, 0]),
+    MethodClass.SOLUTION.value: ("diamond", [1, 0]),
+    MethodClass.SOLVER.value: ("square", [6, 3]),
+    MethodClass.ENGINE.value: ("triangle-up", [2, 2]),
+}
+CLASS_SHAPES = {name: shape for name, (shape, _) in _CLASSES.items()}
+"""Mark of each class of methods."""
+CLASS_DASHES = {name: dash for name, (_, dash) in _CLASSES.items()}
+"""Dash of each class; ours are solid."""
+_ENGINE_COLOURS = tuple(
+    PALETTE[name] for name in ("blue", "vermilion", "green", "orange", "purple", "indigo", "sky", "wine", "olive", "teal")
+)
+_KINDS = {"at its best": [1, 0], "as installed": [5, 3]}
 
 
 def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, Any]:
@@ -24,63 +55,168 @@ def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, 
     }
 
 
-def _line_look(families: Families, title: str) -> dict[str, Any]:
-    """Return colour and mark of the lines, in one legend."""
-    legend = alt.Legend(title=title, orient="right", columns=1, symbolOpacity=1)
-    return {
-        "color": alt.Color("name:N", scale=colour_scale(families), sort=list(families), legend=legend),
-        "shape": alt.Shape("name:N", scale=shape_scale(families), sort=list(families), legend=legend),
-    }
+def _look(channel: str, families: Families, title: str, **legend: Any) -> dict[str, Any]:
+    """Return colour and mark, or colour and dash, of lines, in one legend."""
+    shown = alt.Legend(title=title, **({"columns": 1} | legend))
+    lines = list(families)
+    second = (
+        alt.Shape("name:N", scale=shape_scale(families), sort=lines, legend=shown)
+        if channel == "shape"
+        else alt.StrokeDash("name:N", scale=dash_scale(families), sort=lines, legend=shown)
+    )
+    return {"color": alt.Color("name:N", scale=colour_scale(families), sort=lines, legend=shown), channel: second}
+
+
+def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:
+    return alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=alt.Title(title, subtitle=subtitle))
+
+
+def _time_against_error(data: pd.DataFrame) -> tuple[alt.X, alt.Y]:
+    x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
+    return x, alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
 
 
 def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any:
-    """Return time against error, from `rows.points` of a scene and their `front`, which is the bold line."""
+    """Return time against error, from the points of a scene (see `rows.points`) and their `front`, which is the bold line."""
     data, best_points = (rows.assign(microseconds=rows["time"] * 1e6) for rows in (points, front))
-    look = _line_look(families_of(data), "method")
-    x = alt.X(**log_channel("error", "largest attitude error over the run, rad", data["error"]))
-    y = alt.Y(**log_channel("microseconds", "wall time per simulated second, µs", data["microseconds"]))
-    title = alt.Title(
-        f"{scene}: time against error",
-        subtitle="lower left is better; bold grey: fastest at each error, without closed forms",
+    look = _look("shape", families_of(data), "method", orient="right", symbolOpacity=1)
+    x, y = _time_against_error(data)
+    subtitle = "lower left is better; bold grey: fastest at each error, without closed forms"
+    base = _large(data, f"{scene}: time against error", subtitle).encode(x=x, y=y)
+    best = alt.Chart(best_points).mark_line(
+        color=PALETTE["black"], opacity=0.22, strokeWidth=11, strokeCap="round", strokeJoin="round"
     )
-    base = alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=title).encode(x=x, y=y)
-    best = alt.Chart(best_points).mark_line(color=BLACK, opacity=0.22, strokeWidth=11, strokeCap="round", strokeJoin="round")
     lines = base.mark_line(strokeWidth=1.6).encode(color=look["color"], detail="name:N", order="rank:Q")
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
     lines = lines.transform_window(rank="row_number()")
     return apply_style(best.encode(x=x, y=y, order="error:Q") + lines + marks)
 
 
-def drift(drifts: pd.DataFrame, scene: str) -> Any:
-    """Return the largest drift so far of each invariant over time, from `lines.drifts` of a scene, one panel an invariant."""
-    data = drifts.assign(shown=drifts["drift"].clip(lower=FLOOR))
+def best_of_families(picture: pd.DataFrame) -> Any:
+    """Return time against error of the best of each family, single settings thin; columns as in `rows.points`."""
+    data = picture.assign(microseconds=picture["time"] * 1e6, sample=picture["sample"] * 1e6, rank=range(len(picture)))
     families = families_of(data)
-    panels = [_drift_panel(part, f"{scene}: drift of {kind}", families) for kind, part in data.groupby("quantity", sort=False)]
-    return apply_style(alt.vconcat(*panels))
+    x = alt.X(**log_channel("error", "largest attitude error, rad", data["error"]))
+    y = alt.Y(**log_channel("microseconds", "µs per simulated second", data["microseconds"]))
+
+    def lines(part: pd.DataFrame, width: float, size: float) -> Any:
+        mark = alt.Chart(part).mark_line(strokeWidth=width, point=alt.OverlayMarkDef(size=size, filled=True, opacity=1))
+        return mark.encode(
+            color=alt.Color("name:N", scale=colour_scale(families), sort=list(families)),
+            shape=alt.Shape("class:N", scale=_scale(CLASS_SHAPES)),
+            strokeDash=alt.StrokeDash("class:N", scale=_scale(CLASS_DASHES)),
+            detail="line:N",
+            order=alt.Order("rank:Q"),
+        )
+
+    single = data["single"].astype(bool)
+    thin, bold = lines(data[single], 0.8, 12).transform_filter(SINGLE), lines(data[~single], 2.2, 50)
+    layers = (thin + bold).encode(x=x, y=y).properties(width=WIDTH, height=HEIGHT)
+    return apply_style(layers.add_params(alt.param(name=SINGLE, value=False)))
 
 
-def _drift_panel(data: pd.DataFrame, title: str, families: Families) -> Any:
-    y = alt.Y(**log_channel("shown", "largest so far, relative", data["shown"]))
-    legend = alt.Legend(title="method", columns=1, symbolSize=300)
-    return (
-        alt.Chart(data, width=2 * WIDTH - 180, height=HEIGHT - 40, title=title)
+def _scale(looks: Mapping[str, Any]) -> alt.Scale:
+    return alt.Scale(domain=list(looks), range=list(looks.values()))
+
+
+def drift(drifts: pd.DataFrame, scene: str) -> Any:
+    """Return the largest drift so far over time, from `lines.drifts` of a scene, a panel for each invariant."""
+    data = drifts.assign(shown=drifts["drift"].clip(lower=FLOOR))
+    look = _look("strokeDash", families_of(data), "method", symbolSize=300)
+    panels = [
+        alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 40, title=f"{scene}: drift of {kind}")
         .mark_line(strokeWidth=1.8, clip=True)
         .encode(
             x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)),
-            y=y,
-            color=alt.Color("name:N", scale=colour_scale(families), sort=list(families), legend=legend),
-            strokeDash=alt.StrokeDash("name:N", scale=dash_scale(families), sort=list(families), legend=legend),
+            y=alt.Y(**log_channel("shown", "largest so far, relative", part["shown"])),
+            **look,
         )
-    )
+        for kind, part in data.groupby("quantity", sort=False)
+    ]
+    return apply_style(alt.vconcat(*panels))
 
 
 def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any:
     """Return error against step, from `lines.errors` of a scene and `lines.fit_ends`; the fits are the bold stretches."""
     x = alt.X(**log_channel("dt", "step, s", errors["dt"]))
     y = alt.Y(**log_channel("error", "largest attitude error over the run, rad", errors["error"]))
-    look = _line_look(families_of(errors), "method (observed order)")
-    title = alt.Title(f"{scene}: convergence", subtitle="bold: the stretch that the order is fitted to, and the fit")
-    base = alt.Chart(errors, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=title).encode(x=x, y=y, color=look["color"])
+    look = _look("shape", families_of(errors), "method (observed order)", orient="right", symbolOpacity=1)
+    title, subtitle = f"{scene}: convergence", "bold: the stretch that the order is fitted to, and the fit"
+    base = _large(errors, title, subtitle).encode(x=x, y=y, color=look["color"])
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=look["shape"])
     bold = alt.Chart(fit_ends).mark_line(strokeWidth=6, opacity=0.35, strokeCap="round")
     return apply_style(bold.encode(x=x, y=y, color=look["color"]) + base.mark_line(strokeWidth=1.2) + marks)
+
+
+def engine_looks(names: Iterable[str]) -> Mapping[str, tuple[str, str]]:
+    """Return colour and mark of each engine, sorted by name; ten colours and eight marks make 40 looks."""
+    ordered = sorted(set(names), key=str.lower)
+    return {name: (_ENGINE_COLOURS[i % len(_ENGINE_COLOURS)], SHAPES[i % len(SHAPES)]) for i, name in enumerate(ordered)}
+
+
+def engines(points: pd.DataFrame, scene: str) -> Any:
+    """Return time against error of engines, from `engines.picture_points`: at their best solid, as installed dashed."""
+    data = points.assign(microseconds=points["time"] * 1e6)
+    looks = engine_looks(data["name"])
+    legend = alt.Legend(title="engine", orient="right", columns=1, symbolOpacity=1)
+    colours, marks = (alt.Scale(domain=list(looks), range=[look[part] for look in looks.values()]) for part in (0, 1))
+    x, y = _time_against_error(data)
+    subtitle = "lower left is better; solid: at its best, dashed: as installed; runs with an error below 1 rad"
+    base = _large(data, f"{scene}: engines, time against error", subtitle).encode(
+        x=x,
+        y=y,
+        color=alt.Color("name:N", scale=colours, sort=list(looks), legend=legend),
+        shape=alt.Shape("name:N", scale=marks, sort=list(looks), legend=legend),
+    )
+    dash = alt.StrokeDash("kind:N", scale=_scale(_KINDS), legend=None)
+    lines = base.mark_line(strokeWidth=1.6).encode(detail="setting:N", order="rank:Q", strokeDash=dash)
+    lines = lines.transform_window(rank="row_number()")
+    return apply_style(lines + base.mark_point(filled=True, size=48, opacity=1))
+
+
+def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
+    """Return the cheapest engine's time over ours against the error, a panel for each field: mean, worst and best body."""
+    lowest, highest = float(points["worst"].min()), float(points["best"].max())
+    low, high = min(lowest, 0.9) / 1.1, max(highest, 1.1) * 1.1
+    y: dict[str, Any] = {
+        "scale": alt.Scale(type="log", domain=[low, high], nice=False),
+        "axis": power_axis("engine / ours", low, high),
+    }
+    blue = PALETTE["blue"]
+    titles = {"error": "attitude error, rad", "mean": "engine / ours, mean", "worst": "worst body", "best": "best body"}
+    shown = [alt.Tooltip(f"{name}:Q", format=".3g", title=title) for name, title in titles.items()]
+    even = alt.Chart(pd.DataFrame({"even": [1.0]})).mark_rule(color=PALETTE["grey"], strokeDash=[5, 3])
+    panels = []
+    for field, part in points.groupby("field", sort=False):
+        x = alt.X(**log_channel("error", "largest attitude error, rad", part["error"]))
+        base = alt.Chart(part, width=WIDTH - 60, height=HEIGHT - 60, title=str(field)).encode(x=x)
+        band = base.mark_area(color=blue, opacity=0.18).encode(y=alt.Y("worst:Q", **y), y2="best:Q")
+        mark = base.mark_line(color=blue, strokeWidth=2, point=alt.OverlayMarkDef(color=blue, size=40))
+        panels.append(band + even.encode(y=alt.Y("even:Q", **y)) + mark.encode(y=alt.Y("mean:Q", **y), tooltip=shown))
+    title = alt.Title(
+        f"Random bodies: the cheapest engine's time over ours ({bodies} in each field, seed {seed})",
+        subtitle="line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster",
+    )
+    return apply_style(alt.concat(*panels, columns=2, title=title))
+
+
+def body_costs(points: pd.DataFrame) -> Any:
+    """Return the time per body against the number of bodies; columns of panels are errors, rows kinds of bodies."""
+    look = _look("strokeDash", families_of(points), "method", orient="bottom", columns=2, symbolSize=300)
+    shown = [alt.Tooltip("name:N"), alt.Tooltip("size:Q"), alt.Tooltip("time:Q", format=".3g")]
+    x = alt.X(**log_channel("size", "number of bodies", points["size"]))
+    y = alt.Y(**log_channel("time", "µs a body and simulated second", points["time"]))
+
+    def panel(part: pd.DataFrame, kind: str, error: Any) -> Any:
+        title = f"{kind.replace('_', ' ')}, {tolerance(error)} rad"
+        base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **look)
+        marks = alt.Chart(part).mark_point(filled=True, size=30, opacity=1)
+        marks = marks.encode(x=x, y=y, color=look["color"].legend(None), tooltip=shown)
+        return base.mark_line(strokeWidth=1.6).encode(tooltip=shown) + marks
+
+    rows = [
+        alt.hconcat(*(panel(part, str(kind), error) for error, part in here.groupby("error", sort=False)))
+        for kind, here in points.groupby("kind", sort=False)
+    ]
+    subtitle = "at equal error (median of the bodies); lower is better"
+    return apply_style(alt.vconcat(*rows, title=alt.Title("Many bodies: the cost of one of them", subtitle=subtitle)))

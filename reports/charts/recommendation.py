@@ -13,7 +13,7 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..rows.names import method_text, setting_text
 from .figures import log_channel
-from .style import BLACK, HEIGHT, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale, svg_text
+from .style import HEIGHT, PALETTE, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale, svg_text
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
@@ -76,8 +76,8 @@ def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> 
     base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x, y=y)
     lines = base.mark_line(strokeWidth=1.2).encode(color=look["color"], detail="name:N", order="run:Q")
     marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
-    rings = base.transform_filter("datum.recommended").mark_point(size=200, color=BLACK, strokeWidth=1.5)
-    wanted = alt.Chart(pd.DataFrame({"expected": [error]})).mark_rule(strokeDash=[6, 3], color=BLACK).encode(y=y)
+    rings = base.transform_filter("datum.recommended").mark_point(size=200, color=PALETTE["black"], strokeWidth=1.5)
+    wanted = alt.Chart(pd.DataFrame({"expected": [error]})).mark_rule(strokeDash=[6, 3], color=PALETTE["black"]).encode(y=y)
     return wanted + lines + marks + rings
 
 

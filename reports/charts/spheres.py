@@ -7,7 +7,7 @@ import pandas as pd
 
 from conservative.attitude import Array
 
-from .style import GREY, colours
+from .style import PALETTE, colours
 from .vega_embed import Spec, as_csv
 
 TURN, TILT = np.deg2rad(35.0), np.deg2rad(25.0)
@@ -76,7 +76,7 @@ def _great_circles() -> Spec:
     ]
     return {
         "data": as_csv(rows, ("part", "k", "across", "up")),
-        "mark": _line(GREY, 0.6, 0.5),
+        "mark": _line(PALETTE["grey"], 0.6, 0.5),
         "encoding": _encoding() | {"detail": {"field": "part"}},
     }
 

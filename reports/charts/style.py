@@ -23,34 +23,19 @@ SVG_MARK = "<!-- Written by conservative -->"
 Families = Mapping[str, str]
 """The family of each line of a picture by its name, in the order of legends."""
 
-BLUE, SKY, GREEN, VERMILION, ORANGE, PURPLE, BLACK, GREY, INDIGO, WINE, OLIVE, TEAL = (
-    "#0072B2",
-    "#56B4E9",
-    "#009E73",
-    "#D55E00",
-    "#E69F00",
-    "#CC79A7",
-    "#000000",
-    "#7F7F7F",
-    "#332288",
-    "#882255",
-    "#999933",
-    "#44AA99",
-)
-
 PALETTE = {
-    "blue": BLUE,
-    "sky": SKY,
-    "indigo": INDIGO,
-    "wine": WINE,
-    "olive": OLIVE,
-    "teal": TEAL,
-    "green": GREEN,
-    "vermilion": VERMILION,
-    "orange": ORANGE,
-    "purple": PURPLE,
-    "black": BLACK,
-    "grey": GREY,
+    "blue": "#0072B2",
+    "sky": "#56B4E9",
+    "indigo": "#332288",
+    "wine": "#882255",
+    "olive": "#999933",
+    "teal": "#44AA99",
+    "green": "#009E73",
+    "vermilion": "#D55E00",
+    "orange": "#E69F00",
+    "purple": "#CC79A7",
+    "black": "#000000",
+    "grey": "#7F7F7F",
 }
 """What `Card.colour` can name; families of one role stand in legends in this order."""
 _OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
@@ -152,7 +137,9 @@ def apply_style(chart: Any) -> Any:
     """Return a whole picture with the common fonts, on white, so that it reads the same on any page."""
     return (
         chart.configure(background="white", padding=12, font="sans-serif")
-        .configure_axis(labelFontSize=11, titleFontSize=12, titleFontWeight="normal", gridColor="#E6E6E6", domainColor=GREY)
+        .configure_axis(
+            labelFontSize=11, titleFontSize=12, titleFontWeight="normal", gridColor="#E6E6E6", domainColor=PALETTE["grey"]
+        )
         .configure_view(stroke=None)
         .configure_legend(labelFontSize=11, titleFontSize=12, labelLimit=320, symbolStrokeWidth=2, symbolSize=80)
         .configure_title(fontSize=13, fontWeight="bold", anchor="start", offset=8)

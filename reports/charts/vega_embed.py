@@ -109,10 +109,11 @@ def _parts(spec: Spec) -> Sequence[Spec] | None:
 
 def _panel(panel: Spec, whole: Spec, tooltip: Sequence[Shown], height: int) -> Spec:
     units = [panel, *panel.get("layer", ())]
-    for unit in units:
-        _prepare(unit, tooltip)
-    fields = set(_fields(panel))
     data = whole["datasets"]
+    for unit in units:
+        rows = data[unit.get("data", panel.get("data"))["name"]] if "data" in unit or "data" in panel else ()
+        _prepare(unit, [each for each in tooltip if not rows or each[0] in rows[0]])
+    fields = set(_fields(panel))
     tables = {unit["data"]["name"]: as_csv(data[unit["data"]["name"]], fields) for unit in units if "data" in unit}
     for unit in units:
         if "data" in unit:
@@ -123,7 +124,7 @@ def _panel(panel: Spec, whole: Spec, tooltip: Sequence[Shown], height: int) -> S
 
 
 def _prepare(unit: Spec, tooltip: Sequence[Shown]) -> None:
-    """Take the legend from a chart or a layer, and give it the filter and what hovering shows."""
+    """Remove the legend from a chart or a layer, and add the filter and the tooltip."""
     encoding = unit.get("encoding", {})
     for channel in ("color", "shape", "strokeDash"):
         if channel in encoding:

@@ -56,8 +56,9 @@
   async function equip() {
     if (!document.getElementById("datatables")) return;
     const DataTable = await load("datatables");
-    DataTable.type("words", { detect: () => true, order: ways(String, words.compare) });
-    DataTable.type("numbers", { detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
+    const search = (cell) => String(cell).replace(/<[^>]*>/g, " ");  // the text of a cell, not its markup
+    DataTable.type("words", { detect: () => true, order: ways(String, words.compare), search });
+    DataTable.type("numbers", { search, detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
     const language = { zeroRecords: "No row has all of these words." };
     const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
     for (const table of document.querySelectorAll("table.sortable")) {

@@ -19,8 +19,7 @@ from conservative.benchmarks.studies.studies import ENGINES
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 
-from ..charts import engines as chart
-from ..charts import vega_embed
+from ..charts import figures, vega_embed
 from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
 from ..rows.names import of_measure, of_study, outcomes, with_outcome
@@ -179,9 +178,9 @@ def figure(points: pd.DataFrame, scene: str) -> Figure:
     """Return the figure of `picture_points`."""
     engines = points["name"].nunique()
     summary = f"{len(points)} measured runs of {engines} engines; solid lines at their best, dashed ones as installed."
-    picture = chart.work_precision(points, scene)
+    picture = figures.engines(points, scene)
     panels = vega_embed.embed(picture, ("name", "kind", "setting", "error", "microseconds", "dt"), 520)
-    looks = chart.looks(points["name"]).items()
+    looks = figures.engine_looks(points["name"]).items()
     legend = [LegendEntry(name, colour, vega_embed.PATHS[mark], "") for name, (colour, mark) in looks]
     return Figure(f"engines_{scene}", f"{scene}: engines, wall time against attitude error", summary, picture, panels, legend)
 

@@ -13,7 +13,7 @@ from conservative.benchmarks.studies.studies import THROUGHPUT
 from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
 from conservative.outcome import OutcomeKind
 
-from ..charts import throughput, vega_embed
+from ..charts import figures, vega_embed
 from ..charts.style import families_of
 from ..document.cells import DASH, number, tolerance
 from ..document.model import Cell, Figure, Items, Layout, Paragraph, Role, Section, Style, Table, filled
@@ -43,7 +43,7 @@ def section(table: pd.DataFrame) -> Section:
     points = points.rename(columns={"scene": "kind", "bodies": "size"})[["kind", "error", "name", "family", "size", "time"]]
     if len(points):
         summary = "Time per body and simulated second at equal error, against the number of bodies; lower is better."
-        picture = throughput.costs(points)
+        picture = figures.body_costs(points)
         panels = vega_embed.embed(picture, ("name", "size", "time"), 240)
         legend = vega_embed.legend(families_of(points), marks=False)
         title = "Many bodies: the cost of one of them"

@@ -17,7 +17,7 @@ from conservative.benchmarks.studies.studies import RANDOM
 from conservative.method import Role as Side
 from conservative.outcome import OutcomeKind
 
-from ..charts import random_ratios, vega_embed
+from ..charts import figures, vega_embed
 from ..document.cells import DASH, factor, finite_or_none, number, tolerance
 from ..document.model import Cell, Figure, Grade, Items, Layout, Paragraph, Role, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, MethodClass, display_name, of_classes, without_outcome
@@ -81,7 +81,7 @@ def section(found: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
     points, figure = chart_points(found), None
     if len(points):
         band = "Line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster."
-        picture = random_ratios.ratios(points, bodies, seed)
+        picture = figures.random_ratios(points, bodies, seed)
         panels = vega_embed.embed(picture, (), 220)
         title, words = "Random bodies: the cheapest engine's time over ours", f"Bodies in each field: {bodies}. {band}"
         figure = Figure("random_bodies", title, words, picture, panels, layout=Layout.PAIRS)

@@ -13,7 +13,7 @@ from conservative.benchmarks.studies import long_runs, sphere_curves, step_ladde
 from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.scene import Scene
 
-from ..charts import families, figures, spheres, vega_embed
+from ..charts import figures, spheres, vega_embed
 from ..charts.style import colours, families_of
 from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Block, Figure, Layout, LegendEntry, Paragraph, Role, Row, Section, Style, Table, filled
@@ -104,7 +104,7 @@ def families_figure(summary: Summary, name: str, what: str, picture: object = No
         f"{what}: computing time against attitude error, the best of each family",
         " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(members, "error", "time")]),
         picture,
-        vega_embed.embed(families.work_precision(points), shown, 310, hidden) if len(points) else (),
+        vega_embed.embed(figures.best_of_families(points), shown, 310, hidden) if len(points) else (),
         [_entry(line, rows, line in summary.shown) for line, rows in members],
         Layout.FAMILIES,
     )
@@ -112,8 +112,8 @@ def families_figure(summary: Summary, name: str, what: str, picture: object = No
 
 def _entry(line: str, members: pd.DataFrame, shown: bool) -> LegendEntry:
     family, kind = members[["family", "class"]].iloc[0]
-    dash = " ".join(map(str, families.DASHES[kind]))
-    return LegendEntry(line, colours({line: family})[line], vega_embed.PATHS[families.SHAPES[kind]], dash, shown)
+    dash = " ".join(map(str, figures.CLASS_DASHES[kind]))
+    return LegendEntry(line, colours({line: family})[line], vega_embed.PATHS[figures.CLASS_SHAPES[kind]], dash, shown)
 
 
 def _work_figure(measured: Measured, scene: Scene, summary: Summary) -> Figure:

@@ -8,7 +8,7 @@ import pytest
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
-from conservative.reports.charts.random_ratios import ratios as draw_ratios
+from conservative.reports.charts import figures
 from conservative.reports.document.cells import tolerance
 from conservative.reports.document.model import Table, walk
 from conservative.reports.report import render
@@ -142,7 +142,7 @@ def test_the_picture_draws_mean_and_band():
     points = random_bodies.chart_points(found(*TWICE, *SLOWER, *ENGINE_ALONE))
     assert len(points) == len(DECADES)
     assert points[["mean", "worst", "best"]].iloc[-1].tolist() == pytest.approx([1.0, 0.5, 2.0])
-    (panel,) = draw_ratios(points, 3, 7).to_dict()["concat"]
+    (panel,) = figures.random_ratios(points, 3, 7).to_dict()["concat"]
     drawn = {(part["mark"]["type"], part["encoding"]["y"]["field"]) for part in panel["layer"]}
     assert drawn == {("area", "worst"), ("rule", "even"), ("line", "mean")}
 
