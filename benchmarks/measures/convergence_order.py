@@ -17,16 +17,16 @@ from .line import fit_line
 
 MIN_POINTS = 3
 SHRINKING = 1 / 3
-"""An error is still shrinking with the step where its local slope is above this part of the steepest slope seen."""
+"""An error decreases with the step size if its local slope is above this fraction of the steepest slope."""
 ABOVE_FLOOR = 10.0
-"""How far above the floor a point must be, so that the floor changes it by less than a tenth."""
+"""Ratio of a point to the floor from which the floor changes it by less than a tenth."""
 BEND, CALMER = 0.05, 1.1
 """Drop the coarsest point if its slope differs by more than BEND, relative, and the scatter falls by more than a factor CALMER.
 
 Dropping a point of a bend lessens the scatter; dropping one of noise does not."""
 
 GROWTH, NO_ROUND_OFF = 3.0, 1e-9
-"""Factor, and size, from which on an error at the shortest step has grown, and not by round-off of double precision alone."""
+"""Factor and size of an error at the shortest step that has grown, and not only by round-off in double precision."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Order:
     floor
         The largest error at steps where the error no longer shrinks; nan where the data do not reach a floor.
     reason
-        Why there is no fit; empty where there is one.
+        Reason why there is no fit; empty if there is one.
     """
 
     slope: float
@@ -61,29 +61,30 @@ class Order:
 def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     """Fit log(error) = slope log(step) + constant where the data show convergence.
 
-    From coarse to fine the data are cut into three by rules that see nothing but the data:
+    The data are divided into three parts, from coarse to fine:
 
-    1. The descent is the stretch of neighbouring points, each with a smaller error than the one before by a local slope above
-       `SHRINKING` of the steepest, over which the error falls furthest. The steepest is the second largest slope over three
-       neighbours, so that one lucky zero does not set it. What is coarser has not begun to converge; should any of it be as
-       small as the end of the descent, there was none but chance.
-    2. What is finer than its end has reached the floor: the largest error from that end on. Points within `ABOVE_FLOOR` of it
-       are left out. Should the data end in the bend, so that the last pair's slope is less than half that of the rest, its
-       finer point goes too, once.
-    3. The coarsest point is left out as long as the slope of its pair differs from the fit to the others by more than `BEND`,
-       the scatter about the fit is less without it by more than `CALMER`, and four points or more are there.
+    1. The descent is the range of neighbouring points with the largest decrease of the error in which each local slope is above
+       `SHRINKING` of the steepest. The steepest is the second largest slope over three neighbours, so that a single zero does
+       not determine it. Coarser points have not begun to converge. If one of them is as small as the end of the descent, the
+       descent was chance and there is no order.
+    2. Points finer than the end of the descent have reached the floor, the largest error from there on. Points within
+       `ABOVE_FLOOR` of it are not used. If the slope of the last pair is less than half that of the rest, its finer point is
+       not used either.
+    3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
+    the
+       scatter decreases by more than `CALMER`, and at least four points remain.
 
-    Points whose error is not finite, runs that failed, are passed over; errors of zero are at the floor.
+    Failed runs, whose error is not finite, are skipped. Errors of zero are at the floor.
 
     Parameters
     ----------
     steps, errors
-        (n,) each, in any order; steps above 0 and all different.
+        (n,) each, in any order. Step sizes are above 0 and different.
 
     Raises
     ------
     BadInput
-        The shapes differ, or a step is not finite, not above 0, or there twice.
+        The shapes differ, or a step size is not finite, not above 0, or not unique.
     """
     h, e = check_points(steps, errors)
     order = [int(i) for i in np.argsort(-h) if math.isfinite(e[i])]
@@ -119,7 +120,7 @@ def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:
 
 
 def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
-    """Return both as arrays (n,); raise `BadInput` where no order can be fitted to them."""
+    """Return both as arrays (n,). Raise `BadInput` if they are invalid."""
     e = np.array(errors, dtype=float)
     h = finite_array("steps", steps, (e.shape,), f"as many finite steps as there are errors, {e.shape}")
     if h.ndim != 1 or (h <= 0).any() or len(np.unique(h)) < len(h):
@@ -130,7 +131,7 @@ def check_points(steps: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
 
 
 def _descent(x: Array, y: Array) -> tuple[int, int]:
-    """Return first and last index of the stretch of shrinking errors over which the error falls furthest."""
+    """Return first and last index of the range of decreasing errors with the largest decrease."""
     steepest = np.sort((y[:-2] - y[2:]) / (x[:-2] - x[2:]))[-2:][0]
     best, first = (0, 0), 0
     for last in range(1, len(x)):

@@ -6,7 +6,7 @@ import math
 from enum import IntEnum
 
 CONSERVED, SMALL = 1e-10, 1e-4
-"""Relative drift up to which a quantity counts as conserved, and as drifting little."""
+"""Relative drift up to which a quantity is conserved, and up to which its drift is small."""
 
 
 class DriftClass(IntEnum):

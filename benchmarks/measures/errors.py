@@ -26,16 +26,16 @@ class Slope(NamedTuple):
 
 
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
-    """Return every measure of a trajectory; `blanks(trajectory.scene)` has the same in the same order, without values.
+    """Return every measure of a trajectory; `blanks(trajectory.scene)` returns the same measures without values.
 
     Attitude: the angle of R_ref' R, rad. Rates: |w - w_ref| relative to the largest exact |w|. In uniform gravity also the
-    distance of the centre of mass from where it should be, m. For each invariant of the scene: |I - I0| / scale, I0 that of the
-    scene's start, and the slope of (I - I0) / scale over time. Orthonormality: the largest component of |R'R - 1|.
+    error of the centre of mass, m. For each invariant of the scene: |I - I0| / scale with its initial value I0, and the slope
+    of (I - I0) / scale over time. Orthonormality: the largest component of |R'R - 1|.
 
     Parameters
     ----------
     trajectory
-        May end early; the samples that it has are measured.
+        Can end early; its samples are measured.
     truth
         The exact motion at the same times.
 
@@ -64,7 +64,7 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
 
 
 def measure_drifts(trajectory: Trajectory) -> list[Value]:
-    """Return the measures that need no truth: drift of each invariant of the scene, and orthonormality."""
+    """Return the measures that need no reference solution: drift of each invariant, and orthonormality."""
     found: list[Value] = []
     for invariant in trajectory.scene.invariants:
         relative = trajectory.drift(invariant)
@@ -88,8 +88,8 @@ def blanks(scene: Scene) -> list[Value]:
 def secular_slope(t: Array, drift: Array) -> Slope:
     """Return the least-squares slope of a drift (n,) over t (n,) with its standard error.
 
-    Of a vector (n, 3) the length of the three slopes. The standard error takes the residuals as independent; a drift that only
-    oscillates has a slope within a few of them, or one that shrinks as the run gets longer.
+    For a vector (n, 3) it is the length of the three slopes. The standard error assumes independent residuals. A drift that
+    only oscillates has a slope within a few standard errors, or one that decreases with the length of the run.
     """
     if len(t) < 3:
         return Slope(float("nan"), float("nan"))
@@ -100,7 +100,7 @@ def secular_slope(t: Array, drift: Array) -> Slope:
 
 
 def require_same_times(trajectory: Trajectory, truth: Trajectory) -> None:
-    """Raise `BadInput` unless the trajectory's times are the first ones of the truth's, to round-off."""
+    """Raise `BadInput` unless the trajectory's times are the first times of the reference solution, up to round-off."""
     n = len(trajectory)
     if n == 0:
         raise BadInput("trajectory", "no sample", "one sample or more")

@@ -10,7 +10,7 @@ from conservative.attitude import Array
 
 
 class Line(NamedTuple):
-    """A fitted line: its slope and the standard error of that, and the scatter of the points about it, in y's unit."""
+    """A fitted line: slope, its standard error, and the scatter of the points in the unit of y."""
 
     slope: float
     stderr: float
@@ -18,10 +18,10 @@ class Line(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> Line:
-    """Return the line through three points or more, x (n,) and y (n,), any units.
+    """Return the line through three points or more, x (n,) and y (n,).
 
-    The scatter is that of the residuals: the standard error that `linregress` makes of 1 - r^2 has lost its digits where the
-    points lie on a line.
+    The scatter is computed from the residuals, because the standard error of `linregress`, from 1 - r^2, loses its digits if
+    the points lie on a line.
     """
     from scipy.stats import linregress  # here, as importing it takes as long as everything else of a command
 

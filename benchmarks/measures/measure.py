@@ -52,7 +52,7 @@ class Measure(Enum):
 
     @classmethod
     def from_text(cls, text: str) -> Measure:
-        """Return the measure with this text; raise `KeyError` if there is none."""
+        """Return the measure with this text. Raise `KeyError` if it does not exist."""
         return _BY_TEXT[text]
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ _BY_TEXT = {measure.text: measure for measure in Measure}
 class Value:
     """A measure and its value in the unit of the measure; NaN if it could not be measured.
 
-    `quantity` is the name of the invariant that a drift is of, and empty for everything else.
+    `quantity` is the name of the invariant of a drift, and otherwise empty.
     """
 
     measure: Measure
@@ -80,7 +80,7 @@ class Value:
 
     @property
     def blank(self) -> Value:
-        """The same without its value."""
+        """The same measure without a value."""
         return replace(self, value=float("nan"))
 
 

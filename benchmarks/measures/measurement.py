@@ -1,4 +1,4 @@
-"""What a study yields: tidy rows (`Measurement`), and quantities over time (`Samples`). Every field of both is a column."""
+"""The findings of a study: tidy rows (`Measurement`), and quantities over time (`Samples`). Every field is a column."""
 
 from __future__ import annotations
 
@@ -154,14 +154,14 @@ def _count(value: float) -> int | None:
 
 
 def frame(rows: Iterable[Measurement]) -> pd.DataFrame:
-    """Return the rows as a table: columns as `COLUMNS` has them, text as `string`, numbers as `float64`."""
+    """Return the rows as a table with the columns `COLUMNS`, text as `string` and numbers as `float64`."""
     import pandas as pd  # here, so that the command line answers --help without it
 
     return _typed(pd.DataFrame([flat(row) for row in rows], columns=list(COLUMNS)))
 
 
 def samples_frame(lines: Iterable[Samples]) -> pd.DataFrame:
-    """Return a table with a row for each sample: columns as `SAMPLE_COLUMNS` has them, typed as in `frame`."""
+    """Return a table with a row for each sample and the columns `SAMPLE_COLUMNS`, typed as in `frame`."""
     import pandas as pd
 
     parts = [pd.DataFrame(flat_samples(line), columns=list(SAMPLE_COLUMNS)) for line in lines]

@@ -17,11 +17,11 @@ class Machine:
     Attributes
     ----------
     processor, model
-        Its name, and its family and model as Linux numbers them; the latter empty elsewhere.
+        Name, and family and model numbers of Linux (empty on other systems).
     architecture, system
         Such as `x86_64`, and name and release of the operating system.
     cores
-        How many this process may use.
+        Number of cores that this process may use.
     memory
         Total memory, as Linux reports it; "unknown" elsewhere.
     """
@@ -60,7 +60,7 @@ def machine() -> Machine:
 
 
 def first_values(path: str) -> dict[str, str]:
-    """Return the first value of every key in a file of lines `key: value`, as the Linux kernel has them; nothing elsewhere."""
+    """Return the first value of every key in a Linux file of lines `key: value`; empty if there is no such file."""
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -79,7 +79,7 @@ def git(folder: Path, *arguments: str) -> str:
 
 
 def commit(folder: Path, mark_changes: bool = False) -> str:
-    """Return the commit of a folder, where asked for with "+changes" if files differ from it; "" outside git."""
+    """Return the commit of a folder, with "+changes" if `mark_changes` and files differ from it; "" outside git."""
     head = git(folder, "rev-parse", "HEAD")
     changed = head and mark_changes and git(folder, "status", "--porcelain", "--untracked-files=no")
     return f"{head}+changes" if changed else head

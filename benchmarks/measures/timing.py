@@ -1,4 +1,4 @@
-"""Wall time that can be compared: everything in one run, in interleaved rounds, the fastest of which counts."""
+"""Comparable wall times: the fastest of interleaved rounds in one process."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from conservative.errors import IntegrationFailed
 from conservative.outcome import OK, Outcome
 
 MIN_ROUNDS = 3
-"""Rounds that even a run over its budget gets: fewer have no median."""
+"""Smallest number of rounds, also for a run over its budget: fewer have no median."""
 
 
 @dataclass(frozen=True)
 class Timing:
     """Wall time of one call, s: the minimum and the median over `rounds` samples of `calls` calls each.
 
-    For a run that failed while it was timed, as an engine in another process can, both are NaN, and `outcome` has the failure.
+    Both are NaN for a run that failed during timing, such as an engine in another process; `outcome` has the failure.
     """
 
     minimum: float
@@ -39,7 +39,7 @@ class Timing:
 
 @contextmanager
 def without_collector() -> Iterator[None]:
-    """Collect garbage now and not before the end of the block."""
+    """Collect garbage now, and not during the block."""
     enabled = gc.isenabled()
     gc.collect()
     gc.disable()
@@ -62,7 +62,7 @@ def wall_time(run: Callable[[], Any], calls: int = 1) -> float:
 
 
 def count_calls(run: Callable[[], Any], min_time: float) -> int:
-    """Return how many calls last min_time s. The first call is not counted unless it alone lasts ten times as long."""
+    """Return the number of calls that take `min_time` s. The first call is not counted unless it takes ten times as long."""
     if wall_time(run) > 10 * min_time:
         return 1
     calls = 1
@@ -76,9 +76,8 @@ def time_interleaved(
 ) -> dict[str, Timing]:
     """Time several runs against each other.
 
-    Each is called unmeasured first, to warm up and to see how many calls make a sample. Then every round takes one sample of
-    each, in a new random order, so that a slow spell of the machine, or a neighbour in the order, hits them all alike. Ratios
-    of minimums are reproducible.
+    Unmeasured calls warm up and determine the number of calls per sample. Then every round takes one sample of each run in a
+    new random order, so that slow periods of the machine affect all runs equally. Ratios of minimums are reproducible.
 
     Parameters
     ----------
@@ -89,9 +88,9 @@ def time_interleaved(
     min_time
         Shortest sample, s; faster runs are called repeatedly within a sample.
     budget
-        Time, s, for all samples of one run: slower ones get fewer rounds, but at least three.
+        Time, s, for all samples of one run. Slower runs get fewer rounds, but at least three.
     seed
-        Of the orders.
+        Seed of the random orders.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How often a free body turns over: the quality of its motion, whatever the size of the error."""
+"""Number of flips of a free body, a qualitative property of its motion."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 FAR_SIDE = 0.5
-"""Part of the momentum at the start along the axis of the spin that the body has to have the other way round."""
+"""Fraction of the initial momentum along the spin axis that the reversed momentum has to reach for a flip."""
 
 
 def count_turns_over(trajectory: Trajectory) -> int:

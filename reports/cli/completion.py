@@ -1,4 +1,4 @@
-"""Tab completion of what stands on the command line: registered names, and scene files beside the names of scenes."""
+"""Tab completion: registered names, and scene files in addition to the names of scenes."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import click
 from click.shell_completion import CompletionItem
 
 SPREADS = ("attitude", "rate", "inertia")
-"""What can be spread of every scene."""
+"""Quantities that can be spread for every scene."""
 Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
 def methods(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return the registered methods that the last of several, separated by commas, may become."""
+    """Return the registered methods that complete the last of several, separated by commas."""
     before, last = _last(incomplete)
     return [CompletionItem(before + name) for name in _registered("methods", last)]
 
 
 def engines(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return the registered engines that the text may become."""
+    """Return the registered engines that complete the text."""
     return [CompletionItem(name) for name in _registered("engines", incomplete)]
 
 
 def engine_lists(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return `all` and the registered engines that the last of several, separated by commas, may become."""
+    """Return `all` and the registered engines that complete the last of several, separated by commas."""
     before, last = _last(incomplete)
     return [CompletionItem(before + name) for name in ["all"] * "all".startswith(last) + _registered("engines", last)]
 
 
 def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return the registered scenes, scene files, and folders on the way to one, that the last of several may become."""
+    """Return the registered scenes, scene files and folders that complete the last of several."""
     before, last = _last(incomplete)
     names = [*_registered("scenes", last), *_files(last)]
     if not before and (not names or names == [f"{names[0].rstrip('/')}/"]):
@@ -40,27 +40,27 @@ def scenes(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> l
 
 
 def studies(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return the studies that the text may become."""
+    """Return the studies that complete the text."""
     from conservative.benchmarks.studies.studies import MAKERS
 
     return [CompletionItem(name) for name in MAKERS if name.startswith(incomplete)]
 
 
 def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return what can be spread of the scene on the line, the last of several, up to the equals sign."""
+    """Return the quantities that can be spread for the scene on the line, with an equals sign."""
     before, last = _last(incomplete)
     names = [*SPREADS, *(f"potential.{name}" for name in _parameters(ctx.params.get("scene") or "".join(ctx.args[:1])))]
     return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]
 
 
 def _parameters(scene: str) -> list[str]:
-    """Return what can be spread of the potential of a scene; of one that cannot be made, nothing."""
+    """Return the numbers of a scene's potential that can be spread; none if the scene is invalid."""
     from conservative import registry
     from conservative.integration.spread import list_parameters
 
     try:
         return list_parameters(registry.scene(scene))
-    except Exception:  # nobody reads an error while completing
+    except Exception:  # an error cannot be shown during completion
         return []
 
 
@@ -76,7 +76,7 @@ def _registered(group: str, start: str) -> list[str]:
 
 
 def _files(start: str) -> list[str]:
-    """Return what begins with `start`: files that end in .toml, and folders, with a slash; hidden ones only where asked for."""
+    """Return files that end in .toml, and folders, that begin with `start`; hidden ones only if `start` names them."""
     folder, slash, name = start.rpartition("/")
     try:
         entries = sorted(Path(folder + slash).iterdir())

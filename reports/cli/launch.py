@@ -12,7 +12,7 @@ from ..terminal.interrupts import handle_signals, received
 
 
 def launch() -> None:
-    """Run the command line. The exit code is 2 where click, which the command line is made with, is not installed."""
+    """Run the command line. The exit code is 2 if click is not installed."""
     handle_signals()
     _open_streams()
     _separate_stdout()
@@ -32,7 +32,7 @@ def launch() -> None:
 
 
 def _open_streams() -> None:
-    """Open those of stdin, stdout and stderr that are closed, or the next file that is opened would be taken for them."""
+    """Open closed ones of stdin, stdout and stderr. Otherwise the next opened file would get their descriptor."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
@@ -43,11 +43,11 @@ def _open_streams() -> None:
 
 
 def _separate_stdout() -> None:
-    """Keep stdout for what the command prints.
+    """Reserve stdout for the output of the command.
 
-    Compiled code of engines writes to the descriptor of stdout, as heyoka's log does: that goes to stderr, and leaves --json
-    whole. The new stream has a buffer also under PYTHONUNBUFFERED, without which Python loses what a full disk has no room for,
-    and escapes characters that its encoding does not have.
+    Compiled code of engines, such as heyoka's log, writes to the descriptor of stdout. That output goes to stderr and does not
+    damage --json. The new stream has a buffer also under PYTHONUNBUFFERED, because Python loses output on a full disk without
+    one, and escapes characters outside its encoding.
     """
     own = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)

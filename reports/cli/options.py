@@ -1,4 +1,4 @@
-"""What the commands share: the end of every --help, and the reading of lists of names."""
+"""Parts of all commands: output files, the end of every --help, and lists of names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EXIT_CODES = """Exit codes:
 
 
 class FilePath(click.Path):
-    """A path, which no system takes with a NUL in it."""
+    """A path without NUL."""
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if "\0" in str(value):
@@ -50,7 +50,7 @@ class OutputFile(FilePath):
         return super().convert(value, param, ctx)
 
     def marks(self, path: Path) -> Mapping[Path, str]:
-        """Return the files that are written, each with its mark."""
+        """Return the written files and their marks."""
         return {path: self.mark}
 
 
@@ -89,7 +89,7 @@ class OutputCommand(click.Command):
 
 
 HEAD = 4096
-"""Characters of a file that are searched for a mark."""
+"""Number of characters of a file that are searched for a mark."""
 
 
 def require_replaceable(file: Path, mark: str, option: str, force: bool = False, inputs: Iterable[Path] = ()) -> None:
@@ -138,7 +138,7 @@ def _head(file: Path) -> str:
 
 
 def _words(ctx: click.Context, parameter: click.Parameter) -> Iterator[str]:
-    """Yield the texts that may name a file in the value of a parameter, which may be a list, with commas."""
+    """Yield the texts in the value of a parameter that can name files. The value can be a list or contain commas."""
     value = ctx.params.get(str(parameter.name))
     for text in value if isinstance(value, tuple) else (value,):
         if isinstance(text, str | Path):
@@ -146,7 +146,7 @@ def _words(ctx: click.Context, parameter: click.Parameter) -> Iterator[str]:
 
 
 class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the checker, not before click 8.2
-    """A number of things, 1 or more, which may be written as 1e6."""
+    """An integer of 1 or more, such as 1000 or 1e6."""
 
     name = "count"
 
@@ -183,14 +183,14 @@ def show(document: Document, as_json: bool) -> None:
 
 
 def epilog(*examples: str) -> str:
-    """Return what every --help ends with; a backspace on a line of its own keeps click from joining the lines after it."""
+    """Return the end of a --help. A backspace on its own line keeps click from joining the following lines."""
     return "\n".join(["\b", "Examples:", *(f"  {example}" for example in examples), "", "\b", EXIT_CODES])
 
 
 def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:
-    """Return names out of `a,b:setting=1,other=2,c`: what has an equals sign and no colon belongs to the name before it.
+    """Return the names in `a,b:setting=1,other=2,c`. A part with an equals sign and no colon belongs to the name before it.
 
-    An option that is given but names nothing, as `--scenes "$EMPTY"` does, would mean everything: it is a mistake.
+    An empty option, such as `--scenes "$EMPTY"`, is an error, because it would select everything.
     """
     names: list[str] = []
     for item in split_list(argument, texts):
@@ -202,7 +202,7 @@ def split_names(argument: str, texts: tuple[str, ...]) -> list[str]:
 
 
 def split_list(argument: str, texts: tuple[str, ...]) -> list[str]:
-    """Return what is between the commas; an option that is given but names nothing is a mistake, as in `split_names`."""
+    """Return the parts between commas. An empty option is an error, as in `split_names`."""
     items = [item.strip() for text in texts for item in text.split(",") if item.strip()]
     if texts and not items:
         raise click.BadParameter("it names nothing", param_hint=f"--{argument}")

@@ -1,1 +1,1 @@
-"""A run of the report: its plan, its measurements, its checkpoints, and where they come from."""
+"""A run of the report: plan, measurements, checkpoints and provenance."""

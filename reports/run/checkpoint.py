@@ -1,7 +1,7 @@
-"""What is measured of a report that is not written yet: one file beside its folder, so that `--resume` can go on.
+"""The measurements of an unfinished report, in a file next to its folder, from which `--resume` continues.
 
-The file is replaced as a whole after each study, and goes when the report is there. It says on which terms it was measured:
-measurements are only ever put together with others of the same scenes, methods, versions, source and machine.
+The file is replaced as a whole after each study and removed when the report is written. It contains the terms of the
+measurements: only measurements of the same scenes, methods, versions, source and machine are combined.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from .terms import differences, terms
 
 FORMAT = 2
 _BEGINNING = '{"format": '
-"""How every file of unfinished work begins."""
+"""First characters of every file of unfinished work."""
 _MOST_DIFFERENCES = 3
-"""How many differences a complaint has at most."""
+"""Largest number of differences in a message."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """What measured a study: the command, when it began, and the commit (see `Provenance`)."""
+    """Origin of a study: command, start time and commit (see `Provenance`)."""
 
     command: str
     start: str
@@ -42,7 +42,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """All that one study measured: its rows, lines of its pictures, and the process that measured it."""
+    """The results of a study: its rows, the lines of its charts, and the process that measured it."""
 
     rows: tuple[Measurement, ...]
     samples: tuple[Samples, ...]
@@ -51,9 +51,9 @@ class StudyResult:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The studies of a report that are done, by name, and the file that has them too, except before the first.
+    """The finished studies of a report by name, which are also in a file.
 
-    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the `process` that goes on, and `results`.
+    Attributes: `path` of the file, `names` of all studies, `terms` (see `terms`), the current `process`, and `results`.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class Checkpoint:
     results: dict[str, StudyResult] = field(default_factory=dict)
 
     def keep(self, name: str, findings: Iterable[Finding]) -> None:
-        """Keep what a study finds, in the file as well; what an earlier report left there goes. Raise `NotWritten` of it."""
+        """Store the findings of a study, also in the file. Raise `NotWritten` if that fails."""
         every = list(findings)
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
@@ -78,7 +78,7 @@ class Checkpoint:
 
     @property
     def summary(self) -> str:
-        """What is done, where it is and how to go on, in words."""
+        """The finished studies, their file, and the command that continues, in words."""
         if not self.results:
             return "nothing was finished, nothing is kept"
         command = self.process.command
@@ -87,7 +87,7 @@ class Checkpoint:
         return f"{done} and kept in {str(self.path)!r}; go on with: {again}"
 
     def describe_earlier(self) -> tuple[str, ...]:
-        """Return what other processes measured, one sentence each; empty where one process measured everything."""
+        """Return a sentence for each other process that measured a part; empty if one process measured everything."""
         return tuple(
             f"{', '.join(name for name, _ in items)}: measured by an earlier process, which was interrupted; "
             f"begun {by.start} at commit {by.commit} with `{by.command}`"
@@ -97,7 +97,7 @@ class Checkpoint:
 
 
 def path_for(out: Path) -> Path:
-    """Return where the unfinished work of a report into the folder `out` is kept."""
+    """Return the file for the unfinished work of a report into the folder `out`."""
     folder = out.resolve()
     path = folder.parent / f"{folder.name}.partial.json"
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
@@ -109,7 +109,7 @@ def find_unfinished(out: Path) -> Path | None:
     Raises
     ------
     BadInput
-        The file was not written by a report, so that it must not be replaced.
+        The file was not written by a report and must not be replaced.
     """
     path = path_for(out)
     if not path.exists():
@@ -124,12 +124,12 @@ def find_unfinished(out: Path) -> Path | None:
 
 
 def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint:
-    """Return the checkpoint to begin with: empty, or with `resume` with the studies of an unfinished report.
+    """Return the first checkpoint: empty, or the studies of an unfinished report if `resume`.
 
     Raises
     ------
     BadInput
-        There is nothing to resume, or it was measured on other terms or is damaged; or the file was not written by a report.
+        There is nothing to resume, its terms differ or it is damaged; or the file was not written by a report.
     """
     path = find_unfinished(out)
     process = Origin(source.command, source.date, source.commit)
@@ -144,7 +144,7 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
 
 
 def _require_same_terms(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    """Raise `BadInput` unless a file, as `read` has it, was measured on the terms of now."""
+    """Raise `BadInput` if the terms of a file differ from the present ones."""
     different = list(differences(before["terms"], json.loads(json.dumps(now))))
     if different:
         more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
@@ -156,7 +156,7 @@ def _require_same_terms(path: Path, before: Mapping[str, Any], now: Mapping[str,
 
 
 def _content(checkpoint: Checkpoint) -> str:
-    """Return the file: floats come back as they are, nan as nan."""
+    """Return the text of the file. Floats are restored exactly, nan as nan."""
     results = {name: _record(result) for name, result in checkpoint.results.items()}
     content = {"format": FORMAT, "command": checkpoint.process.command, "terms": checkpoint.terms, "pieces": results}
     return json.dumps(content, ensure_ascii=False)
@@ -179,12 +179,12 @@ def _result(record: Mapping[str, Any]) -> StudyResult:
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, StudyResult]]:
-    """Return the command and terms of a file of unfinished work, and its results.
+    """Return command, terms and results of a file of unfinished work.
 
     Raises
     ------
     BadInput
-        It cannot be read, or is something else.
+        It cannot be read, or is another kind of file.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""What a report measures, study by study; each is kept in the checkpoint as soon as it is done."""
+"""The measurements of a report. Each finished study is stored in the checkpoint."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .plan import Plan
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """All that a report measures: the tidy table (see `Measurement`), and the samples of lines (see `Samples`)."""
+    """The measurements of a report: the tidy table (see `Measurement`), and the samples of lines (see `Samples`)."""
 
     table: pd.DataFrame
     samples: pd.DataFrame
@@ -26,7 +26,7 @@ class Measurements:
 def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
     """Return rows and samples in the order of the plan.
 
-    Studies in the checkpoint are not measured again; the others are stored there. `step` gets the share that is done.
+    Studies in the checkpoint are not measured again, others are added to it. `step` is called with the finished share.
     """
     for i, study in enumerate(plan.studies):
         if study.name in checkpoint.results:

@@ -14,7 +14,7 @@ from conservative.scene import Scene
 from .provenance import Lock, locks_of
 
 MAIN_TIME_LIMIT = 0.15
-"""Longest single run, s, that a default report plans for, so that all of it takes a minute. A full one has that of `Study`."""
+"""Time budget of a run, s, in a default report, which then takes a minute. A full report has that of `Study`."""
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""
 
@@ -82,7 +82,7 @@ def plan_report(
     png
         Whether pictures are also written as PNG.
     time_limit
-        Longest single run to plan for, s; see `Study`. Default: `MAIN_TIME_LIMIT` for the scenes, unless `full`.
+        Time budget of a run, s; see `Study`. Default: `MAIN_TIME_LIMIT` for the scenes, unless `full`.
     bodies
         Random bodies in each field. Default: none; if `full` and no scene is named `BODIES`, or `QUICK_BODIES` if `quick`.
     seed
@@ -108,7 +108,7 @@ def plan_report(
         for method in (*compared, *found):
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     made: list[Study] = []
-    # Random bodies come first, as the page shows them first. A method that takes none of them leaves the study out.
+    # Random bodies come first, as on the page. Methods that do not support them are not part of the study.
     if bodies and (drawn := random.select(every)):
         made.append(random.random_study(drawn, bodies, seed, quick, skip_missing))
     # In the order of the table of all studies.

@@ -1,4 +1,4 @@
-"""Where numbers come from: command, machine, versions, commit, date."""
+"""The provenance of measurements: command, machine, versions, commit, date."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from conservative.method import Method
 from conservative.references.environments.engine_method import EngineMethod
 
 COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy", "numba", "mpmath", "pandas", "altair")
-"""Packages whose versions can change a number; a report names them first."""
+"""Packages whose versions can change measurements. A report lists them first."""
 
 
 @dataclass(frozen=True)
 class Lock:
-    """What an engine's environment has: `name`, as `exudyn==1.13.6`, its `python`, and all `packages`, as `name==version`."""
+    """Contents of an engine's environment: `name`, as `exudyn==1.13.6`, `python`, and all `packages`, as `name==version`."""
 
     name: str
     python: str
@@ -37,10 +37,10 @@ def locks_of(methods: Iterable[Method]) -> tuple[Lock, ...]:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What it takes to make a report again.
+    """Everything that is needed to repeat a report.
 
-    `resumed` says what earlier processes measured, one sentence each, where this one did not measure everything. `environments`
-    are the locks of those that engines ran in.
+    `resumed` has a sentence for each earlier process that measured a part. `environments` are the locks of the engines'
+    environments.
     """
 
     command: str
@@ -54,7 +54,7 @@ class Provenance:
 
     @property
     def compared(self) -> dict[str, str]:
-        """Versions of what can change a number, by package."""
+        """Versions of the packages that can change measurements, by package."""
         return {name: self.packages.get(name, "not installed") for name in COMPARED}
 
     @property
@@ -77,7 +77,7 @@ def provenance(arguments: list[str] | None = None) -> Provenance:
 
 
 def describe_origin() -> dict[str, str]:
-    """Return how and where something is measured; to be asked before any work, as files and the commit can change meanwhile."""
+    """Return command, machine, versions and commit, before any work: files and the commit can change meanwhile."""
     source = provenance()
     return {"command": source.command, "date": source.date, "commit": source.commit, **source.machine}
 

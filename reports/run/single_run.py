@@ -28,7 +28,7 @@ from conservative.trajectory import Trajectory
 from ..terminal.progress import Step
 
 SAMPLES = 1_000_000
-"""Largest number of samples; every step is one in runs of no more steps."""
+"""Largest number of samples. Shorter runs store every step."""
 STEPS = 10**11
 """Largest number of steps: a day's work of a fast method."""
 TIMED = 0.2
@@ -96,10 +96,10 @@ def compare(
 
 
 def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:
-    """Return the steps and samples, or find what `integrate` would refuse before a file is opened."""
+    """Return the grid. Invalid arguments raise here, before a file is opened."""
     dt = scene.dt if dt is None else dt
     try:
-        grid = grid_for(scene, dt, t_end, STEPS)  # few samples: how many there will be is decided below
+        grid = grid_for(scene, dt, t_end, STEPS)  # few samples: their number is determined below
     except OverflowError:  # more steps than a float can count
         grid = Grid(dt or 0.0, STEPS + 1)
     require_support(method, scene)
@@ -113,7 +113,7 @@ def _integrate(scene: Scene, method: Method, grid: Grid) -> Trajectory:
 
 
 def summarize(trajectory: Trajectory, method: Method, dt: float) -> dict[str, Any]:
-    """Return what a run was, how it ended, its drifts and its last state."""
+    """Return the description of a run, its outcome, its drifts and its final state."""
     scene = trajectory.scene
     return {
         "scene": scene.name,

@@ -1,4 +1,4 @@
-"""One study, out of the table of them, on its own: what it is of where nothing is named, and its measurements."""
+"""A single study by name, with its default scenes and methods, and its measurements."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def plan_study(
     skip_missing: bool = False,
     time_limit: float | None = None,
 ) -> Study:
-    """Return a study by name; names of scenes, methods and engines that are left out stand for the study's own.
+    """Return a study by name. Omitted scenes, methods and engines are the defaults of the study.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def plan_study(
     Raises
     ------
     BadInput
-        A name, a setting or a number cannot be used, or is not for this study.
+        A name, a setting or a number is invalid, or does not apply to this study.
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
@@ -107,7 +107,7 @@ def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:
 
 
 def read_count(argument: str, text: str) -> int:
-    """Return the number that a text such as `1e6` stands for. Raise `BadInput` for what is no integer of 1 or more."""
+    """Return the value of a text such as `1e6`. Raise `BadInput` if it is not an integer of 1 or more."""
     with suppress(ValueError, OverflowError):
         if (number := float(text)) >= 1 and number == int(number):
             return int(number)
@@ -115,12 +115,12 @@ def read_count(argument: str, text: str) -> int:
 
 
 def measure_study(study: Study, progress: Progress, scheduler: str | None = None) -> Measurements:
-    """Return all that the study finds: here, or on the Dask cluster whose scheduler has this address.
+    """Return the findings of a study, measured here or on the Dask cluster with this scheduler.
 
     Raises
     ------
     BadInput
-        The study is one of times, no scheduler answers, or its workers cannot be used.
+        The study measures times, no scheduler answers, or its workers cannot be used.
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """

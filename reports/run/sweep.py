@@ -29,18 +29,18 @@ KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
 _SPREAD = "what varies, and how, such as attitude=5deg, rate=2%, inertia=1% or potential.weight=2%"
 MOST_TIMES = 6
-"""Times at most at which a summary shows how far attitudes are apart."""
+"""Largest number of times in the summary of the spread of attitudes."""
 MOST_FAILURES = 10
-"""Failures that a summary lists at most."""
+"""Largest number of failures in a summary."""
 Step = Callable[[float, str], None]
 Summary = dict[str, Any]
 _OPTIONS = {"path": "out", "sample_every": "samples", "client": "scheduler", "n": "starts"}
-"""Arguments of `integrate_many` and `spread`, and the options that they come from."""
+"""Arguments of `integrate_many` and `spread`, and their options."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What `integrate_many` is given: a scene, initial states and bodies, and settings; and the options that they come from."""
+    """The arguments of `integrate_many` and their options."""
 
     scene: Scene
     starts: Mapping[str, Any]
@@ -89,7 +89,7 @@ def plan(
     dt: float | None,
     **settings: Any,
 ) -> Sweep:
-    """Return what is asked for; `varied` is as `read_spread` returns it, and the settings are those of `integrate_many`.
+    """Return the sweep. `varied` is a result of `read_spread`, and the settings are those of `integrate_many`.
 
     Raises
     ------
@@ -132,7 +132,7 @@ class Result:
 
 
 def run_sweep(sweep: Sweep, step: Step) -> Result:
-    """Return the result of a sweep; `step` is called with the share that is done, and how fast, in words.
+    """Return the result of a sweep. `step` is called with the finished share and the rate in words.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
 
 
 def _in_options(error: BadInput) -> BadInput:
-    """Return an error about an argument of a function as one about an option."""
+    """Return an error about an argument as an error about its option."""
     allowed = error.allowed.replace("resume=True", "--resume")
     argument = _OPTIONS.get(error.argument, error.argument)
     if argument == "samples":
@@ -176,7 +176,7 @@ def _in_options(error: BadInput) -> BadInput:
 
 
 def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    """Return what is kept, should the run end now; nothing if samples are not written to a folder."""
+    """Return the note on the stored bodies for an interrupted run; empty if samples are not written to a folder."""
     out = sweep.settings.get("path")
     if out is None:
         return ""
@@ -189,7 +189,7 @@ def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
 
 
 def summarize(sweep: Sweep, result: Result) -> Summary:
-    """Return outcomes, drifts, how far attitudes are apart, and rates."""
+    """Return outcomes, drifts, spread of attitudes, and rates."""
     found, last, choice = result.ensemble, result.last, result.ensemble.choice
     rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
     failed = sorted(found.failures.items())
@@ -233,7 +233,7 @@ def summarize(sweep: Sweep, result: Result) -> Summary:
 
 
 def rate_text(value: float) -> str:
-    """Return a rate with three digits, such as 3,460 or 20.7M, in any unit."""
+    """Return a rate with three digits, such as 3,460 or 20.7M."""
     for size, prefix in ((1e9, "G"), (1e6, "M")):
         if value >= size:
             return f"{value / size:.3g}{prefix}"

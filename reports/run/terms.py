@@ -1,4 +1,4 @@
-"""The terms of a report: what has to be the same for measurements of two processes to be put together."""
+"""The terms of a report. Measurements of two processes are combined only if their terms are equal."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .plan import Plan
 from .provenance import Provenance
 
 _ROOMS = (".", "references", "benchmarks")
-"""What decides about a measurement; `reports` only shows it."""
+"""Packages whose source determines measurements. `reports` only shows them."""
 
 
 def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
-    """Return what has to be the same for measurements to be put together, as what JSON knows."""
+    """Return the terms of measurements as JSON values."""
     return {
         "studies": list(plan.names),
         "scenes": {scene.name: define_scene(scene) for scene in plan.scenes},
@@ -36,7 +36,7 @@ def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
 
 
 def _source_hash() -> str:
-    """Return the hash of all source that decides about a measurement: a commit would not tell of changes, nor without git."""
+    """Return the hash of all source that determines measurements. A commit does not show local changes and needs git."""
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for file in sorted({file for room in _ROOMS for file in (root / room).rglob("*.py")} - set((root / "reports").rglob("*"))):
@@ -45,7 +45,7 @@ def _source_hash() -> str:
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """Yield in words what differs between two terms."""
+    """Yield the differences between two terms, in words."""
     for name in {**before, **now}:
         old, new = before.get(name), now.get(name)
         if isinstance(old, dict) and isinstance(new, dict):

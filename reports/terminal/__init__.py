@@ -1,1 +1,1 @@
-"""What a person in front of a terminal sees and presses: progress and interrupts."""
+"""Progress and interrupts on a terminal."""

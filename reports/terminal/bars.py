@@ -1,4 +1,4 @@
-"""The bar of `progress`, in a file of its own, since importing rich takes longer than showing a --help."""
+"""The bar of `progress`. It has its own file, because importing rich takes longer than showing a --help."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Column
 
 ECHO = len("^C") + 1
-"""Columns left free at the end of a line: the ^C that a terminal shows must not break it, or the bar cannot be removed."""
+"""Free columns at the end of a line for the ^C of a terminal. If the line wrapped, the bar could not be removed."""
 
 
 class Bar(Progress):
-    """A bar on stderr: share, time spent, time left, what is done. It is gone when it stops."""
+    """A bar on stderr with share, elapsed time, remaining time and current work. It is removed when it stops."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        # Numbers keep their width where the terminal is narrow; bar and text share what is left.
+        # On a narrow terminal, numbers keep their width, and bar and text share the remaining columns.
         columns = (
             BarColumn(None, table_column=Column(ratio=1)),
             TaskProgressColumn(table_column=Column(min_width=4, no_wrap=True)),
@@ -31,6 +31,6 @@ class Bar(Progress):
         super().__init__(*columns, console=self._terminal, transient=True, expand=True, get_time=clock)
 
     def get_renderables(self) -> Iterable[RenderableType]:
-        """Yield what is shown, a little narrower than the terminal."""
+        """Yield the table of the bar, a little narrower than the terminal."""
         for renderable in super().get_renderables():
             yield Constrain(renderable, max(1, self._terminal.width - ECHO))

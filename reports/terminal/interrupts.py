@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP end a command by an exception, so that its temporary files and its processes go with it.
+"""Ctrl-C, SIGTERM and SIGHUP end a command by an exception, so that its temporary files and processes are removed.
 
 Kernels call handlers of signals between blocks of steps (`kernels/signals.py`). During a call of an engine's compiled code a
 signal waits until that call returns.
@@ -32,9 +32,9 @@ received: list[Interrupted] = []
 
 
 def handle_signals() -> None:
-    """Have signals raise `Interrupted` from now on, except those that are ignored, as under nohup.
+    """Make signals raise `Interrupted`, except ignored ones, such as SIGHUP under nohup.
 
-    A second Ctrl-C ends the process at once. Other signals after the first are ignored, so that tidying up can finish.
+    A second Ctrl-C ends the process at once. Other signals after the first are ignored, so that cleanup can finish.
     """
     for number in _NUMBERS:
         if signal.getsignal(number) not in (None, signal.SIG_IGN):
@@ -52,7 +52,7 @@ def _interrupt(number: int, frame: object) -> None:
 
 
 def _send_again(unraisable: Any) -> None:
-    """Send a signal again whose exception was ignored: the callback of a weak reference, as imports have them, cannot raise."""
+    """Send a signal again if its exception was ignored, as in callbacks of weak references, which imports use."""
     if unraisable.exc_value in received:
         received.clear()
         threading.Timer(_AGAIN, os.kill, (os.getpid(), unraisable.exc_value.number)).start()
@@ -62,7 +62,7 @@ def _send_again(unraisable: Any) -> None:
 
 @contextmanager
 def unstoppable() -> Iterator[None]:
-    """Make signals wait until the end of the block: for a few renames that belong together."""
+    """Delay signals until the end of the block, for renames that belong together."""
     # Blocking them in this thread is not enough: the system would hand them to another one.
     waiting: list[int] = []
     in_main_thread = threading.current_thread() is threading.main_thread()  # only there can handlers be set

@@ -10,9 +10,9 @@ from threading import Event, Thread
 from time import monotonic
 
 Step = Callable[[float, str], None]
-"""Called with the share of all work that is done, 0 to 1, and what comes next."""
+"""Called with the finished share of all work, 0 to 1, and a description of the next piece."""
 DELAY = 1.0
-"""Time, s, that one piece of work takes before a bar appears."""
+"""Time, s, after which a bar appears."""
 
 
 def has_terminal() -> bool:
@@ -41,7 +41,7 @@ def progress() -> Iterator[Step]:
 
 @contextmanager
 def show_waiting(what: str, clock: Callable[[], float] = monotonic) -> Iterator[None]:
-    """Show that one piece of work goes on, if it takes longer than `DELAY`."""
+    """Show a bar if a piece of work takes longer than `DELAY`."""
     if not has_terminal():
         yield
         return

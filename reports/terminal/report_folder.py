@@ -1,8 +1,8 @@
-"""The folder of a report, which is there whole or not at all: written beside its place, then renamed.
+"""The folder of a report, complete or absent: it is written next to its place and then renamed.
 
-Of an earlier report the files that its manifest lists go; anything a person put beside them stays. A swap takes three steps:
-the earlier folder steps aside, the new one takes its place, what is a person's moves over. Where a kill ends it in between, the
-next report puts back what is missing, and removes the rest.
+The files in the manifest of an earlier report are removed, other files stay. The exchange has three steps: the earlier folder
+is renamed, the new one takes its place, and other files move over. After a kill between them, the next report restores missing
+files and removes leftovers.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from conservative.errors import BadInput, NotWritten
 from .interrupts import unstoppable
 
 MANIFEST = "measurements.json"
-"""The file of a report that lists the others under `files`, and by which a folder is known to be one."""
+"""The file of a report that lists the others under `files`. It identifies the folder of a report."""
 _FOLDER = "a folder that can be written and is new, empty, or an earlier report, on a disk with room for it"
 _ASIDE = "-old"
-"""How the name of an earlier report that has stepped aside ends."""
+"""Suffix of the renamed folder of an earlier report."""
 _SWAP_TIME = 1.0
-"""Time, s, that another report may take to finish with the same folder."""
+"""Time, s, to wait for another report that exchanges the same folder."""
 
 
 @contextmanager
 def report_folder(target: Path) -> Iterator[Path]:
-    """Yield an empty folder that takes the place of `target` when the block ends well, and vanishes when it does not.
+    """Yield an empty folder that replaces `target` when the block succeeds, and is removed when it fails.
 
-    The folder is made before the block: a place that cannot be written is an error before any work.
+    The folder is created before the block, so a place that cannot be written is an error before any work.
 
     Raises
     ------
     BadInput
-        The target cannot be written, is a file, or is a folder with other things in it; or the disk is full.
+        The target cannot be written, is a file, or is a folder with other files; or the disk is full.
     """
-    target = target.resolve()  # a link stays one
+    target = target.resolve()  # a link stays a link
     _require_place(target)
     with ExitStack() as stack:
         try:
@@ -59,7 +59,7 @@ def report_folder(target: Path) -> Iterator[Path]:
 
 
 def recover(target: Path) -> None:
-    """Put back what a kill in the middle of a swap left beside a folder, and remove leftovers."""
+    """Restore the files of an interrupted exchange, and remove leftovers."""
     for old in files.leftovers(target, _ASIDE):
         with suppress(OSError):
             if target.exists():
@@ -70,7 +70,7 @@ def recover(target: Path) -> None:
 
 
 def _require_place(target: Path) -> None:
-    """Raise `BadInput` where a folder is no place for a report."""
+    """Raise `BadInput` if a folder must not be replaced by a report."""
     if not target.exists():
         return
     if not target.is_dir():
@@ -96,12 +96,12 @@ def _make(path: Path) -> int:
 
 
 def _in_place(error: NotWritten, fresh: Path, target: Path) -> NotWritten:
-    """Return an error about a file of the new folder as one about the place of that."""
+    """Return an error about a file in the new folder as an error about its place."""
     return NotWritten("out", target, error.cause, _FOLDER) if error.path.is_relative_to(fresh) else error
 
 
 def _swap(fresh: Path, target: Path) -> None:
-    """Put one folder in the place of another. Nothing is deleted before all that must stay is where it belongs."""
+    """Replace a folder by another. Files are deleted last."""
     files.sync(fresh)
     aside: list[tuple[Path, int | None]] = []
     while True:
@@ -110,7 +110,7 @@ def _swap(fresh: Path, target: Path) -> None:
         try:
             fresh.rename(target)
             break
-        except OSError as error:  # another report was put there at this moment
+        except OSError as error:  # another report appeared at this moment
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                 raise
     for old, handle in aside:
@@ -121,9 +121,9 @@ def _swap(fresh: Path, target: Path) -> None:
 
 
 def _step_aside(target: Path) -> tuple[Path, int | None]:
-    """Rename an earlier report and return its new name, with its lock: nobody may take it for a leftover.
+    """Rename an earlier report and return its new name and its lock, which protects it from `recover`.
 
-    Another report that holds it has just been put there, and is about to be done with it.
+    If another process holds the lock, it has just written this report and is about to release it.
     """
     end = time.monotonic() + _SWAP_TIME
     while (handle := files.lock(target)) is None and target.exists() and time.monotonic() < end:
@@ -132,12 +132,12 @@ def _step_aside(target: Path) -> tuple[Path, int | None]:
 
 
 def _move_foreign(old: Path, target: Path) -> None:
-    """Move what no report wrote from an earlier folder into its successor, then remove the earlier one."""
+    """Move files that no report wrote from an earlier folder into the new one, then remove the earlier one."""
     listed = _manifest(old / MANIFEST) or ()
     for name in sorted(path.name for path in old.iterdir() if path.name not in listed):
         if (target / name).exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target / name))
         (old / name).rename(target / name)
     done = target.with_name(old.name.removesuffix(_ASIDE))
-    old.rename(done)  # by this name all of it is a leftover, should a kill end its removal
+    old.rename(done)  # with this name it is a leftover if a kill interrupts its removal
     files.remove(done)
