@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import chain
 
 from .. import registry
@@ -83,8 +84,9 @@ class Candidate:
     @property
     def settled(self) -> bool:
         """Whether the last step is short enough, or shorter ones do not help."""
-        stalled = self.method.order is None or stops_falling([error for _, error in self.attempts])
-        return bool(self.attempts) and (self.reached or stalled)
+        if not self.attempts:
+            return False
+        return self.reached or self.method.order is None or stops_falling([error for _, error in self.attempts])
 
     @property
     def hopeless(self) -> bool:
@@ -111,8 +113,9 @@ class Candidate:
         )
         return after if after.settled else replace(after, dt=grid.dt * step_factor(trial.error, self.error, self.method))
 
+    @cached_property
     def prior_work(self) -> float:
-        """Return a guess at the work, ns, from order and rate alone: error = (rate * step)^order."""
+        """A guess at the work, ns, from order and rate alone: error = (rate * step)^order."""
         step = 1.0 if self.method.order is None else (SAFETY * self.error) ** (1 / self.method.order)
         return self.method.card.cost(self.method).least * self.rate * self.duration / step
 
@@ -121,7 +124,7 @@ class Candidate:
         if self.hopeless:
             return math.inf
         if not self.attempts:
-            return scale * self.prior_work()
+            return scale * self.prior_work
         if self.settled:
             return self.work * (1.0 if self.reached or self.method.order is None else PENALTY)
         dt, error = self.attempts[-1]
@@ -172,7 +175,7 @@ def most_promising(running: Sequence[Candidate]) -> int:
         return 0
     # The fastest rotation that the energy allows may be far above the actual one. Candidates that have reached the error
     # show by how much, and the priors of the others are scaled to be lower bounds.
-    ratios = (each.work / each.prior_work() for each in running if each.reached and each.prior_work() > 0)
+    ratios = (each.work / each.prior_work for each in running if each.reached and each.prior_work > 0)
     scale = min(ratios, default=1.0) / LENIENCY
     return min(range(len(running)), key=lambda i: running[i].expected_work(scale))
 
@@ -187,7 +190,7 @@ def candidates(scene: Scene, exact: bool = True) -> tuple[Method, ...]:
     chosen: dict[str, tuple[Method, ...]] = {}
     for family in sorted(families, key=lambda family: family.card.rank or 0):
         try:
-            settings = family.settings_for("candidates")
+            settings = _settings_of(family)
         except MissingEngine:
             continue
         if not settings or (family.card.exact and not exact) or settings[0].unsupported(scene) is not None:
@@ -196,6 +199,12 @@ def candidates(scene: Scene, exact: bool = True) -> tuple[Method, ...]:
             return settings
         chosen.setdefault(family.card.group or family.family, settings)
     return tuple(chain.from_iterable(chosen.values()))
+
+
+@lru_cache(maxsize=64)
+def _settings_of(family: type[Method]) -> tuple[Method, ...]:
+    """Return the settings that are tried; reading them from the card each time would double the time of `candidates`."""
+    return family.settings_for("candidates")
 
 
 def even_grid(t_end: float, dt: float, sample_every: int) -> Grid:

@@ -1,6 +1,5 @@
 """The automatic choice of a method and a step: its rules, its cost, its memory, and the estimates of errors it rests on."""
 
-import dataclasses
 import math
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -95,10 +94,6 @@ def test_the_next_step_follows_from_the_order(estimate, power, expected):
     assert search.step_factor(estimate, 1e-6, Known(power=power)) == pytest.approx(expected)
 
 
-def test_factors_by_which_a_finer_run_is_better():
-    assert [trials.convergence_factor(Known(power=power)) for power in (0, 2, 4, 6)] == [1.0, 3.0, 15.0, 30.0]
-
-
 @pytest.mark.parametrize(
     ("errors", "stalls"),
     [
@@ -113,17 +108,6 @@ def test_factors_by_which_a_finer_run_is_better():
 def test_errors_that_stop_falling(errors, stalls):
     assert search.stops_falling(errors) is stalls
     assert search.stops_falling([math.inf, *errors]) is stalls
-
-
-def test_bounds_and_counts():
-    faster = cv.Scene("spin", BODY, np.eye(3), (0, 0, 3.0), 8.0)
-    for scene in (SCENE, faster):
-        assert search.bound_rate(scene) == pytest.approx(math.sqrt(2 * scene.energy_scale))
-    trajectory = Known().prepare(SCENE, cv.Grid(0.5, 4, 1))()
-    assert trials.count_work(Known(step=7.0), trajectory) == 3.0 * 8 + 7.0 * 4
-    explicit = dataclasses.replace(trajectory, counters=Counters(4, 4, None))
-    assert trials.count_work(Known(step=7.0), explicit) == 7.0 * 4
-    assert trials.rounding_error(trajectory) == pytest.approx(2.0**-53 * 2.0 * 2.0, rel=1e-9, abs=0)
 
 
 @pytest.mark.parametrize(("every", "n"), [(1, 8), (2, 8), (3, 8), (1, 6), (3, 10), (4, 10)])
@@ -275,11 +259,6 @@ def test_a_low_order_is_given_up_before_it_is_dear(choose, error, reverse):
     assert sum(1.5 * each.card.cost(each).least * grid.n_steps for each, grid in made) < 40 * needed[method]
 
 
-def test_work_is_extrapolated_from_the_order():
-    candidate = search.Candidate(Known(power=2), 2e-9, 8.0, 1.0, 0.01, ((0.1, 1e-3),), 2.0)
-    assert candidate.expected_work(1.0) == pytest.approx(2.0 * 80 * 1e3 / search.LENIENCY)
-
-
 def test_the_first_rank_is_tried_first_and_the_hopeless_not_at_all(choose):
     first, never = Known(size=0.1, power=8, step=50.0), Known(size=0.1, power=2, step=49.0)
     choose(first, never)
@@ -347,15 +326,6 @@ def test_scenes_of_other_content_share_nothing():
     assert {trials.content_of(each) for each in same} == {found[0]}
     assert trials.trials_of(same[0]).known is trials.trials_of(scene).known
     assert trials.trials_of(others[0]).known is not trials.trials_of(scene).known
-
-
-def test_functions_are_the_same_where_they_are_the_same_object():
-    def field():
-        return cv.FunctionPotential(lambda R: R[2, 2], lambda R: np.diag((0.0, 0.0, 1.0)))
-
-    one, other = field(), field()
-    assert trials.content_of(satellite(potential=one)) == trials.content_of(satellite(potential=one))
-    assert trials.content_of(satellite(potential=one)) != trials.content_of(satellite(potential=other))
 
 
 def test_memory_is_bounded(monkeypatch, choose):
