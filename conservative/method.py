@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import wraps
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
 from .card import Role as Role
@@ -45,6 +45,8 @@ class Method(ABC):
     family: ClassVar[str]
     role: ClassVar[Role]
     card: ClassVar[Card] = Card()
+    if TYPE_CHECKING:
+        __dataclass_fields__: ClassVar[dict[str, Any]]  # subclasses are dataclasses
 
     def __init_subclass__(cls) -> None:
         if "unsupported" in vars(cls):

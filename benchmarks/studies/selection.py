@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, NoReturn
+from typing import ClassVar, NoReturn
 
 from conservative import registry
 from conservative.errors import MissingEngine, NotLoadable
@@ -17,11 +17,11 @@ TOLERANCES = ("tol", "rtol", "tolerance")
 """Settings that control the accuracy of adaptive methods instead of dt."""
 
 Settings = Callable[[Method], tuple[Method, ...]]
-"""Maps a method to settings of its family."""
+"""Returns the settings of a method's family that its bare name stands for."""
 
 
 def all_variants(method: Method) -> tuple[Method, ...]:
-    """Return all variants of a method's family."""
+    """Return all settings that tables include."""
     return method.settings_for("variants")
 
 
@@ -56,29 +56,23 @@ class Missing(Method):
 
 
 def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
-    """Return scenes by name, which can include parameters.
-
-    Raises
-    ------
-    BadInput
-        A name or a parameter is unknown, or a value cannot be used.
-    """
+    """Return scenes by name, with parameters if a name has them. Raises as `registry.scene`."""
     return tuple(registry.scene(name) for name in names)
 
 
 def methods(
     names: Iterable[str] | None = None, skip_missing: bool = False, settings: Settings = all_variants
 ) -> tuple[Method, ...]:
-    """Return methods by name, ours first. The name of a family, such as `mujoco`, means all its variants.
+    """Return methods by name, ours first.
 
     Parameters
     ----------
     names
-        Default: every registered family.
+        Names, by default of every registered family.
     skip_missing
-        A `Missing` method for each name whose engine is not installed, instead of an error.
+        Return a `Missing` method for each name whose engine is not installed, instead of an error.
     settings
-        Settings that the name of a family means; by default all variants.
+        Returns the settings that a family's bare name, such as `mujoco`, stands for.
 
     Raises
     ------
@@ -87,11 +81,20 @@ def methods(
     MissingEngine
         An engine is not installed, and `skip_missing` is False.
     """
-    wanted = registry.list_methods() if names is None else names
-    found: dict[Method, None] = {}
-    for name in wanted:
-        found.update(dict.fromkeys(_resolve(name, skip_missing, settings)))
-    return tuple(sorted(found, key=lambda method: list(Role).index(Role(method.role))))
+    selected: dict[Method, None] = {}
+    for name in registry.list_methods() if names is None else names:
+        try:
+            method = registry.method(name)
+            selected.update(dict.fromkeys((method,) if ":" in name else settings(method)))
+        except MissingEngine as error:
+            if not skip_missing:
+                raise
+            selected[Missing(name, error.engine, error.package)] = None
+        except NotLoadable as error:  # a broken entry point of another package
+            if not skip_missing:
+                raise
+            selected[Missing(name, name, error.place)] = None
+    return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 
 def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
@@ -104,69 +107,43 @@ def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
     return methods(names, skip_missing, lambda method: (method,))
 
 
-def _resolve(name: str, skip_missing: bool, settings: Settings) -> tuple[Method, ...]:
-    try:
-        method = registry.method(name)
-        return (method,) if ":" in name else settings(method)
-    except MissingEngine as error:
-        if not skip_missing:
-            raise
-        return (Missing(name, error.engine, error.package),)
-    except NotLoadable as error:  # a broken entry point of another package
-        if not skip_missing:
-            raise
-        return (Missing(name, name, error.place),)
-
-
 def tolerance_setting(method: Method) -> str | None:
-    """Return the name of the setting that controls the accuracy of an adaptive method, or None."""
+    """Return the name of the setting that determines the accuracy of an adaptive method; None if there is none."""
     if method.order is not None:
         return None
-    return next((field.name for field in fields(_value(method)) if field.name in TOLERANCES), None)
+    return next((field.name for field in fields(method) if field.name in TOLERANCES), None)
 
 
 def takes_exact_steps(method: Method) -> bool:
-    """Return whether steps have no truncation error: neither a step size nor a tolerance controls the accuracy."""
+    """Return whether steps have no truncation error, so that accuracy depends on neither a step nor a tolerance."""
     return method.order is None and tolerance_setting(method) is None
 
 
 def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
     """Return the method with another tolerance."""
-    changed: Method = replace(_value(method), **{setting: tolerance})
-    return changed
+    return replace(method, **{setting: tolerance})
 
 
 def series(method: Method) -> str:
-    """Return the name of a line in a chart: the method's name without its tolerance."""
+    """Return the name of a line in a chart: that of the method without its tolerance."""
     setting = tolerance_setting(method)
     if setting is None:
         return method.name
-    default = next(field.default for field in fields(_value(method)) if field.name == setting)
+    default = next(field.default for field in fields(method) if field.name == setting)
     return at_tolerance(method, setting, default).name if isinstance(default, float) else method.name
 
 
 def identifier(scene: Scene, method: Method, dt: float) -> str:
     """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
 
-    The id contains the settings that differ from the default, and the first setting if it is a text, such as the name of an
-    engine's integrator.
+    It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's integrator.
     """
-    settings = [(field.name, getattr(method, field.name), field.default) for field in fields(_value(method))]
-    shown = [
-        _short(name, setting)
-        for position, (name, setting, default) in enumerate(settings)
-        if setting != default or (position == 0 and isinstance(setting, str))
-    ]
+    shown = []
+    for position, field in enumerate(fields(method)):
+        value = getattr(method, field.name)
+        if isinstance(value, str):
+            if position == 0 or value != field.default:
+                shown.append(value.lower())
+        elif value != field.default:
+            shown.append({"order": "o", "stages": "s"}.get(field.name, field.name) + str(value))
     return f"{scene.name}-{'_'.join([method.family, *shown])}-dt{dt:g}"
-
-
-def _short(name: str, setting: object) -> str:
-    """Return a setting as part of an id: texts as they are, numbers with the name of the setting."""
-    if isinstance(setting, str):
-        return setting.lower()
-    return {"order": "o", "stages": "s"}.get(name, name) + str(setting)
-
-
-def _value(method: Method) -> Any:
-    """Methods are frozen dataclasses, which the type of their abstract base cannot say."""
-    return method
