@@ -10,7 +10,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import allow_build_option, epilog, find_links_option, show
+from .options import allow_build_option, epilog, find_links_option, json_option, show
 
 if TYPE_CHECKING:
     from conservative.references.environments.install import Installation
@@ -31,9 +31,6 @@ def engines() -> None:
 
     Engines that are installed with the package itself, such as MuJoCo, need no environment. `conservative list` shows them.
     """
-
-
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
 @engines.command(short_help="Install engines.", epilog=epilog("conservative engines install drake exudyn==1.13.6"))

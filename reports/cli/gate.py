@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,18 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import FilePath, OutputCommand, OutputFile, allow_build_option, epilog, find_links_option, split_names
+from .options import (
+    FilePath,
+    OutputCommand,
+    OutputFile,
+    allow_build_option,
+    epilog,
+    find_links_option,
+    names_option,
+    output_files,
+    show,
+    split_names,
+)
 
 if TYPE_CHECKING:
     from ..document.model import Document
@@ -46,19 +56,8 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
     help="The older version. Both versions run in turn, each in its own environment; no baseline is needed.",
 )
 @click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: the newer version.  [default: this folder]")
-@click.option(
-    "--scenes",
-    multiple=True,
-    metavar="A,B",
-    shell_complete=completion.scenes,
-    help="With --against: scenes.  [default: those of the benchmarks]",
-)
-@click.option(
-    "--methods",
-    multiple=True,
-    metavar="A,B",
-    help="With --against: methods.  [default: all except engines and reference solutions]",
-)
+@names_option("scenes", "With --against: scenes.  [default: those of the benchmarks]", complete=completion.scenes)
+@names_option("methods", "With --against: methods.  [default: all except engines and reference solutions]")
 @click.option(
     "--with",
     "requirements",
@@ -86,22 +85,13 @@ def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
 
     The exit code is 1, with a line for each violation, or 2 if the comparison cannot be made.
     """
-    from .. import document
-    from ..document import terminal
-
     two_versions = options["against"] is not None
     for name in OF_BASELINE if two_versions else OF_VERSIONS:
         if options[name]:
             parameter = next(each for each in context.command.params if each.name == name)
             problem = "cannot be used with --against" if two_versions else "needs --against"
             raise click.UsageError(f"{parameter.get_error_hint(context)} {problem}")
-    answer = _compare_and_write(options) if two_versions else _judge(options)
-    if as_json:
-        click.echo(document.text(answer, "json"))
-    else:
-        terminal.show(answer)
-    if answer.failures:
-        raise click.exceptions.Exit(1)
+    show(_compare_and_write(options) if two_versions else _judge(options), as_json, silent=True)
 
 
 def _judge(options: dict[str, Any]) -> Document:
@@ -138,19 +128,13 @@ def _judge(options: dict[str, Any]) -> Document:
 
 def _compare_and_write(options: dict[str, Any]) -> Document:
     """Compare two versions and write the files that are asked for; missing packages and bad paths end it before any work."""
-    from conservative.files import text_file
-
-    from .. import document
-
     require_extra("conservative gate --against", "environments")
     require_extra("conservative gate --against", "gate", "heyoka")
     if options["html"]:
         require_extra("conservative gate --html", "report", "jinja2", "itables")
-    with ExitStack() as files:
-        streams = {name: files.enter_context(text_file(options[name], name)) for name in FILES if options[name] is not None}
+    with output_files(None, (), **{name: options[name] for name in FILES}) as write:
         answer = _compare(options)
-        for name, stream in streams.items():
-            stream.write(document.text(answer, name))
+        write(answer)
     return answer
 
 

@@ -6,7 +6,7 @@ import click
 
 from conservative.errors import require_extra
 
-from .options import epilog, show
+from .options import epilog, json_option, show
 
 
 @click.command(
@@ -17,7 +17,7 @@ from .options import epilog, show
         "conservative list --json | jq '.methods[] | select(.available) | .name'",
     ),
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@json_option
 def list_all(as_json: bool) -> None:
     """List the scenes, our methods and the installed engines, with the invariants that they conserve."""
     require_extra("conservative list", "report", "rich")

@@ -1,15 +1,17 @@
-"""Parts of all commands: output files, the end of every --help, and lists of names."""
+"""What the commands share: options, output files, the end of every --help, and the reading of lists of names."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from conservative.errors import BadInput
+
+from . import completion
 
 if TYPE_CHECKING:
     from ..document.model import Document
@@ -160,6 +162,23 @@ class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the 
         self.fail(f"got {value!r}; expected an integer of 1 or more, such as 1000 or 1e6", param, ctx)
 
 
+def names_option(name: str, help: str, metavar: str = "A,B", complete: Any = None) -> Callable[[Any], Any]:
+    """Return an option that takes several names, separated by commas, and may be repeated."""
+    return click.option(f"--{name}", multiple=True, metavar=metavar, shell_complete=complete, help=help)
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+skip_missing_option = click.option(
+    "--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing."
+)
+quick_option = click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
+engines_option = names_option(
+    "engines",
+    "Add engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`). A report gets a section that "
+    "compares them.",
+    "E,F",
+    completion.engine_lists,
+)
 find_links_option = click.option(
     "--find-links",
     type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
@@ -170,8 +189,47 @@ allow_build_option = click.option(
 )
 
 
-def show(document: Document, as_json: bool) -> None:
-    """Print a document, or its data as JSON. If it has failures, end the command with these as the message and exit code 1."""
+@contextmanager
+def output_files(out: Path | None, names: Iterable[str], **options: Path | None) -> Iterator[Callable[..., None]]:
+    """Open the output files of a command, so that a place that cannot be written is an error before any work.
+
+    Parameters
+    ----------
+    out, names
+        A folder, or None, and the names of its files.
+    options
+        Single files by the name of their option, such as `junit`.
+
+    Yields
+    ------
+    Callable
+        Writes a document into all files, in the formats of their endings or options. Formats that the renderers do not have are
+        given to it as functions without arguments, such as `csv=...`.
+    """
+    from conservative.files import make_folder, text_file
+
+    from ..document import text
+
+    places = {option: (path, option) for option, path in options.items() if path is not None}
+    if out is not None:
+        make_folder(out, "out")
+        places |= {name: (out / name, "out") for name in names}
+    with ExitStack() as stack:
+        streams = {name: stack.enter_context(text_file(*place)) for name, place in places.items()}
+
+        def write(document: Document, **others: Callable[[], str]) -> None:
+            for name, stream in streams.items():
+                kind = name.rpartition(".")[2]
+                stream.write(others[kind]() if kind in others else text(document, kind))
+
+        yield write
+
+
+def show(document: Document, as_json: bool, silent: bool = False) -> None:
+    """Print a document, or its data as JSON. If it has failures, end the command with exit code 1.
+
+    The failures are the message, unless `silent`, for documents that state them.
+    """
     from ..document import terminal, text
 
     if as_json:
@@ -179,7 +237,7 @@ def show(document: Document, as_json: bool) -> None:
     else:
         terminal.show(document)
     if document.failures:
-        raise click.ClickException("; ".join(document.failures))
+        raise click.exceptions.Exit(1) if silent else click.ClickException("; ".join(document.failures))
 
 
 def epilog(*examples: str) -> str:

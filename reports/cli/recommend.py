@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -10,7 +9,7 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFolder, epilog, show, split_names
+from .options import OutputCommand, OutputFolder, epilog, json_option, names_option, output_files, show, split_names
 
 FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Written by conservative -->"}
 """The files of `--out`, and how each is recognized."""
@@ -30,18 +29,12 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Wr
     "--error", type=float, default=1e-6, show_default=True, help="Target: the largest attitude error over the duration, rad."
 )
 @click.option("--duration", type=float, help="Duration, s.  [default: the scene's]")
-@click.option(
-    "--engine",
-    multiple=True,
-    metavar="A,B",
-    shell_complete=completion.methods,
-    help="Engines to probe, in addition to our method.  [default: all installed]",
-)
+@names_option("engine", "Engines to probe, in addition to our method.  [default: all installed]", complete=completion.methods)
 @click.option(
     "--cost-limit", type=float, default=1.0, show_default=True, help="Largest wall time of a setting per simulated second, s."
 )
 @click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@json_option
 @click.option("--out", type=OutputFolder(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
 def recommend(
     scene: str,
@@ -62,24 +55,20 @@ def recommend(
     from conservative import registry
     from conservative.benchmarks.recommendation.recommend import ask
     from conservative.benchmarks.recommendation.recommend import recommend as answer
-    from conservative.files import make_folder, text_file
 
-    from .. import document
     from ..sections.recommendation import build
     from ..terminal.progress import progress
 
-    with progress() as step, ExitStack() as files:
+    def picture() -> str:
+        from ..charts.recommendation import svg  # not needed without --out, and slow to import
+
+        return svg(recommendation)
+
+    with progress() as step:
         names = split_names("engine", engine) or None
         question = ask(registry.scene(scene), error, duration, names, cost_limit, time_limit)
-        streams = []
-        if out is not None:  # a place that cannot be written is an error before any work
-            make_folder(out, "out")
-            streams = [files.enter_context(text_file(out / name, "out")) for name in FILES]
-        recommendation = answer(question, step)
-        shown = build(recommendation)
-        if streams:
-            from ..charts.recommendation import svg  # not needed without --out, and slow to import
-
-            for stream, content in zip(streams, (document.text(shown, "json"), svg(recommendation)), strict=True):
-                stream.write(content)
-    show(shown, as_json)
+        with output_files(out, FILES) as write:
+            recommendation = answer(question, step)
+            document = build(recommendation)
+            write(document, svg=picture)
+    show(document, as_json)

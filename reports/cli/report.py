@@ -9,7 +9,7 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import FilePath, epilog, split_list, split_names
+from .options import FilePath, engines_option, epilog, names_option, quick_option, skip_missing_option, split_list, split_names
 
 
 @click.command(
@@ -23,24 +23,15 @@ from .options import FilePath, epilog, split_list, split_names
         "conservative report --resume                 continue after Ctrl-C, with the same options",
     ),
 )
-@click.option(
-    "--scenes", multiple=True, metavar="A,B", shell_complete=completion.scenes, help="Scenes.  [default: the paper's two]"
-)
-@click.option(
-    "--methods",
-    multiple=True,
-    metavar="M,N",
-    shell_complete=completion.methods,
-    help="Methods. A name without settings, such as mujoco, selects all its variants (`run --method` runs the default one).  "
+@names_option("scenes", "Scenes.  [default: the paper's two]", complete=completion.scenes)
+@names_option(
+    "methods",
+    "Methods. A name without settings, such as mujoco, selects all its variants (`run --method` runs the default one).  "
     "[default: a selection; with --full all]",
+    "M,N",
+    completion.methods,
 )
-@click.option(
-    "--engines",
-    multiple=True,
-    metavar="E,F",
-    shell_complete=completion.engine_lists,
-    help="Add a section that compares engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`).",
-)
+@engines_option
 @click.option(
     "--bodies",
     type=click.IntRange(0),
@@ -54,8 +45,8 @@ from .options import FilePath, epilog, split_list, split_names
     help="Measure all methods, and add random bodies, many bodies, hard cases, longest steps, runs with every step stored, "
     "and the paper's figures.",
 )
-@click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
-@click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
+@quick_option
+@skip_missing_option
 @click.option(
     "--time-limit",
     type=float,

@@ -10,7 +10,7 @@ from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFile, epilog, show
+from .options import OutputCommand, OutputFile, epilog, json_option, show
 
 
 @click.command(
@@ -36,7 +36,7 @@ from .options import OutputCommand, OutputFile, epilog, show
 )
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
 @click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@json_option
 @click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write t, R_WB, w_WB_B, energy and momentum of each sample.")
 def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.

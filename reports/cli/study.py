@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,21 @@ import click
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFile, OutputFolder, epilog, show, split_list, split_names
+from .options import (
+    OutputCommand,
+    OutputFile,
+    OutputFolder,
+    engines_option,
+    epilog,
+    json_option,
+    names_option,
+    output_files,
+    quick_option,
+    show,
+    skip_missing_option,
+    split_list,
+    split_names,
+)
 
 FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\n "study": '}
 """The files of `--out`, and how each begins."""
@@ -30,21 +43,9 @@ FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\
     ),
 )
 @click.argument("name", shell_complete=completion.studies)
-@click.option(
-    "--scenes",
-    multiple=True,
-    metavar="A,B",
-    shell_complete=completion.scenes,
-    help="Scenes to measure.  [default: the study's own]",
-)
-@click.option("--methods", multiple=True, metavar="M,N", shell_complete=completion.methods, help="Methods.  [default: all]")
-@click.option(
-    "--engines",
-    multiple=True,
-    metavar="E,F",
-    shell_complete=completion.engine_lists,
-    help="Add engines: NAME, NAME==VERSION, or `all`, the installed ones (see `conservative engines`).",
-)
+@names_option("scenes", "Scenes to measure.  [default: the study's own]", complete=completion.scenes)
+@names_option("methods", "Methods.  [default: all]", "M,N", completion.methods)
+@engines_option
 @click.option(
     "--bodies",
     type=click.IntRange(1),
@@ -52,14 +53,14 @@ FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\
     help="Number of random bodies per field in `random`, per kind in `throughput`.  [default: 10; in `throughput` 64]",
 )
 @click.option("--seed", type=click.IntRange(0), metavar="S", help="Seed of the random bodies.  [default: 0]")
-@click.option("--sizes", multiple=True, metavar="N,M", help="For throughput: batch sizes.  [default: 1,10,...,1e6]")
-@click.option("--quick", is_flag=True, help="Fewer steps and rounds of timing.")
-@click.option("--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing.")
+@names_option("sizes", "For throughput: batch sizes.  [default: 1,10,...,1e6]", "N,M")
+@quick_option
+@skip_missing_option
 @click.option("--time-limit", type=float, metavar="S", help="Time budget per run, s.  [default: 0.6, with --quick 0.15]")
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler; only for studies that measure no times."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print rows and samples as JSON.")
+@json_option
 @click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
 @click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
 @click.option("--out", type=OutputFolder(FILES), help=f"Write {', '.join(FILES)} into this folder.")
@@ -83,21 +84,12 @@ def study(
     describes them.
     """
     require_extra("conservative study", "report")
-    from conservative.files import make_folder, text_file
-
-    from .. import document
     from ..run.provenance import provenance
     from ..run.single_study import measure_study, plan_study
     from ..sections.study import build
     from ..terminal.progress import announce, progress
 
-    wanted = [("csv", csv, "study.csv"), ("markdown", markdown, "study.md")]
-    with ExitStack() as files:
-        # A place that cannot be written is an error before any work.
-        if out is not None:
-            make_folder(out, "out")
-            wanted += [("out", out / content, content) for content in FILES]
-        streams = [(files.enter_context(text_file(path, key)), content) for key, path, content in wanted if path is not None]
+    with output_files(out, FILES, csv=csv, markdown=markdown) as write:
         planned = plan_study(
             name,
             split_names("scenes", scenes),
@@ -111,10 +103,6 @@ def study(
         announce(f"study {name.replace('_', ' ')}")
         with progress() as step:
             measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)
-        shown = build(name, measured, made)
-        for stream, content in streams:
-            if content == "study.csv":
-                stream.write(measured.table.to_csv(index=False, lineterminator="\n"))
-            else:
-                stream.write(document.text(shown, "markdown" if content == "study.md" else "json"))
-    show(shown, as_json)
+        document = build(name, measured, made)
+        write(document, csv=lambda: measured.table.to_csv(index=False, lineterminator="\n"))
+    show(document, as_json)

@@ -11,7 +11,7 @@ import click
 from conservative.errors import BadInput, require_extra
 
 from . import completion
-from .options import Count, FilePath, OutputCommand, OutputFile, epilog, show, split_list
+from .options import Count, FilePath, OutputCommand, OutputFile, epilog, json_option, show, split_list
 
 SVG_MARK = "<!-- Written by conservative -->"
 """The first line of pictures (`reports.charts.style.SVG_MARK`, which --help has no time to import)."""
@@ -71,7 +71,7 @@ SVG_MARK = "<!-- Written by conservative -->"
 )
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads.  [default: one per processor]")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@json_option
 def sweep(
     scene: str,
     starts: int,

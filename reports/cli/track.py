@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +17,10 @@ from .options import (
     allow_build_option,
     epilog,
     find_links_option,
+    json_option,
+    names_option,
+    output_files,
+    show,
     split_names,
 )
 
@@ -48,20 +51,9 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
     help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence or an "
     "invariant, or if a run fails that succeeded before.",
 )
-@click.option(
-    "--scenes",
-    multiple=True,
-    metavar="A,B",
-    shell_complete=completion.scenes,
-    help="Scenes to run.  [default: the paper's two]",
-)
-@click.option(
-    "--settings",
-    multiple=True,
-    metavar="A,B",
-    help="Settings of the engine, such as RK4.  [default: those that a report shows]",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
+@names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
+@json_option
 @click.option("--junit", type=OutputFile('name="conservative track '), help="Write a JUnit report.")
 @click.option("--markdown", type=OutputFile(PAGE["track.md"]), help="Write tables and changes as Markdown.")
 @click.option("--out", type=OutputFolder(PAGE), help=f"Write {', '.join(PAGE)} into this folder.")
@@ -74,28 +66,11 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")
-    from conservative.files import make_folder, text_file
-
-    from .. import document
-    from ..document import terminal
-
     scenes, settings = (split_names(name, options.pop(name)) for name in ("scenes", "settings"))
-    paths = {name: (options[name], name) for name in ("junit", "markdown") if options[name] is not None}
-    if (out := options["out"]) is not None:
-        make_folder(out, "out")
-        paths |= {name: (out / name, "out") for name in PAGE}
-    with ExitStack() as files:  # a place that cannot be written is an error before any work
-        streams = {name: files.enter_context(text_file(*place)) for name, place in paths.items()}
+    with output_files(options["out"], PAGE, junit=options["junit"], markdown=options["markdown"]) as write:
         answer = _answer(engine, versions, scenes, settings, options)
-        kinds = {"track.html": "html", "track.md": "markdown", "track.json": "json"}
-        for name, stream in streams.items():
-            stream.write(document.text(answer, kinds.get(name, name)))
-    if as_json:
-        click.echo(document.text(answer, "json"))
-    else:
-        terminal.show(answer)
-    if answer.failures:
-        raise click.exceptions.Exit(1)
+        write(answer)
+    show(answer, as_json, silent=True)
 
 
 def _answer(

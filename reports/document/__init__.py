@@ -6,8 +6,8 @@ from .model import Document
 
 
 def text(document: Document, kind: str) -> str:
-    """Return a document as "markdown", "html", "junit" or "json" (its data). Renderers are imported when they are used."""
-    if kind == "markdown":
+    """Return a document as "markdown" or "md", "html", "junit" or "json" (its data); renderers are imported when used."""
+    if kind in ("markdown", "md"):
         from . import markdown
 
         return markdown.render(document)
