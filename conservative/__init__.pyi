@@ -3,6 +3,7 @@
 from . import scenes as scenes
 from . import shapes as shapes
 from .body import RigidBody as RigidBody
+from .card import Card as Card
 from .errors import AccuracyNotReached as AccuracyNotReached
 from .errors import BadInput as BadInput
 from .errors import Diverged as Diverged

@@ -115,20 +115,19 @@ class Method(ABC):
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:
-        """Return the run of a `Batch`, which gives a `Block`; None where each has to run alone.
+        """Return the run of a `Batch`, which returns a `Block`; None if bodies have to run one by one.
 
-        Runs that were prepared apart overlap in threads, and give the same numbers whatever else runs and whoever the
-        neighbours are.
+        Runs of separate calls can execute in parallel threads. The numbers of a body do not depend on other bodies and runs.
         """
         return None
 
-    def check(self, scene: Scene, grid: Grid, found: object) -> Trajectory:
+    def check(self, scene: Scene, grid: Grid, result: object) -> Trajectory:
         """Return the trajectory if it passes every check, otherwise its valid samples and the failure.
 
         Every run is checked here: the result is a `Trajectory` of the scene with all samples of the grid, with the right
         shapes, types and times, finite, and within `bounds`.
         """
-        return accept(found, scene, grid, self, self.bounds(scene, grid))
+        return accept(result, scene, grid, self, self.bounds(scene, grid))
 
     def solve(self, scene: Scene, grid: Grid) -> Trajectory:
         """Return the checked trajectory on a grid, whatever its outcome."""
@@ -136,7 +135,7 @@ class Method(ABC):
 
     @classmethod
     def settings_for(cls, purpose: Purpose) -> tuple[Self, ...]:
-        """Return the methods that `card` lists for a purpose, such as "variants" or "suite"."""
+        """Return the methods that `card` lists for a purpose, such as "variants" or "suite"; see `Card`."""
         return tuple(cls.configure(text) for text in cls.card.settings(purpose))
 
     @classmethod

@@ -254,8 +254,8 @@ class Refinement:
     def converging(self) -> tuple[Array, Array]:
         """Return settings (n,) and errors (n,) for the fit of an order: of short probes of equal length."""
         length = self.short[0].length
-        found = {p.setting: p.error for p in self.short if math.isclose(p.length, length) and p.error < ASYMPTOTIC}
-        return np.array(list(found)), np.array(list(found.values()))
+        errors = {p.setting: p.error for p in self.short if math.isclose(p.length, length) and p.error < ASYMPTOTIC}
+        return np.array(list(errors)), np.array(list(errors.values()))
 
 
 def _refine_from_start(conditions: Conditions, method: Method, step: float) -> Refinement | Outcome:
@@ -392,7 +392,7 @@ def _advise(conditions: Conditions, line: str, role: Role, refinement: Refinemen
 
 
 def _explain_shortfall(conditions: Conditions, refinement: Refinement, probe: Probe) -> str:
-    """Return why no finer setting was found."""
+    """Return the reason why there is no finer setting."""
     last = refinement.last
     if not probe.outcome.ok:
         return str(probe.outcome)

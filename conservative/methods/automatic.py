@@ -94,16 +94,16 @@ def cut_step(
     grid = grid_with(dt)
     attempts: tuple[tuple[float, float], ...] = ()
     while True:
-        found = estimate(grid)
-        attempts = (*attempts, (grid.dt, found.total))
-        rounding = found.sensitivity or 0.0
+        run = estimate(grid)
+        attempts = (*attempts, (grid.dt, run.total))
+        rounding = run.sensitivity or 0.0
         within = error - rounding if rounding < error else rounding  # no step reduces the effect of rounding the scene
-        if found.error <= within or rounding >= ASYMPTOTIC or len(attempts) == ATTEMPTS:
+        if run.error <= within or rounding >= ASYMPTOTIC or len(attempts) == ATTEMPTS:
             return attempts
         if stops_falling([total for _, total in attempts]):
             return attempts
         try:
-            grid = grid_with(grid.dt * step_factor(found.error, within, method))
+            grid = grid_with(grid.dt * step_factor(run.error, within, method))
         except BadInput:  # too many steps or samples: the best run so far has to do
             return attempts
 

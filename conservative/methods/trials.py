@@ -84,23 +84,23 @@ class Trials:
     def estimate(self, method: Method, grid: Grid, sensitivity: bool = False) -> Estimate:
         """Return the estimate of a run, with its `sensitivity` if requested."""
         known = self.known.get((method, grid))
-        return (
-            self.make(method, grid, sensitivity)[0] if known is None or (sensitivity and known.sensitivity is None) else known
-        )
+        if known is None or (sensitivity and known.sensitivity is None):
+            known, _ = self.make(method, grid, sensitivity)
+        return known
 
     def make(self, method: Method, grid: Grid, sensitivity: bool = False) -> tuple[Estimate, Trajectory]:
         """Make a run and return its estimate, with its `sensitivity` if requested, and its trajectory."""
         self.observe(method, grid)
         error, fine, coarse = run_twice(method, self.scene, grid)
-        found = Estimate(error, count_work(method, fine))
+        estimate = Estimate(error, count_work(method, fine))
         if sensitivity:
             # If the run at twice the step failed, the step is too long to tell.
             moved = find_sensitivity(method, coarse, coarse_grid(grid)) if coarse is not None else 0.0
-            found = replace(found, sensitivity=moved)
+            estimate = replace(estimate, sensitivity=moved)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
-        self.known[method, grid] = found
-        return found, fine
+        self.known[method, grid] = estimate
+        return estimate, fine
 
 
 def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None) -> Trials:
@@ -168,19 +168,19 @@ def coarse_grid(grid: Grid) -> Grid:
 
 def _solve(method: Method, scene: Scene, grid: Grid) -> Trajectory | None:
     try:
-        found = method.solve(scene, grid)
+        trajectory = method.solve(scene, grid)
     except (IntegrationFailed, MissingEngine, Unsupported):
         return None
-    return found if found.ok else None
+    return trajectory if trajectory.ok else None
 
 
-def find_sensitivity(method: Method, found: Trajectory, grid: Grid) -> float:
+def find_sensitivity(method: Method, trajectory: Trajectory, grid: Grid) -> float:
     """Return the distance of a run from that of `nearby_scene`, rad; inf if that fails."""
-    scene = nearby_scene(found.scene)
+    scene = nearby_scene(trajectory.scene)
     if method.unsupported(scene) is not None:  # it needs a symmetry that the changed inertia lacks
-        scene = scene.rename(scene.name, body=found.scene.body)
+        scene = scene.rename(scene.name, body=trajectory.scene.body)
     nearby = _solve(method, scene, grid)
-    return math.inf if nearby is None else float(angle_between(found.R_WB, nearby.R_WB).max())
+    return math.inf if nearby is None else float(angle_between(trajectory.R_WB, nearby.R_WB).max())
 
 
 def nearby_scene(scene: Scene) -> Scene:

@@ -6,20 +6,12 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative import registry
 from conservative.references.engines.heyoka import FRAMES, Heyoka
 from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.heyoka_equations import formulations
 from conservative.references.precise import Precise
-
-EVERYTHING = [method for cls in (MuJoCo, Pinocchio, Heyoka, SciPy, Precise) for method in cls.settings_for("variants")]
-
-
-@pytest.mark.parametrize("method", EVERYTHING, ids=lambda m: m.name)
-def test_a_name_gives_the_method_back(method):
-    assert registry.method(method.name) == method
 
 
 @pytest.mark.parametrize(
