@@ -1,7 +1,7 @@
-"""Calls of the public API with hostile arguments: each returns a right and finite result or raises a documented exception.
+"""Calls of the public API with hostile arguments: each returns a correct, finite result or raises a documented exception.
 
-A call has arguments that work, of which one to three are replaced by numbers beyond floats, texts with NUL, nan, wrong shapes,
-functions that fail and objects that cannot even be printed. Names, scene files and model files are scrambled.
+One to three valid arguments of a call are replaced by numbers beyond floats, texts with NUL, nan, wrong shapes, functions that
+fail and objects without a `repr`. Names, scene files and model files are scrambled.
 """
 
 import inspect

@@ -1,9 +1,9 @@
 """Runs of random bodies in all fields, with steps of any length and in any units.
 
-Moments lie up to 1e16 apart in diagonal tensors and up to 1e13 in others; some are equal or nearly so. Steps turn the body by a
-ten thousandth of a radian to a hundred. A run that is called ok has lost nothing beyond its bounds; a run of a `TAME` body in
-`SHORT` steps does not fail for lack of conservation. Short runs of free bodies and tops agree with the closed form. Units that
-are powers of two change only exponents, so that a run in other units gives the same attitudes.
+The ratio of moments is up to 1e16 in diagonal tensors and up to 1e13 in others; some moments are equal or nearly so. A step
+turns the body by 1e-4 to 100 rad. A run with the outcome ok is within its bounds. A run of a `TAME` body with `SHORT` steps
+does not fail with `NotConserved`. Short runs of free bodies and tops agree with the closed form. Units that are powers of two
+change only exponents, so attitudes are the same.
 """
 
 import math

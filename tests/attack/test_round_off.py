@@ -1,7 +1,7 @@
-"""Round-off over long runs: drifts of energy and momentum grow like the square root of the number of steps, and not linearly.
+"""Round-off over long runs: drifts of energy and momentum grow with the square root of the number of steps, not linearly.
 
-An ensemble of bodies, each spun a little differently, takes the steps; the drift of each is read at equally spaced times. Short
-runs are in every run of the tests. `ATTACK_EFFORT=100 pytest --attack` takes 10^8 steps.
+The drift of each body of an ensemble with slightly different rates is read at equally spaced times. Short runs are part of all
+test runs. `ATTACK_EFFORT=100 pytest --attack` takes 10^8 steps.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""Runs that overlap in threads return what the same runs return one after the other, bit for bit.
+"""Runs in concurrent threads return the same results as consecutive runs, bit for bit.
 
-Every setting that tables show of every registered method runs on registered scenes, on random bodies and on two scenes that
-share a potential of Python functions. Half of the runs share their scene with the other threads; half have a copy.
+All variants of all registered methods run on registered scenes, random bodies, and two scenes that share a potential of Python
+functions. Half of the runs share their scene with other threads, half have a copy.
 """
 
 import hashlib

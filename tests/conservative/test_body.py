@@ -16,12 +16,9 @@ def test_moments_and_tensor_describe_the_same_body():
     np.testing.assert_allclose(body.R_BP @ np.diag(body.moments) @ body.R_BP.T, body.inertia, atol=1e-14)
     assert np.linalg.det(body.R_BP) == pytest.approx(1)
     np.testing.assert_allclose(body.inverse @ body.inertia, np.eye(3), atol=1e-14)
-
-
-def test_principal_moments_keep_their_axes_and_order():
-    body = cv.RigidBody((13, 5, 10))
-    np.testing.assert_array_equal(body.moments, [13, 5, 10])
-    np.testing.assert_array_equal(body.R_BP, np.eye(3))
+    diagonal = cv.RigidBody((13, 5, 10))  # keeps its axes and their order
+    np.testing.assert_array_equal(diagonal.moments, [13, 5, 10])
+    np.testing.assert_array_equal(diagonal.R_BP, np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -127,25 +124,14 @@ def test_the_cone_on_its_tip_is_the_papers_top():
     np.testing.assert_allclose(cone.gravity(9.81).moment_B, top.potential.moment_B, rtol=1e-14)  # measured 2e-16
 
 
-def test_gravity_acts_at_the_centre_of_mass():
-    body = shapes.box((1, 2, 3), mass=1.7).rotate(R_BS).about(COM_B)
-    np.testing.assert_array_equal(body.gravity(3.7).com_B, COM_B)
-    assert body.gravity(3.7).weight == pytest.approx(1.7 * 3.7, rel=1e-15)
-
-
 BAD = {
     "negative edge": (lambda: shapes.box((1, -2, 3), mass=1), "size", "-2.0", "above 0, m"),
-    "two edges": (lambda: shapes.box((1, 2), mass=1), "size", "shape (2,)", "(3,)"),
     "nan radius": (lambda: shapes.cone(math.nan, 1, mass=1), "radius", "nan", "above 0, m"),
-    "zero height": (lambda: shapes.cylinder(1, 0, mass=1), "height", "0", "above 0, m"),
-    "infinite semi-axis": (lambda: shapes.ellipsoid((1, math.inf, 1), mass=1), "semi_axes", "inf", "above 0, m"),
     "no mass": (lambda: shapes.box((1, 2, 3)), "mass", "neither", "density"),
     "both": (lambda: shapes.box((1, 2, 3), mass=1, density=2), "density", "mass = 1", "not both"),
-    "zero mass": (lambda: shapes.box((1, 2, 3), mass=0), "mass", "0", "above 0, kg"),
     "text density": (lambda: shapes.box((1, 2, 3), density="iron"), "density", "'iron'", "kg/m^3"),
     "far away": (lambda: shapes.box((1, 2, 3), mass=1).about((0, 0, math.inf)), "com_B", "inf", "three finite numbers"),
     "no rotation": (lambda: shapes.box((1, 2, 3), mass=1).rotate(2 * np.eye(3)), "R_BS", "|R'R - 1| = 3", "rotation matrix"),
-    "no acceleration": (lambda: shapes.box((1, 2, 3), mass=1).gravity(math.nan), "g", "nan", "m/s^2"),
 }
 
 

@@ -2,7 +2,6 @@
 
 import re
 import sys
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -133,21 +132,17 @@ def numbers(scene):
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_a_body_is_the_same_whatever_else_is_drawn(field):
+def test_a_body_depends_on_its_field_seed_and_index_only(field):
     first = numbers(random_body(field, SEED, 3))
     random_body(field, SEED, 4)
     assert np.array_equal(first, numbers(random_body(field, SEED, 3)))
     others = [random_body(field, SEED, 2), random_body(field, SEED + 1, 3)]
+    others += [random_body(other, SEED, 3) for other in FIELDS if other != field]
     assert all(np.abs(first - numbers(other)).max() > 1e-3 for other in others)
 
 
-def test_fields_have_bodies_of_their_own():
-    counts = Counter(tuple(np.round(random_body(field, SEED, 0).body.moments, 9)) for field in FIELDS)
-    assert set(counts.values()) == {1}
-
-
-def test_the_first_body_is_the_one_it_has_always_been():
-    """Every figure that was ever printed rests on it: a change of the draws needs new figures."""
+def test_the_first_body_does_not_change():
+    """All published ratios depend on it."""
     scene = random_body()
     assert np.allclose(scene.body.moments, FIRST_MOMENTS, rtol=1e-12, atol=0)
     assert np.allclose(scene.w_WB_B0, FIRST_RATES, rtol=1e-12, atol=0)
