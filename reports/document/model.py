@@ -32,21 +32,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell with more than text.
-
-    Attributes
-    ----------
-    text
-        The text.
-    grade
-        How good it is, if it is judged.
-    note
-        Less important words after the text, such as the method that a time belongs to.
-    interval
-        The interval to draw next to the text.
-    parts
-        The two halves of a cell in a table of style `GRID`; the text is then shown on request.
-    """
+    """A cell with more than text: a grade, a less important note, an interval to draw, or two halves (in a `GRID`)."""
 
     text: str
     grade: Grade | None = None
@@ -65,13 +51,9 @@ class Style(StrEnum):
     """How the page shows a table."""
 
     SORTED = "sorted"
-    """Columns sort by a click."""
-    FILTERED = "filtered"
-    """Columns sort, and a search field selects rows."""
-    CARDS = "cards"
-    """A phone shows each row as a card."""
-    GRID = "grid"
-    """A matrix of small cells in two halves, whose text appears below the table."""
+    FILTERED = "filtered"  # sorted, with a search field
+    CARDS = "cards"  # a phone shows each row as a card
+    GRID = "grid"  # a matrix of small cells in two halves, whose text appears below the table
 
 
 @dataclass(frozen=True)
@@ -85,7 +67,7 @@ class Table:
 
 
 class Role(StrEnum):
-    """What a paragraph is."""
+    """How a paragraph is emphasized."""
 
     BODY = ""
     LEAD = "lead"
@@ -123,7 +105,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and values."""
+    """Names with their values."""
 
     facts: Sequence[tuple[str, str]]
 
@@ -146,8 +128,7 @@ class Layout(StrEnum):
     PANELS = "panels"
     PAIRS = "pairs"
     SPHERES = "sphere"
-    FAMILIES = "families"
-    """One chart, with a switch for single settings (the chart's parameter `single`)."""
+    FAMILIES = "families"  # with a switch for single settings, the parameter `single` of the chart
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any
 
 import pandas as pd
 
@@ -35,7 +34,6 @@ ERROR = 1e-3
 MOMENTA = ("momentum", "vertical momentum")
 """Names of the conserved momentum in the world: of a free body, and about the axis of a field."""
 AT_ITS_BEST = "at its best"
-BOTH = "both"
 ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 FAR_FROM_ORDER = 0.5
 """How far an order may be below the expected one without a mark."""
@@ -67,16 +65,8 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Drift:
-    """The largest drift of a quantity over the run, relative, and whether it was `gained` or `lost` at the end."""
-
-    size: float = math.nan
-    direction: str = ""
-
-
-@dataclass(frozen=True)
 class EngineRow:
-    """One setting of one engine on one scene; nan for values that were not measured.
+    """One setting of one engine on one scene; NaN or a dash for values that were not measured.
 
     Attributes
     ----------
@@ -85,19 +75,13 @@ class EngineRow:
     series
         Name of its line of steps or tolerances.
     outcome
-        Outcome of the run at the scene's step.
-    bits
-        Precision of its numbers.
+        Outcome of the run at the scene's step, or of its timing.
     as_installed, best
         Whether only the step is set, and whether no setting of the engine has a smaller error.
-    error
-        Largest attitude error at the scene's step, rad.
-    energy, momentum
-        Drifts at that step.
-    turns, true_turns
-        Number of flips of the body, and of the exact motion.
-    order, order_stderr, expected_order, no_order
-        The observed order, the expected one, and why none was observed.
+    bits, error
+        Precision of its numbers, and largest attitude error at the scene's step, rad.
+    energy, momentum, turns, order
+        Cells: drifts, flips of the body, and the observed order with the expected one.
     longest_step
         The longest step, s, with an error of `USABLE` or less.
     step_time, second_time
@@ -108,22 +92,18 @@ class EngineRow:
     label: str
     setting: str
     series: str
-    outcome: Outcome = OK
-    bits: float = math.nan
-    as_installed: bool = False
+    outcome: Outcome
+    as_installed: bool
+    bits: float
+    error: float
+    energy: Cell
+    momentum: Cell
+    turns: str | Cell
+    order: str | Cell
+    longest_step: float
+    step_time: float
+    second_time: float
     best: bool = False
-    error: float = math.nan
-    energy: Drift = Drift()
-    momentum: Drift = Drift()
-    turns: float = math.nan
-    true_turns: float = math.nan
-    order: float = math.nan
-    order_stderr: float = math.nan
-    expected_order: float = math.nan
-    no_order: str = ""
-    longest_step: float = math.nan
-    step_time: float = math.nan
-    second_time: float = math.nan
 
 
 def section(measured: Measured) -> Section:
@@ -209,76 +189,75 @@ def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[E
 
 def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[str, pd.DataFrame]) -> EngineRow:
     first = rows.iloc[0]
-    line = lines.get(first["series"], rows.iloc[:0])
-    engine = "==".join(filter(None, (first["engine"], first["version"])))
     label, setting, series = (str(first[name]) for name in ("label", "setting", "series"))
-    row = EngineRow(engine, label, setting, series, _outcome(rows), **_facts(rows), **_errors(rows), **_order(line))
-    points = timed.get(first["series"])
-    second = math.nan if points is None else cost(points["error"].tolist(), points["time"].tolist(), ERROR)
-    has_step = not math.isnan(row.expected_order)
-    longest = _longest_step(line) if has_step else math.nan
-    per_step = _value(rows, Measure.TIME_PER_STEP) if has_step else math.nan
-    return replace(row, longest_step=longest, step_time=per_step, second_time=second)
-
-
-def _outcome(rows: pd.DataFrame) -> Outcome:
-    """Return how the run at the scene's step ended; where that was well, how its timing did."""
+    line, points = lines.get(series, rows.iloc[:0]), timed.get(series)
     ends = pd.concat([of_measure(rows, measure) for measure in (Measure.ATTITUDE_MAX, Measure.TIME)])
-    return next((outcome for outcome in outcomes(ends) if not outcome.ok), OK)
-
-
-def _facts(rows: pd.DataFrame) -> dict[str, Any]:
-    return {
-        "bits": _value(rows, Measure.PRECISION),
-        "expected_order": _value(rows, Measure.ORDER_EXPECTED),
-        "as_installed": AS_INSTALLED in set(of_measure(rows, Measure.PRECISION)["detail"]),
-    }
-
-
-def _errors(rows: pd.DataFrame) -> dict[str, Any]:
-    return {
-        "error": _value(rows, Measure.ATTITUDE_MAX),
-        "energy": _drift(rows, "energy"),
-        "momentum": next((drift for name in MOMENTA if not math.isnan((drift := _drift(rows, name)).size)), Drift()),
-        "turns": _value(rows, Measure.TURNS_OVER),
-        "true_turns": _value(rows, Measure.TURNS_OVER_TRUE),
-    }
-
-
-def _drift(rows: pd.DataFrame, quantity: str) -> Drift:
-    found = of_measure(rows, Measure.DRIFT_MAX, quantity)
-    return Drift(float(found["value"].iloc[0]), str(found["detail"].iloc[0])) if len(found) else Drift()
-
-
-def _order(line: pd.DataFrame) -> dict[str, Any]:
-    found = of_measure(line, Measure.ORDER)
-    reason = str(found["reason"].iloc[0]) if len(found) and found["outcome"].iloc[0] == OutcomeKind.NO_ORDER.value else ""
-    return {"order": _value(line, Measure.ORDER), "order_stderr": _value(line, Measure.ORDER_STDERR), "no_order": reason}
-
-
-def _longest_step(line: pd.DataFrame) -> float:
     good = with_outcome(of_measure(line, Measure.ATTITUDE_MAX), OutcomeKind.OK)
-    return float(good[good["value"] <= USABLE]["dt"].max())
+    expected = _value(rows, Measure.ORDER_EXPECTED)
+    has_step = not math.isnan(expected)
+    momenta = [_drift(rows, name) for name in MOMENTA if len(of_measure(rows, Measure.DRIFT_MAX, name))]
+    return EngineRow(
+        engine="==".join(filter(None, (first["engine"], first["version"]))),
+        label=label,
+        setting=setting,
+        series=series,
+        outcome=next((outcome for outcome in outcomes(ends) if not outcome.ok), OK),
+        as_installed=AS_INSTALLED in set(of_measure(rows, Measure.PRECISION)["detail"]),
+        bits=_value(rows, Measure.PRECISION),
+        error=_value(rows, Measure.ATTITUDE_MAX),
+        energy=_drift(rows, "energy"),
+        momentum=momenta[0] if momenta else grade_drift(math.nan),
+        turns=_turns(_value(rows, Measure.TURNS_OVER), _value(rows, Measure.TURNS_OVER_TRUE)),
+        order=_order(line, expected),
+        longest_step=float(good[good["value"] <= USABLE]["dt"].max()) if has_step else math.nan,
+        step_time=_value(rows, Measure.TIME_PER_STEP) if has_step else math.nan,
+        second_time=math.nan if points is None else cost(points["error"].tolist(), points["time"].tolist(), ERROR),
+    )
 
 
 def _value(rows: pd.DataFrame, measure: Measure) -> float:
-    found = of_measure(rows, measure)["value"]
-    return float(found.iloc[0]) if len(found) else math.nan
+    values = of_measure(rows, measure)["value"]
+    return float(values.iloc[0]) if len(values) else math.nan
+
+
+def _drift(rows: pd.DataFrame, quantity: str) -> Cell:
+    """Return a graded drift; the direction is given if it is more than small."""
+    drift = of_measure(rows, Measure.DRIFT_MAX, quantity)
+    size = float(drift["value"].iloc[0]) if len(drift) else math.nan
+    cell = grade_drift(size)
+    return Cell(f"{cell.text} {drift['detail'].iloc[0]}".rstrip(), cell.grade) if size > SMALL else cell
+
+
+def _turns(turns: float, expected: float) -> str | Cell:
+    if math.isnan(turns) or math.isnan(expected):
+        return DASH
+    right = turns == expected
+    return Cell(f"{'✓' if right else '✗'} {turns:.0f} of {expected:.0f}", Grade.GOOD if right else Grade.BAD)
+
+
+def _order(line: pd.DataFrame, expected: float) -> str | Cell:
+    """Return the observed order with the expected one, marked if it is lower, or that there is none."""
+    if math.isnan(expected):
+        return DASH
+    fit, order = of_measure(line, Measure.ORDER), _value(line, Measure.ORDER)
+    if len(fit) and fit["outcome"].iloc[0] == OutcomeKind.NO_ORDER and fit["reason"].iloc[0] == WORSE:
+        return Cell(f"{DASH} none ({expected:.0f}): {WORSE}", Grade.BAD)
+    if math.isnan(order):
+        return f"{DASH} not seen ({expected:.0f})"
+    text = f"{order:.2f} ± {_value(line, Measure.ORDER_STDERR):.2f} ({expected:.0f})"
+    return Cell(f"✗ {text}", Grade.BAD) if order < expected - FAR_FROM_ORDER else text
 
 
 def _mark_best(rows: list[EngineRow]) -> list[EngineRow]:
-    """Return rows with the best of each engine marked: the smallest error, of equal ones the one that takes less time."""
+    """Return rows with the best setting of each engine marked: the smallest error, then the shortest time."""
+
+    def rank(row: EngineRow) -> tuple[float, float]:
+        return row.error, math.inf if math.isnan(row.second_time) else row.second_time
+
     best: dict[str, EngineRow] = {}
-    for row in rows:
-        if not math.isnan(row.error) and _rank(row) < _rank(best.get(row.engine)):
-            best[row.engine] = row
+    for row in sorted((row for row in rows if not math.isnan(row.error)), key=rank):
+        best.setdefault(row.engine, row)
     return [replace(row, best=best.get(row.engine) is row) for row in rows]
-
-
-def _rank(row: EngineRow | None) -> tuple[float, float]:
-    if row is None:
-        return (math.inf, math.inf)
-    return (row.error, math.inf if math.isnan(row.second_time) else row.second_time)
 
 
 def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
@@ -297,80 +276,47 @@ def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
         f"µs per s at {ERROR:g} rad",
         "run",
     ]
-    there = [[row.label, *_setting_cells(row)] for row in rows if row.outcome.kind not in ABSENT]
-    absent = _absent([row for row in rows if row.outcome.kind in ABSENT], len(header))
-    return Table(header, [*there, *absent], f"{scene}: every setting of every engine", Style.FILTERED)
-
-
-def _setting_cells(row: EngineRow) -> list[str | Cell]:
-    return [
-        taken(row),
-        _integer(row.bits),
-        number(row.error),
-        order(row),
-        drift(row.energy),
-        drift(row.momentum),
-        turns(row),
-        number(row.longest_step),
-        number(row.step_time * 1e6, 3),
-        number(row.second_time * 1e6, 3),
-        outcome_cell(row.outcome) if row.outcome.ok else _with_reason(row),
+    there: list[Row] = [
+        [
+            row.label,
+            _taken(row),
+            _integer(row.bits),
+            number(row.error),
+            row.order,
+            row.energy,
+            row.momentum,
+            row.turns,
+            number(row.longest_step),
+            number(row.step_time * 1e6, 3),
+            number(row.second_time * 1e6, 3),
+            _with_reason(row.outcome),
+        ]
+        for row in rows
+        if row.outcome.kind not in ABSENT
     ]
-
-
-def _with_reason(row: EngineRow) -> Cell:
-    """Return how a run ended, with the reason, which tables elsewhere leave to one another."""
-    cell = outcome_cell(row.outcome)
-    reason = row.outcome.reason
-    return Cell(cell.text if not reason or reason in cell.text else f"{cell.text}: {reason}", cell.grade)
-
-
-def _absent(rows: Sequence[EngineRow], columns: int) -> list[Row]:
-    """Return a row for each engine and reason why it does not take a scene; of several settings only their number is named."""
-
-    def key(row: EngineRow) -> tuple[str, str]:
-        return row.engine, row.outcome.reason
-
-    found: list[Row] = []
-    for (engine, _), group in groupby(sorted(rows, key=key), key):
+    absent = sorted((row for row in rows if row.outcome.kind in ABSENT), key=_reason)
+    for (engine, _), group in groupby(absent, _reason):
         members = list(group)
         label = members[0].label if len(members) == 1 else f"{engine}, {len(members)} settings"
-        found.append([label, *[DASH] * (columns - 2), _with_reason(members[0])])
-    return found
+        there.append([label, *[DASH] * (len(header) - 2), _with_reason(members[0].outcome)])
+    return Table(header, there, f"{scene}: every setting of every engine", Style.FILTERED)
 
 
-def taken(row: EngineRow) -> str:
-    """Return how an engine is taken in a row: as installed, at its best, both or neither."""
+def _reason(row: EngineRow) -> tuple[str, str]:
+    return row.engine, row.outcome.reason
+
+
+def _taken(row: EngineRow) -> str:
     if row.as_installed and row.best:
-        return BOTH
+        return "both"
     return AS_INSTALLED if row.as_installed else AT_ITS_BEST if row.best else ""
 
 
-def order(row: EngineRow) -> str | Cell:
-    """Return the order that was seen, marked where it is below the expected one, in brackets, or that there is none."""
-    if math.isnan(row.expected_order):
-        return DASH
-    expected = f"({row.expected_order:.0f})"
-    if row.no_order == WORSE:
-        return Cell(f"{DASH} none {expected}: {WORSE}", Grade.BAD)
-    if math.isnan(row.order):
-        return f"{DASH} not seen {expected}"
-    text = f"{row.order:.2f} ± {row.order_stderr:.2f} {expected}"
-    return Cell(f"✗ {text}", Grade.BAD) if row.order < row.expected_order - FAR_FROM_ORDER else text
-
-
-def drift(value: Drift) -> Cell:
-    """Return a graded drift, with its direction where it is more than small."""
-    cell = grade_drift(value.size)
-    return Cell(f"{cell.text} {value.direction}".rstrip(), cell.grade) if value.size > SMALL else cell
-
-
-def turns(row: EngineRow) -> str | Cell:
-    """Return how often the body turned over, of how often it does."""
-    if math.isnan(row.turns) or math.isnan(row.true_turns):
-        return DASH
-    right = row.turns == row.true_turns
-    return Cell(f"{'✓' if right else '✗'} {row.turns:.0f} of {row.true_turns:.0f}", Grade.GOOD if right else Grade.BAD)
+def _with_reason(outcome: Outcome) -> Cell:
+    """Return an outcome with its reason, which other tables omit."""
+    cell = outcome_cell(outcome)
+    known = outcome.ok or not outcome.reason or outcome.reason in cell.text
+    return cell if known else Cell(f"{cell.text}: {outcome.reason}", cell.grade)
 
 
 def _integer(value: float) -> str:
@@ -381,18 +327,14 @@ def beside(rows: Sequence[EngineRow], scene: str) -> Table:
     """Return each engine as installed next to its best setting, the most accurate engines first."""
     parts = ("setting", "attitude error, rad", "energy drift", "turns over")
     header = ["engine", "bits", *(f"{text}: {part}" for text in (AS_INSTALLED, AT_ITS_BEST) for part in parts)]
-    engines = dict.fromkeys(row.engine for row in rows if row.best)
-    body = [_pair(engine, [row for row in rows if row.engine == engine]) for engine in engines]
+    body: list[Row] = []
+    for best in (row for row in rows if row.best):
+        installed = next((row for row in rows if row.engine == best.engine and row.as_installed), None)
+        body.append([best.engine, _integer(best.bits), *(_short(installed) if installed else [DASH] * 4), *_short(best)])
     return Table(header, body, f"{scene}: each engine", Style.FILTERED)
-
-
-def _pair(engine: str, rows: Sequence[EngineRow]) -> Row:
-    best = next(row for row in rows if row.best)
-    installed = next((row for row in rows if row.as_installed), None)
-    return [engine, _integer(best.bits), *(_short(installed) if installed else [DASH] * 4), *_short(best)]
 
 
 def _short(row: EngineRow) -> list[str | Cell]:
     if math.isnan(row.error):
         return [row.setting, outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
-    return [row.setting, number(row.error), drift(row.energy), turns(row)]
+    return [row.setting, number(row.error), row.energy, row.turns]
