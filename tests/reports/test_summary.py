@@ -11,7 +11,7 @@ from conservative.reports.rows import points as families
 from conservative.reports.rows.names import MethodClass, class_of, with_names
 from conservative.reports.rows.points import points
 from conservative.reports.sections import random_bodies, summary
-from conservative.reports.sections.headline import first_lost, of_points, of_random_bodies
+from conservative.reports.sections.verdict import of_points, of_random_bodies
 
 from .rows import frame, point, row
 from .test_random_ratios import ENGINE_ALONE, SLOWER, TWICE
@@ -166,10 +166,10 @@ def test_random_bodies_have_points_where_most_of_them_get_there():
     assert math.isclose(ours["time"].iloc[0], 1.0)
 
 
-def test_what_is_lost_comes_first():
+def test_a_statement_is_marked_where_an_engine_wins():
     table = frame([each for rows in (*TWICE, *SLOWER) for each in rows])
-    found = first_lost([*of_points(points(frame([*OURS, *SOLVER, *SOLUTION]))), *of_random_bodies(random_bodies.ratios(table))])
-    assert [each.lost for each in found] == [True, False, False, False]
+    found = [*of_random_bodies(random_bodies.ratios(table)), *of_points(points(frame([*OURS, *SOLVER, *SOLUTION])))]
+    assert [each.marked for each in found] == [True, False, False, False]
     assert "11 of 22 cases" in found[0].text
     assert "up to 2.0 times" in found[0].text
     assert "60 to 80 times" in found[-1].text

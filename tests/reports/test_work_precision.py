@@ -10,7 +10,7 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.rows import points as work_precision
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.rows.points import points
-from conservative.reports.sections import headline, scene_contests, summary
+from conservative.reports.sections import scene_contests, summary, verdict
 
 from .rows import frame, point, row, table
 
@@ -19,7 +19,7 @@ ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine"
 
 
 def statements(contests):
-    return [f"{found.scene}: {found.text}" for found in headline.statements(contests)]
+    return [f"{found.subject}: {found.text}" for found in verdict.statements(contests)]
 
 
 def contests(found, errors=work_precision.DECADES):
@@ -170,13 +170,13 @@ def test_contests_have_both_at_last_in_the_units_of_their_columns():
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])
 def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
     found = scene_contests.each_step(table, "made_up")
-    assert list(headline.of_each_step("made_up", found)) == []
+    assert list(verdict.of_each_step("made_up", found)) == []
     assert len(found.kept) == len(found.alone) == 0
 
 
 def test_the_faster_side_of_each_step_is_named_and_times_within_a_tenth_are_equal():
-    assert [each.lost for each in headline.of_each_step("made_up", FOUND)] == [False, False, True, False]
+    assert [each.marked for each in verdict.of_each_step("made_up", FOUND)] == [False, False, True, False]
     for ratio in (0.92, 1.0, 1.09):
-        assert "same time" in headline._faster(("ours", "heyoka"), ratio)
-    assert headline._faster(("ours", "heyoka"), 1.2) == "ours is 1.2 times as fast as heyoka"
-    assert headline._faster(("ours", "heyoka"), 0.5) == "heyoka is 2.0 times as fast as ours"
+        assert "same time" in verdict._faster(("ours", "heyoka"), ratio)
+    assert verdict._faster(("ours", "heyoka"), 1.2) == "ours is 1.2 times as fast as heyoka"
+    assert verdict._faster(("ours", "heyoka"), 0.5) == "heyoka is 2.0 times as fast as ours"
