@@ -6,16 +6,17 @@ import gc
 import math
 import random
 import statistics
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter_ns
-from typing import Any
+from typing import Any, TypeVar
 
 from conservative.check import positive_integer, positive_number
 from conservative.errors import IntegrationFailed
 from conservative.outcome import OK, Outcome
 
+Key = TypeVar("Key", bound=Hashable)
 MIN_ROUNDS = 3
 """Smallest number of rounds, also for a run over its budget: fewer have no median."""
 
@@ -72,8 +73,8 @@ def count_calls(run: Callable[[], Any], min_time: float) -> int:
 
 
 def time_interleaved(
-    runs: Mapping[str, Callable[[], Any]], rounds: int = 7, min_time: float = 0.01, budget: float = math.inf, seed: int = 0
-) -> dict[str, Timing]:
+    runs: Mapping[Key, Callable[[], Any]], rounds: int = 7, min_time: float = 0.01, budget: float = math.inf, seed: int = 0
+) -> dict[Key, Timing]:
     """Time several runs against each other.
 
     Unmeasured calls warm up and determine the number of calls per sample. Then every round takes one sample of each run in a
@@ -82,7 +83,7 @@ def time_interleaved(
     Parameters
     ----------
     runs
-        Functions to call, by name.
+        Functions to call, by any key.
     rounds
         Samples of each.
     min_time

@@ -10,7 +10,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 
 from ..measures import errors
-from ..measures.convergence_order import observed_order
+from ..measures.convergence_order import Order, observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from . import step_ladder
@@ -34,14 +34,17 @@ LINE_LIMIT = 8
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield errors over decreasing step sizes, and the observed order, of every method with a step size."""
-    methods = study.competitors
-    total = len(study.scenes) * len(methods)
-    for i, scene in enumerate(study.scenes):
-        for j, method in enumerate(methods):
-            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+    tell = study.count(progress, len(study.competitors))
+    for scene in study.scenes:
+        for method in study.competitors:
+            tell(f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, step_ladder.samples(scene, method))
             failed = no_order(case, study.skip_missing)
-            yield from without_order(case, failed) if failed else converge(study, scene, method)
+            if failed:
+                measures = blanks(*(order for order, _ in ORDERS.values()))
+                yield from map(drop_step, case.blanks(measures, failed.outcome))
+            else:
+                yield from converge(study, scene, method)
 
 
 def no_order(case: Case, skip_missing: bool) -> Failure | None:
@@ -51,12 +54,6 @@ def no_order(case: Case, skip_missing: bool) -> Failure | None:
         return missing if isinstance(missing, Failure) else None
     reason = case.method.unsupported(case.scene) or ("its accuracy does not depend on dt" if case.method.order is None else "")
     return fail_unsupported(reason) if reason else None
-
-
-def without_order(case: Case, failed: Failure) -> list[Measurement]:
-    """Return the rows of a method that has no order."""
-    measures = blanks(*(order for order, _ in ORDERS.values()))
-    return [drop_step(row) for row in case.blanks(measures, failed.outcome)]
 
 
 def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
@@ -72,8 +69,16 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
             if value.measure in found:
                 found[value.measure][case.grid.dt] = value.value
                 yield case.row(value)
-    for measure in ORDERS:
-        yield from fit(cases[0], measure, found[measure])
+    for measure, names in ORDERS.items():
+        order = observed_order(list(found[measure]), list(found[measure].values()))
+        yield from order_rows(cases[0], names, order, order.reason)
+
+
+def order_rows(case: Case, names: tuple[Measure, Measure], order: Order, reason: str) -> list[Measurement]:
+    """Return the rows of an observed order and its standard error, or of the reason why there is none."""
+    outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
+    values = map(Value, names, (order.slope, order.stderr))
+    return [drop_step(case.row(value, outcome, "" if reason else str(order))) for value in values]
 
 
 def attempt_each(study: Study, cases: Iterable[Case]) -> Iterator[tuple[Case, Success | Failure]]:
@@ -112,12 +117,3 @@ def cost_of_run(study: Study, case: Case, done: Success, first: bool) -> float:
         return done.cost.first_call
     again = attempt_within(study.hang_limit, case, study.skip_missing)
     return min(each.cost.first_call for each in (done, again) if isinstance(each, Success))
-
-
-def fit(case: Case, measure: Measure, errors_by_step: dict[float, float]) -> list[Measurement]:
-    """Return the observed order and its standard error."""
-    order = observed_order(list(errors_by_step), list(errors_by_step.values()))
-    outcome = Outcome(OutcomeKind.NO_ORDER, order.reason) if order.reason else OK
-    detail = "" if order.reason else str(order)
-    values = zip(ORDERS[measure], (order.slope, order.stderr), strict=True)
-    return [drop_step(case.row(Value(name, value), outcome, detail)) for name, value in values]

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator
-from dataclasses import replace
 
 from conservative.attitude import angle_between
 from conservative.grid import Grid, grid_for
@@ -23,16 +22,14 @@ from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.measure import Measure, Value, blanks
+from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from ..measures.timing import time_interleaved
-from .case import Case, Failure, Success
+from .case import Case, Failure
 from .convergence import attempt_each
 from .selection import at_tolerance, tolerance_setting
-from .speed import CALL, Extend, TimedRun, keep_end, lengthen
+from .speed import Extend, keep_end
 from .study import Progress, Study
-from .time_limit import attempt_here
-from .work_precision import ROUNDS, one_of_each_series
+from .work_precision import one_of_each_series, time_rows
 
 ERROR = 1e-6
 """Attitude error, rad, that a timed method has to reach."""
@@ -53,15 +50,15 @@ KEPT: dict[Measure, Extend] = {Measure.TIME_SAMPLED: keep_each, Measure.TIME: ke
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the errors of every method up to the setting that reaches `ERROR`, and both times of that setting."""
     methods = one_of_each_series(study)
-    pieces = len(methods) + 1
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(methods) + 1)
+    for scene in study.scenes:
         truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
         chosen: list[Case] = []
-        for j, method in enumerate(methods):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+        for method in methods:
+            tell(f"{scene.name}: errors of {method.name}")
             chosen += yield from coarsest(study, cases(study, scene, method), truth)
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(chosen)} methods")
-        yield from time_rows(study, chosen)
+        tell(f"{scene.name}: timing {len(chosen)} methods")
+        yield from time_rows(study, chosen, KEPT)
 
 
 def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
@@ -87,22 +84,3 @@ def coarsest(study: Study, settings: list[Case], truth: Trajectory) -> Generator
         if error <= ERROR:
             return [case]
     return []
-
-
-def time_rows(study: Study, chosen: list[Case]) -> Iterator[Measurement]:
-    """Yield both times of each case, s per simulated second, all in interleaved rounds."""
-    ready: dict[tuple[Case, Measure], TimedRun] = {}
-    for case in chosen:
-        for measure, keep in KEPT.items():
-            short = replace(case, grid=keep(case.grid, 1))
-            outcome = attempt_here(study.hang_limit, short)
-            if isinstance(outcome, Success):
-                ready[case, measure] = TimedRun(*lengthen(short, outcome, study.hang_limit, keep), outcome)
-            else:
-                yield from case.blanks(blanks(measure), outcome.outcome)
-    runs = {str(i): timed.done.run for i, timed in enumerate(ready.values())}
-    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
-    for i, ((case, measure), timed) in enumerate(ready.items()):
-        timing = timings[str(i)]
-        detail = str(timing) if timing.outcome.ok else ""
-        yield case.row(Value(measure, timing.minimum / timed.simulated), timing.outcome, detail)

@@ -40,20 +40,19 @@ TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the properties of each engine, its errors and drifts with every step stored, and its times with a few samples."""
-    methods = study.competitors
-    pieces = len(methods) + 1
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(study.competitors) + 1)
+    for scene in study.scenes:
         grid = grid_for(scene, scene.dt)
         truth = study.truth(scene, grid).trajectory
-        ready: dict[str, TimedRun] = {}
-        for j, method in enumerate(methods):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: {method.name}")
-            case = Case(study.name, scene, method, grid)
-            timed = yield from measure(study, case, truth)
-            if timed is not None:
-                ready[method.name] = timed
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} engines")
-        yield from time_rows(study, ready)
+        ready: list[TimedRun] = []
+        for method in study.competitors:
+            tell(f"{scene.name}: {method.name}")
+            ready += yield from measure(study, Case(study.name, scene, method, grid), truth)
+        tell(f"{scene.name}: timing {len(ready)} engines")
+        with time_limit(study.hang_limit):
+            timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
+        for timed, timing in timings.items():
+            yield from times(timed, timing)
 
 
 def facts(case: Case, outcome: Outcome) -> list[Measurement]:
@@ -68,20 +67,19 @@ def facts(case: Case, outcome: Outcome) -> list[Measurement]:
     return [case.row(value, outcome, detail) for value in known]
 
 
-def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, TimedRun | None]:
-    """Yield the rows of one engine except its times; return the run to be timed, or None."""
+def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, list[TimedRun]]:
+    """Yield the rows of one engine except its times; return the run to be timed in a list, which may be empty."""
     outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
     yield from facts(case, outcome.outcome if isinstance(outcome, Failure) else OK)
     yield from accuracy(case, outcome, truth)
-    if isinstance(outcome, Failure):
-        yield from case.blanks(blanks(*MEASURES), outcome.outcome)
-        return None
-    few = replace(case, grid=keep_few(case.grid, study.longest_run / outcome.cost.first_call))
-    again = attempt_here(study.hang_limit, few, study.skip_missing)
+    few, again = case, outcome
+    if isinstance(outcome, Success):
+        few = replace(case, grid=keep_few(case.grid, study.longest_run / outcome.cost.first_call))
+        again = attempt_here(study.hang_limit, few, study.skip_missing)
     if isinstance(again, Failure):
         yield from few.blanks(blanks(*MEASURES), again.outcome)
-        return None
-    return TimedRun(few, again, again)
+        return []
+    return [TimedRun(few, again, again)]
 
 
 def keep_few(grid: Grid, share: float) -> Grid:
@@ -108,12 +106,3 @@ def direction(value: Value, trajectory: Trajectory) -> str:
     if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
         return ""
     return "gained" if trajectory.drift(energy)[-1] > 0 else "lost"
-
-
-def time_rows(study: Study, ready: dict[str, TimedRun]) -> Iterator[Measurement]:
-    """Yield the times of all engines on a scene, taken in interleaved rounds."""
-    runs = {name: timed.done.run for name, timed in ready.items()}
-    with time_limit(study.hang_limit):
-        timings = time_interleaved(runs, study.rounds, budget=study.timing_budget)
-    for name, timed in ready.items():
-        yield from times(timed, timings[name])

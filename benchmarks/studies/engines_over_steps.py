@@ -22,7 +22,7 @@ from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved
 from . import step_ladder
 from .case import Case, Failure, Success, drop_step
-from .convergence import attempt_each, no_order
+from .convergence import attempt_each, no_order, order_rows
 from .study import Progress, Study
 from .work_precision import ROUNDS, one_of_each_series, points
 
@@ -52,16 +52,16 @@ class Point:
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the errors of every engine at all step sizes, the observed order, and the times of the same runs."""
     methods = one_of_each_series(study)
-    pieces = len(methods) + 1
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(methods) + 1)
+    for scene in study.scenes:
         found: list[Point] = []
-        for j, method in enumerate(methods):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+        for method in methods:
+            tell(f"{scene.name}: errors of {method.name}")
             mine = yield from converge(study, scene, method)
-            yield from order_rows(study, scene, method, mine)
+            yield from order_of(study, scene, method, mine)
             found += mine
         good = [point for point in found if point.error <= TIMED]
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} runs")
+        tell(f"{scene.name}: timing {len(good)} runs")
         yield from time_rows(study, good)
 
 
@@ -103,28 +103,23 @@ def limit_preparation(cases: list[Case], found: list[Point]) -> Iterator[Case]:
         yield case
 
 
-def order_rows(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:
+def order_of(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:
     """Return the observed order and its standard error, or the reason why there is no order."""
-    case = Case(study.name, scene, method, step_ladder.samples(scene, method))
-    failed = no_order(case, study.skip_missing)
-    if failed:
-        return [drop_step(row) for row in case.blanks(blanks(Measure.ORDER, Measure.ORDER_STDERR), failed.outcome)]
+    case, names = Case(study.name, scene, method, step_ladder.samples(scene, method)), (Measure.ORDER, Measure.ORDER_STDERR)
+    if failed := no_order(case, study.skip_missing):
+        return [drop_step(row) for row in case.blanks(blanks(*names), failed.outcome)]
     steps, values = [point.case.grid.dt for point in found], [point.error for point in found]
     order = observed_order(steps, values)
-    reason = WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason
-    outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
-    rows = (Value(Measure.ORDER, order.slope), Value(Measure.ORDER_STDERR, order.stderr))
-    return [drop_step(case.row(value, outcome, "" if reason else str(order))) for value in rows]
+    return order_rows(case, names, order, WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason)
 
 
 def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
-    quick = [point for point in found if point.done.cost.first_call <= study.longest_run]
-    runs = {str(i): point.done.run for i, point in enumerate(quick)}
+    quick = {point: point.done.run for point in found if point.done.cost.first_call <= study.longest_run}
     with time_limit(study.hang_limit):
-        timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
-    for i, point in enumerate(quick):
-        yield time_row(point, timings[str(i)].minimum, timings[str(i)].outcome, str(timings[str(i)]))
+        timings = time_interleaved(quick, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
+    for point, timing in timings.items():
+        yield time_row(point, timing.minimum, timing.outcome, str(timing))
     for point in found:
         if point not in quick:
             yield time_row(point, point.done.cost.first_call, OK, "a single run")

@@ -39,12 +39,8 @@ def settings(methods: tuple[Method, ...]) -> tuple[Method, ...]:
     for method in methods:
         if method.role != Role.TRUTH:
             families.setdefault(method.name if isinstance(method, Missing) else method.family, []).append(method)
-    return tuple(method for members in families.values() for method in dict.fromkeys((members[0], _second(members))))
-
-
-def _second(members: list[Method]) -> Method:
-    """Return the second setting of a family, which can be the first again."""
-    return members[-1] if members[0].role == Role.OURS else members[:2][-1]
+    pairs = ((m[0], m[-1] if m[0].role == Role.OURS else m[:2][-1]) for m in families.values())
+    return tuple(method for pair in pairs for method in dict.fromkeys(pair))
 
 
 def grid(scene: Scene) -> Grid:
@@ -56,13 +52,13 @@ def grid(scene: Scene) -> Grid:
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield all errors, drifts and work of every method on every scene."""
-    methods = study.competitors
-    total, limit = len(study.scenes) * len(methods), max(LIMIT, HANG_FACTOR * study.longest_run)
-    for i, scene in enumerate(study.scenes):
-        progress(i * len(methods), total, f"{scene.name}: truth")
+    limit = max(LIMIT, HANG_FACTOR * study.longest_run)
+    tell = study.count(progress, len(study.competitors) + 1)
+    for scene in study.scenes:
+        tell(f"{scene.name}: truth")
         steps = grid(scene)
         truth = study.truth(scene, steps).trajectory
-        for j, method in enumerate(methods):
-            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+        for method in study.competitors:
+            tell(f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
             yield from accuracy(case, attempt_apart(limit, case, study.skip_missing), truth)

@@ -29,11 +29,10 @@ ORTHONORMALITY = "orthonormality"
 
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     """Yield drifts of every method at the scene's step size, and the running maximum over time of each relative drift."""
-    methods = study.competitors
-    total = len(study.scenes) * len(methods)
-    for i, scene in enumerate(study.scenes):
-        for j, method in enumerate(methods):
-            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+    tell = study.count(progress, len(study.competitors))
+    for scene in study.scenes:
+        for method in study.competitors:
+            tell(f"{scene.name}: {method.name}")
             case = case_for(study.name, scene, method)
             yield from long_run(case, attempt_within(study.hang_limit, case, study.skip_missing))
 

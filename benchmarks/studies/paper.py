@@ -8,7 +8,7 @@ from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.references.truth import Truth
 from conservative.scene import Scene
-from conservative.trajectory import Counters, Trajectory
+from conservative.trajectory import Trajectory
 
 from ..measures import errors
 from ..measures.measure import Measure, Value
@@ -25,14 +25,14 @@ APPROXIMATE = "approximate"
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield drifts, errors and work of every method at the paper's step sizes, with every step stored."""
-    total = len(study.scenes) * len(study.methods)
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(study.methods) + 1)
+    for scene in study.scenes:
         grids = [grid_for(scene, scene.dt * fraction) for fraction in FRACTIONS]
-        progress(i * len(study.methods), total, f"{scene.name}: truth")
+        tell(f"{scene.name}: truth")
         truths = [study.truth(scene, grid) for grid in grids]
         yield from (agreement(study, scene, grid.dt, truth) for grid, truth in zip(grids, truths, strict=True))
-        for j, method in enumerate(study.methods):
-            progress(i * len(study.methods) + j, total, f"{scene.name}: {method.name}")
+        for method in study.methods:
+            tell(f"{scene.name}: {method.name}")
             for grid, truth in zip(grids, truths, strict=True):
                 case = Case(study.name, scene, method, grid)
                 outcome = attempt_within(study.hang_limit, case, study.skip_missing)
@@ -61,15 +61,11 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
     """Return a row for every measure and counter; without values if the run failed."""
     if isinstance(outcome, Failure):
         return case.blanks(errors.blanks(case.scene), outcome.outcome)
-    found = errors.measure_errors(outcome.trajectory, truth) + work(outcome.trajectory.counters)
-    return [case.row(value) for value in found]
-
-
-def work(counters: Counters) -> list[Value]:
-    """Return the counters that the method provides."""
-    counts = (
-        (Measure.STEPS, counters.steps),
-        (Measure.NEWTON_ITERATIONS, counters.iterations),
-        (Measure.EVALUATIONS, counters.evaluations),
-    )
-    return [Value(measure, float(count)) for measure, count in counts if count is not None]
+    counters = outcome.trajectory.counters
+    work = {
+        Measure.STEPS: counters.steps,
+        Measure.NEWTON_ITERATIONS: counters.iterations,
+        Measure.EVALUATIONS: counters.evaluations,
+    }
+    counts = [Value(measure, float(count)) for measure, count in work.items() if count is not None]
+    return [case.row(value) for value in errors.measure_errors(outcome.trajectory, truth) + counts]

@@ -41,7 +41,7 @@ from ..contest import cost, credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
-from .case import Case, Drawn, Failure, Success
+from .case import NOT_DRAWN, Case, Drawn, Failure, Success
 from .selection import Missing, at_tolerance, series, takes_exact_steps, tolerance_setting
 from .speed import keep_end
 from .study import Progress, Study, Truths
@@ -146,21 +146,20 @@ Line = list[Point]
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
-    assert isinstance(study, RandomStudy)
+    every = study.drawn if isinstance(study, RandomStudy) else (NOT_DRAWN,) * len(study.scenes)
     methods = list({series(method): method for method in study.competitors}.values())
-    pieces = len(methods) + 2
-    for i, (scene, drawn) in enumerate(zip(study.scenes, study.drawn, strict=True)):
-        progress(i * pieces, len(study.scenes) * pieces, f"{scene.name}: truth")
+    tell = study.count(progress, len(methods) + 2)
+    for scene, drawn in zip(study.scenes, every, strict=True):
+        tell(f"{scene.name}: truth")
         coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
         truth = study.truth(scene, coarsest).trajectory
         found: list[Line] = []
-        for j, method in enumerate(methods, start=1):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
-            found.append(
-                (yield from measure_line(study, cases(study.quick, Case(study.name, scene, method, coarsest, drawn)), truth))
-            )
+        for method in methods:
+            tell(f"{scene.name}: errors of {method.name}")
+            line = cases(study.quick, Case(study.name, scene, method, coarsest, drawn))
+            found.append((yield from measure_line(study, line, truth)))
         chosen = worth_timing(found)
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(chosen)} settings")
+        tell(f"{scene.name}: timing {len(chosen)} settings")
         yield from time_rows(study, chosen)
         yield from (point.case.row(TIME, UNTIMED) for line in found for point in line if point not in chosen)
 
@@ -229,20 +228,19 @@ def _deciding(lines: list[Line], error: float) -> Iterator[Point]:
 
 def time_rows(study: Study, points: list[Point]) -> Iterator[Measurement]:
     """Yield the times of the points of a body, s per simulated second, in interleaved rounds."""
-    runs: dict[str, Run] = {}
-    timed = {str(i): (point, longer(point)) for i, point in enumerate(points)}
+    runs: dict[tuple[int, Case], Run] = {}
     with time_limit(study.hang_limit):
-        for key, (point, case) in timed.items():
+        for number, point in enumerate(points):
+            case = longer(point)
             run = prepare_unchecked(case)
             if isinstance(run, Outcome):
                 yield point.case.row(TIME, run)
             else:
-                runs[key] = run
+                runs[number, case] = run
         timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=BUDGET)
-    for key, timing in timings.items():
-        (point, case), detail = timed[key], str(timing) if timing.outcome.ok else ""
-        simulated = case.grid.dt * case.grid.n_steps
-        yield point.case.row(Value(Measure.TIME, timing.minimum / simulated), timing.outcome, detail)
+    for (number, case), timing in timings.items():
+        value = Value(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps))
+        yield points[number].case.row(value, timing.outcome, str(timing) if timing.outcome.ok else "")
 
 
 def prepare_unchecked(case: Case) -> Run | Outcome:

@@ -17,7 +17,7 @@ from conservative.outcome import OK
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved, wall_time
-from .case import Case, Success, fail_unsupported
+from .case import Case, Failure, Success, fail_unsupported
 from .study import HANG_LIMIT, Progress, Study
 from .time_limit import attempt_here, attempt_within, is_known_to_end
 
@@ -82,7 +82,7 @@ def _shortest(run: Run) -> float:
     return spent if spent > 10 * CALL else min(spent, wall_time(run), wall_time(run))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TimedRun:
     """A case to be timed: the timed case, and the first call."""
 
@@ -96,28 +96,32 @@ class TimedRun:
         return self.case.grid.dt * self.case.grid.n_steps
 
 
+def make_timed(study: Study, case: Case, extend: Extend = keep_end) -> TimedRun | Failure:
+    """Return a case that is ready to be timed, with as many steps as fill a call, or its failure."""
+    outcome = attempt_here(study.hang_limit, case, study.skip_missing)
+    if isinstance(outcome, Failure):
+        return outcome
+    return TimedRun(*lengthen(case, outcome, study.hang_limit, extend), outcome)
+
+
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield wall times at the scene's step size, final state only: each method in its own loop, all interleaved."""
-    methods = study.competitors
-    pieces = len(methods) + 1
-    for i, scene in enumerate(study.scenes):
-        grid = keep_end(grid_for(scene, scene.dt))
-        ready: dict[str, TimedRun] = {}
-        for j, method in enumerate(methods):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: preparing {method.name}")
+    tell = study.count(progress, len(study.competitors) + 1)
+    for scene in study.scenes:
+        ready: list[TimedRun] = []
+        for method in study.competitors:
+            tell(f"{scene.name}: preparing {method.name}")
             scene.forget()  # so that the scene is converted again; compiled code stays warm
-            case = shorten(study, Case(study.name, scene, method, grid))
-            outcome = attempt_here(study.hang_limit, case, study.skip_missing)
-            if isinstance(outcome, Success):
-                ready[method.name] = TimedRun(*lengthen(case, outcome, study.hang_limit), outcome)
+            case = shorten(study, Case(study.name, scene, method, keep_end(grid_for(scene, scene.dt))))
+            timed = make_timed(study, case)
+            if isinstance(timed, Failure):
+                yield from case.blanks(blanks(*MEASURES), timed.outcome)
             else:
-                yield from case.blanks(blanks(*MEASURES), outcome.outcome)
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(ready)} methods")
-        timings = time_interleaved(
-            {name: timed.done.run for name, timed in ready.items()}, study.rounds, budget=study.timing_budget
-        )
-        for name, timed in ready.items():
-            yield from times(timed, timings[name])
+                ready.append(timed)
+        tell(f"{scene.name}: timing {len(ready)} methods")
+        timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
+        for timed, timing in timings.items():
+            yield from times(timed, timing)
 
 
 def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:

@@ -71,11 +71,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     The second row has the outcome of the failure, and so does the first row if no step size works.
     """
     methods = [method for method in study.methods if method.order is not None or isinstance(method, Missing)]
-    total = len(study.scenes) * len(methods)
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(methods))
+    for scene in study.scenes:
         motion = TrueMotion.of(study, scene)
-        for j, method in enumerate(methods):
-            progress(i * len(methods) + j, total, f"{scene.name}: {method.name}")
+        for method in methods:
+            tell(f"{scene.name}: {method.name}")
             yield from longest_step(study, motion, method)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -99,6 +100,11 @@ class Study:
     def competitors(self) -> tuple[Method, ...]:
         """The methods except reference solutions."""
         return tuple(method for method in self.methods if method.role != Role.TRUTH)
+
+    def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
+        """Return a function to be called with what comes next, before each of `per_scene` pieces of work for each scene."""
+        done = itertools.count()
+        return lambda what: progress(next(done), len(self.scenes) * per_scene, what)
 
     def __post_init__(self) -> None:
         for argument in ("scenes", "methods"):

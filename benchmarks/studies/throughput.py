@@ -147,8 +147,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield errors of all settings on a few bodies of each kind, and times of the deciding ones for all numbers of bodies."""
     assert isinstance(study, ThroughputStudy)
     ways = [way for method in study.competitors for way in list_ways(method)]
-    pieces = len(ways) + len(study.sizes)
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(ways) + len(study.sizes))
+    for scene in study.scenes:
         try:
             kind = yield from find_kind(study, scene.name)
         except MissingEngine as error:
@@ -159,11 +159,11 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
             continue
         points: list[Point] = []
-        for j, way in enumerate(ways):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {way.method.name}")
+        for way in ways:
+            tell(f"{scene.name}: errors of {way.method.name}")
             points += decide((yield from measure_errors(kind, way)))
-        for j, size in enumerate(study.sizes, start=len(ways)):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: timing {size} bodies")
+        for size in study.sizes:
+            tell(f"{scene.name}: timing {size} bodies")
             points = yield from time_rows(kind, points, size)
 
 
@@ -248,8 +248,9 @@ def decide(line: list[Point]) -> list[Point]:
 
 def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measurement, None, list[Point]]:
     """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
-    study, ready = kind.study, {}
-    for i, point in enumerate(points):
+    study = kind.study
+    ready: dict[Point, ManyDone] = {}
+    for point in points:
         if reason := too_long(point, size, study.longest_run):
             yield point.case.row(Value(Measure.TIME, math.nan), reason, bodies=size, way=point.way.text)
             continue
@@ -258,16 +259,15 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
         if isinstance(found, Outcome):
             yield point.case.row(Value(Measure.TIME, math.nan), found, bodies=size, way=point.way.text)
         else:
-            ready[str(i)] = found
-    rounds = QUICK_ROUNDS if study.quick else ROUNDS
-    timings = time_interleaved({key: found.run for key, found in ready.items()}, rounds, CALL, budget=study.timing_budget)
-    done = [
-        replace(points[int(key)], spent=min(points[int(key)].spent, timings[key].minimum / size), prepare=found.prepare / size)
-        for key, found in ready.items()
-    ]
-    for point, timing in zip(done, timings.values(), strict=True):
-        yield from rows_of(point, size, timing)
-    return [point for point, timing in zip(done, timings.values(), strict=True) if timing.outcome.ok]
+            ready[point] = found
+    runs = {point: found.run for point, found in ready.items()}
+    timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=study.timing_budget)
+    done = []
+    for point, timing in timings.items():
+        timed = replace(point, spent=min(point.spent, timing.minimum / size), prepare=ready[point].prepare / size)
+        yield from rows_of(timed, size, timing)
+        done += [timed] * timing.outcome.ok
+    return done
 
 
 def too_long(point: Point, size: int, limit: float) -> Outcome | None:

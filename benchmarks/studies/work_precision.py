@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from conservative.method import Method
@@ -17,9 +17,8 @@ from . import step_ladder
 from .case import Case, Failure, Success
 from .convergence import attempt_each
 from .selection import at_tolerance, series, tolerance_setting
-from .speed import CALL, TimedRun, keep_end, lengthen
+from .speed import CALL, Extend, TimedRun, keep_end, make_timed
 from .study import Progress, Study
-from .time_limit import attempt_here
 
 ERRORS = (Measure.ATTITUDE_FINAL, Measure.ATTITUDE_MAX)
 ROUNDS = 5
@@ -29,17 +28,17 @@ ROUNDS = 5
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield error and time of every point. Rows of a point share scene, method and dt; those of a line share their series."""
     methods = one_of_each_series(study)
-    pieces = len(methods) + 1
-    for i, scene in enumerate(study.scenes):
+    tell = study.count(progress, len(methods) + 1)
+    for scene in study.scenes:
         good: list[Case] = []
-        for j, method in enumerate(methods):
-            progress(i * pieces + j, len(study.scenes) * pieces, f"{scene.name}: errors of {method.name}")
+        for method in methods:
+            tell(f"{scene.name}: errors of {method.name}")
             truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
             for case, outcome in attempt_each(study, points(study, scene, method)):
                 yield from error_rows(case, outcome, truth)
                 good += [case] * isinstance(outcome, Success)
-        progress((i + 1) * pieces - 1, len(study.scenes) * pieces, f"{scene.name}: timing {len(good)} points")
-        yield from time_rows(study, good)
+        tell(f"{scene.name}: timing {len(good)} points")
+        yield from time_rows(study, good, {Measure.TIME: keep_end})
 
 
 def one_of_each_series(study: Study) -> list[Method]:
@@ -71,17 +70,21 @@ def error_rows(case: Case, outcome: Success | Failure, truth: Trajectory) -> lis
     return [case.row(found[measure]) for measure in ERRORS]
 
 
-def time_rows(study: Study, cases: list[Case]) -> Iterator[Measurement]:
-    """Yield the times of all points of a scene, interleaved, final state only."""
-    ready: dict[str, TimedRun] = {}
+def time_rows(study: Study, cases: list[Case], kept: Mapping[Measure, Extend]) -> Iterator[Measurement]:
+    """Yield the times of cases, s per simulated second, all in interleaved rounds.
+
+    `kept` has what is timed of each, and the grid of its runs: that of the case, with so many times as many steps.
+    """
+    ready: dict[tuple[Case, Measure], TimedRun] = {}
     for case in cases:
-        bare = replace(case, grid=keep_end(case.grid))
-        outcome = attempt_here(study.hang_limit, bare)
-        if isinstance(outcome, Success):
-            ready[str(len(ready))] = TimedRun(*lengthen(bare, outcome, study.hang_limit), outcome)
-        else:
-            yield from case.blanks(blanks(Measure.TIME), outcome.outcome)
+        for measure, keep in kept.items():
+            timed = make_timed(study, replace(case, grid=keep(case.grid, 1)), keep)
+            if isinstance(timed, Failure):
+                yield from case.blanks(blanks(measure), timed.outcome)
+            else:
+                ready[case, measure] = timed
     runs = {key: timed.done.run for key, timed in ready.items()}
     timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
-    for key, timed in ready.items():
-        yield timed.case.row(Value(Measure.TIME, timings[key].minimum / timed.simulated), timings[key].outcome)
+    for (case, measure), timing in timings.items():
+        value = Value(measure, timing.minimum / ready[case, measure].simulated)
+        yield ready[case, measure].case.row(value, timing.outcome, str(timing) if timing.outcome.ok else "")
