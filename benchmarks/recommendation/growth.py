@@ -142,46 +142,30 @@ def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) ->
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """Growth of a small relative change of the initial rates, the `disturbance`.
+    """Growth of a small relative change of the initial rates, the `disturbance`, as long as the two motions are comparable.
 
     `factor` (n,) is the largest difference of the attitudes up to the times t (n,), s, in rad, divided by the disturbance.
-    `label` is that of the method that integrated both motions.
+    `label` is that of the method that integrated both motions. `is_lost` is whether they have nothing in common after t[-1].
     """
 
     t: Array
     factor: Array
     disturbance: float
     label: str
-
-    @property
-    def known(self) -> int:
-        """Number of samples before the two motions have nothing in common."""
-        lost = self.factor * self.disturbance > ASYMPTOTIC
-        return max(2, int(np.argmax(lost))) if lost.any() else len(self.t)
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the two motions have nothing in common in the end."""
-        return self.known < len(self.t)
-
-    @property
-    def end(self) -> float:
-        """End of the known part, s."""
-        return float(self.t[self.known - 1])
+    is_lost: bool = False
 
     @property
     def final_size(self) -> float:
-        """Largest difference in the known part, rad."""
-        return float(self.factor[self.known - 1]) * self.disturbance
+        """Largest difference, rad."""
+        return float(self.factor[-1]) * self.disturbance
 
     @property
     def steepness(self) -> float:
         """Final disturbance divided by a straight line through its value after an eighth of the samples."""
-        last = self.known - 1
-        early = max(1, last // 8)
+        early = max(1, (len(self.t) - 1) // 8)
         if self.factor[early] <= 0:
-            return math.inf if self.factor[last] > 0 else 1.0
-        return float(self.factor[last] / self.factor[early] * self.t[early] / self.t[last])
+            return math.inf if self.factor[-1] > 0 else 1.0
+        return float(self.factor[-1] / self.factor[early] * self.t[early] / self.t[-1])
 
     @property
     def unstable(self) -> bool:
@@ -190,10 +174,18 @@ class Amplification:
 
     def excess(self, start: float, stop: float) -> float:
         """Return the growth between two times, s, divided by that in proportion to time; infinite if the attitude is lost."""
-        if self.is_lost and self.unstable and self.end < stop:
+        end = float(self.t[-1])
+        if self.is_lost and self.unstable and end < stop:
             return math.inf
-        known, last = slice(self.known), min(stop, self.end)
+        last = min(stop, end)
         if last <= start:
             return 1.0
-        before, after = np.interp([start, last], self.t[known], self.factor[known]).tolist()
+        before, after = np.interp([start, last], self.t, self.factor).tolist()
         return max(1.0, after / before * start / last) if before > 0 else 1.0
+
+
+def amplification_of(t: Array, factor: Array, disturbance: float, label: str) -> Amplification:
+    """Return the amplification up to the time at which the two motions have nothing in common."""
+    lost = factor * disturbance > ASYMPTOTIC
+    known = max(2, int(np.argmax(lost))) if lost.any() else len(t)
+    return Amplification(t[:known], factor[:known], disturbance, label, known < len(t))

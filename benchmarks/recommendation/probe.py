@@ -32,9 +32,8 @@ from ..measures.timing import wall_time
 from ..studies import step_ladder
 from ..studies.case import Case, Success
 from ..studies.selection import tolerance_setting
-from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_within
-from .growth import Amplification, ErrorLaw, ExpectedDrift, extrapolate_drifts, fit_law
+from .growth import Amplification, ErrorLaw, ExpectedDrift, amplification_of, extrapolate_drifts, fit_law
 
 CLOSED_RADIANS, RADIANS = 60.0, 30.0
 """Length of short probes, rad, with a closed form and with multi-precision, which takes a second for ten radians."""
@@ -103,17 +102,40 @@ class Probe:
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
-    """The conditions under which all probes of a scene run.
+class Question:
+    """What a recommendation is for.
 
     Attributes
     ----------
     scene, error, duration
-        Scene, requested attitude error, rad, and duration, s.
+        Scene, largest attitude error, rad, and duration, s.
+    methods, missing
+        The engines to probe, and the names of those that are not installed.
     cost_limit
         Largest wall time of a setting per simulated second, s/s.
+    time_limit
+        Wall time, s, after which the run of an engine is stopped.
+    """
+
+    scene: Scene
+    error: float
+    duration: float
+    methods: tuple[Method, ...]
+    missing: tuple[str, ...]
+    cost_limit: float
+    time_limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions(Question):
+    """A question with the conditions under which all of its probes run.
+
+    Attributes
+    ----------
     spacing, samples
         Sampling interval, s, and number of samples in a short window.
+    reference
+        The reference solution.
     truth
         Returns the true attitudes (n, 3, 3) on a grid.
     truth_until
@@ -122,21 +144,15 @@ class Conditions:
         Largest angular speed, rad/s.
     amplification
         Growth of a disturbance.
-    time_limit
-        Wall time, s, after which a probe is stopped.
     """
 
-    scene: Scene
-    error: float
-    duration: float
-    cost_limit: float
     spacing: float
     samples: int
+    reference: Truth
     truth: Callable[[Grid], Array]
     truth_until: float
     rate: float
     amplification: Amplification
-    time_limit: float = HANG_LIMIT
 
     @property
     def short(self) -> float:
@@ -150,15 +166,13 @@ class Conditions:
 
     def step_at_most(self, dt: float) -> float:
         """Return the longest round step, s, of at most dt."""
-        if dt >= self.spacing:
-            return self.spacing * float(_ROUND[bisect.bisect_right(_ROUND, dt / self.spacing * (1 + 1e-9)) - 1])
-        return self.spacing / float(_ROUND[bisect.bisect_left(_ROUND, self.spacing / dt * (1 - 1e-9))])
+        spacing = self.spacing
+        return spacing * _round_down(dt / spacing) if dt >= spacing else spacing / _round_up(spacing / dt)
 
     def step_at_least(self, dt: float) -> float:
         """Return the shortest round step, s, of at least dt."""
-        if dt >= self.spacing:
-            return self.spacing * float(_ROUND[bisect.bisect_left(_ROUND, dt / self.spacing * (1 - 1e-9))])
-        return self.spacing / float(_ROUND[bisect.bisect_right(_ROUND, self.spacing / dt * (1 + 1e-9)) - 1])
+        spacing = self.spacing
+        return spacing * _round_up(dt / spacing) if dt >= spacing else spacing / _round_down(spacing / dt)
 
     def choose_ours(self, methods: Sequence[Method] | None = None, error: float | None = None) -> tuple[Method, float]:
         """Return the method of the automatic choice for a short window, among all candidates or some, and its round step, s.
@@ -256,10 +270,17 @@ class Conditions:
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
 
 
-def prepare_conditions(
-    scene: Scene, error: float, duration: float, cost_limit: float, time_limit: float = HANG_LIMIT
-) -> tuple[Conditions, Truth]:
-    """Return the conditions of all probes, and the reference solution. Units are those of `Conditions`."""
+def _round_down(ratio: float) -> float:
+    return float(_ROUND[bisect.bisect_right(_ROUND, ratio * (1 + 1e-9)) - 1])
+
+
+def _round_up(ratio: float) -> float:
+    return float(_ROUND[bisect.bisect_left(_ROUND, ratio * (1 - 1e-9))])
+
+
+def prepare_conditions(asked: Question) -> Conditions:
+    """Return the conditions of all probes."""
+    scene, duration = asked.scene, asked.duration
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyNotReached)  # only the angular velocity is used
         until = min(duration, 2 * CLOSED_RADIANS / bound_rate(scene))
@@ -267,7 +288,10 @@ def prepare_conditions(
     rate = max(float(np.linalg.norm(trial.w_WB_B, axis=1).max()), 1 / duration)  # at least one radian in the whole duration
     closed = Exact().unsupported(scene) is None
     length = min(duration, (CLOSED_RADIANS if closed else RADIANS) / rate)
-    spacing = _round_down(min(length / SAMPLES, step_ladder.RADIANS / rate))
+    widest = min(length / SAMPLES, step_ladder.RADIANS / rate)
+    power = math.floor(math.log10(widest))
+    digit = max(digit for digit in (1, 2, 5) if digit <= widest / 10.0**power * (1 + 1e-9))
+    spacing = float(f"{digit}e{power}")
     samples = math.ceil(length / spacing * (1 - 1e-9))
     # Runs with steps longer than the spacing end up to an eighth later.
     truth = reference(scene, Grid(spacing, samples + samples // 8 + 1))
@@ -281,26 +305,16 @@ def prepare_conditions(
         return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
 
     conditions = Conditions(
-        scene,
-        error,
-        duration,
-        cost_limit,
-        spacing,
-        samples,
+        **vars(asked),
+        spacing=spacing,
+        samples=samples,
+        reference=truth,
         truth=closed_form if closed else sampled,
         truth_until=float(max(duration, truth.trajectory.t[-1]) if closed else samples * spacing),
         rate=rate,
         amplification=Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, ""),
-        time_limit=time_limit,
     )
-    return replace(conditions, amplification=_measure_amplification(conditions)), truth
-
-
-def _round_down(value: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is at most `value`."""
-    power = math.floor(math.log10(value))
-    digit = max(digit for digit in (1, 2, 5) if digit <= value / 10.0**power * (1 + 1e-9))
-    return float(f"{digit}e{power}")
+    return replace(conditions, amplification=_measure_amplification(conditions))
 
 
 def _measure_amplification(conditions: Conditions) -> Amplification:
@@ -326,4 +340,4 @@ def _measure_amplification(conditions: Conditions) -> Amplification:
         factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
     t, factor = np.concatenate(times), np.concatenate(factors)
     order = np.argsort(t, kind="stable")
-    return Amplification(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)
+    return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)

@@ -25,7 +25,6 @@ from conservative.methods.automatic import ATTEMPTS
 from conservative.methods.search import candidates, step_factor, stops_falling
 from conservative.methods.trials import ASYMPTOTIC
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.references.truth import Truth
 from conservative.scene import Scene
 
 from ..measures.convergence_order import MIN_POINTS, Order, observed_order
@@ -35,7 +34,7 @@ from ..studies.case import Case, Success, fail_unsupported, names_of
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_here
-from .probe import RUN_LIMIT, STEPS, Conditions, Probe, prepare_conditions
+from .probe import RUN_LIMIT, STEPS, Conditions, Probe, Question, prepare_conditions
 
 Progress = Callable[[float, str], None]
 
@@ -58,19 +57,6 @@ LARGEST_TOLERANCE_CUT = 4
 """Largest cut of a tolerance from one probe to the next, powers of ten."""
 COARSEN_BELOW = 1 / 16
 """A longer step is tried as well if the error is below this share of the requested one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Checked arguments of `ask`. `missing` are engines that are not installed."""
-
-    scene: Scene
-    error: float
-    duration: float
-    methods: tuple[Method, ...]
-    missing: tuple[str, ...]
-    cost_limit: float
-    time_limit: float = HANG_LIMIT
 
 
 def ask(
@@ -177,15 +163,10 @@ class Advice:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """The advice on every method, ours first; see `Advice`.
-
-    `conditions` are those of all probes, `truth` is the reference solution, `missing` are engines that are not installed.
-    """
+    """The advice on every method, ours first, and the conditions of all probes."""
 
     conditions: Conditions
-    truth: Truth
     advice: tuple[Advice, ...]
-    missing: tuple[str, ...]
 
     @property
     def ours(self) -> Advice:
@@ -212,7 +193,7 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
         There is no reference solution.
     """
     progress(0.0, "reference solution")
-    conditions, truth = prepare_conditions(asked.scene, asked.error, asked.duration, asked.cost_limit, asked.time_limit)
+    conditions = prepare_conditions(asked)
     starts = [conditions.choose_ours()]
     if starts[0][0].card.exact and (general := candidates(asked.scene, exact=False)):
         starts.append(conditions.choose_ours(general))
@@ -229,7 +210,7 @@ def recommend(asked: Question, progress: Progress = lambda share, what: None) ->
     advice = tuple(
         _advise(conditions, line, roles[line], each, costs.get(line, math.nan)) for line, each in refinements.items()
     )
-    return Recommendation(conditions, truth, advice, asked.missing)
+    return Recommendation(conditions, advice)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def build(recommendation: Recommendation) -> Document:
 
 
 def _data(recommendation: Recommendation) -> dict[str, Any]:
-    conditions, truth = recommendation.conditions, recommendation.truth
+    conditions, truth = recommendation.conditions, recommendation.conditions.reference
     amplified = conditions.amplification
     return {
         "scene": conditions.scene.name,
@@ -40,7 +40,7 @@ def _data(recommendation: Recommendation) -> dict[str, Any]:
         "cost_limit": conditions.cost_limit,
         **{name: getattr(advice, "line", None) for name, advice in recommendation.winners.items()},
         "recommendations": [_advice(advice) for advice in recommendation.advice],
-        "not_installed": recommendation.missing,
+        "not_installed": conditions.missing,
         "truth": {
             "by": truth.names[0],
             "checked_by": truth.names[1],
@@ -53,7 +53,7 @@ def _data(recommendation: Recommendation) -> dict[str, Any]:
             "disturbance": amplified.disturbance,
             "becomes": amplified.final_size,
             "lost": amplified.is_lost,
-            "measured_until": amplified.end,
+            "measured_until": float(amplified.t[-1]),
             "by": amplified.label,
         },
     }
@@ -110,8 +110,8 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
 
 def notes(recommendation: Recommendation) -> list[str]:
     """Return the fastest methods, and the basis of the numbers: growth of errors, reference solution, stability."""
-    advice, conditions, truth = recommendation.advice, recommendation.conditions, recommendation.truth
-    amplified = conditions.amplification
+    advice, conditions = recommendation.advice, recommendation.conditions
+    truth, amplified = conditions.reference, conditions.amplification
     after = ", and by any angle after that" if amplified.is_lost else ""
     growth = "the motion is unstable and amplifies errors" if amplified.unstable else "no more than in proportion to time"
     return [
@@ -121,11 +121,11 @@ def notes(recommendation: Recommendation) -> list[str]:
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
         f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
-        f"{amplified.final_size:.2g} rad within {amplified.end:.4g} s{after} ({amplified.label}): {growth}.",
+        f"{amplified.final_size:.2g} rad within {amplified.t[-1]:.4g} s{after} ({amplified.label}): {growth}.",
         "Times: the fastest of interleaved runs on this machine; ratios are comparable across machines, times are not.",
         *(f"{method_text(a)}: not a general integrator; it solves integrable motions only." for a in advice if not a.general),
         *(f"{method_text(a)}: {a.reason}." for a in advice if not a.reached),
-        *(f"{name}: not installed." for name in recommendation.missing),
+        *(f"{name}: not installed." for name in conditions.missing),
     ]
 
 
