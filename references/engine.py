@@ -74,7 +74,7 @@ def load(module: str, package: str, engine: str) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Axes:
+class EngineAxes:
     """The initial state of a scene in axes F in which the inertia is diagonal.
 
     Attributes
@@ -127,19 +127,19 @@ class Axes:
         return Trajectory(self.scene, grid.t[:good], R_WB[:good], w_WB_B[:good], label, work, failure)
 
 
-def principal_axes(scene: Scene) -> Axes:
+def principal_axes(scene: Scene) -> EngineAxes:
     """Return the initial state in principal axes. If the inertia is diagonal, they are the body axes in their order."""
-    return Axes(scene, scene.body.R_BP, scene.body.moments)
+    return EngineAxes(scene, scene.body.R_BP, scene.body.moments)
 
 
-def symmetric_axes(scene: Scene) -> Axes | None:
+def symmetric_axes(scene: Scene) -> EngineAxes | None:
     """Return the initial state in axes whose third is an axis of symmetry of body and field; None if there is none."""
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
     # heyoka's tolerance is relative to the state: with the axes of our kernels, its errors change by a few per cent.
     R_BF = axes_about(axis, beside=int(np.argmin(np.abs(axis))))
-    return Axes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
+    return EngineAxes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ class MassModel:
     body: RigidBody
 
 
-def mass_model(axes: Axes) -> MassModel | None:
+def mass_model(axes: EngineAxes) -> MassModel | None:
     """Return a physical mass model, None if there is none.
 
     With the second moments S = tr(J)/2 - J of the mass distribution about the fixed point, those about the centre of mass are

@@ -32,7 +32,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from .engine import STEP_LIMIT, Axes, limit_reason, pace_reason, version
+from .engine import STEP_LIMIT, EngineAxes, limit_reason, pace_reason, version
 from .heyoka_equations import forms
 
 Reals = NDArray[Any]
@@ -176,7 +176,7 @@ class Precise(Method):
         field = find_field(scene.potential)
         values = () if field is None else field.values(scene.potential)
         solve = _solver(scene.body.inertia.tolist(), to_quaternion(scene.R_WB0), scene.w_WB_B0, field, values, self.bits)
-        axes = Axes(scene, np.eye(3), np.diag(scene.body.inertia))
+        axes = EngineAxes(scene, np.eye(3), np.diag(scene.body.inertia))
         t = _reals(grid.steps.tolist(), self.bits) * _real(grid.dt, self.bits)
 
         def run() -> Trajectory:

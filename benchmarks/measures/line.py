@@ -9,7 +9,7 @@ import numpy as np
 from conservative.attitude import Array
 
 
-class Line(NamedTuple):
+class FittedLine(NamedTuple):
     """A fitted line: slope, its standard error, and the scatter of the points in the unit of y."""
 
     slope: float
@@ -17,7 +17,7 @@ class Line(NamedTuple):
     scatter: float
 
 
-def fit_line(x: Array, y: Array) -> Line:
+def fit_line(x: Array, y: Array) -> FittedLine:
     """Return the line through three points or more, x (n,) and y (n,).
 
     The scatter is computed from the residuals, because the standard error of `linregress`, from 1 - r^2, loses its digits if
@@ -28,4 +28,4 @@ def fit_line(x: Array, y: Array) -> Line:
     found = linregress(x, y)
     residuals = (y - y.mean()) - found.slope * (x - x.mean())
     scatter = float(np.sqrt(np.sum(residuals**2) / (len(x) - 2)))
-    return Line(float(found.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)
+    return FittedLine(float(found.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)

@@ -41,7 +41,7 @@ CALL = 0.002
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class EnginePoint:
     """A run that reached its end, and its largest attitude error, rad."""
 
     case: Case
@@ -54,7 +54,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = one_of_each_series(study)
     tell = study.count(progress, len(methods) + 1)
     for scene in study.scenes:
-        found: list[Point] = []
+        found: list[EnginePoint] = []
         for method in methods:
             tell(f"{scene.name}: errors of {method.name}")
             mine = yield from converge(study, scene, method)
@@ -73,10 +73,10 @@ def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
     return [Case(study.name, scene, method, grid) for grid in grids]
 
 
-def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[Point]]:
+def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[EnginePoint]]:
     """Yield the errors of one method; return its points."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-    found: list[Point] = []
+    found: list[EnginePoint] = []
     cases = cases_of(study, scene, method)
     tried: list[Case] = []
     for case, outcome in attempt_each(study, limit_preparation(cases, found)):
@@ -87,13 +87,13 @@ def converge(study: Study, scene: Scene, method: Method) -> Generator[Measuremen
         with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
             values = errors.measure_errors(outcome.trajectory, truth)
         error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
-        found.append(Point(case, outcome, error.value))
+        found.append(EnginePoint(case, outcome, error.value))
         yield case.row(error)
     yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), SKIPPED) for case in cases if case not in tried)
     return found
 
 
-def limit_preparation(cases: list[Case], found: list[Point]) -> Iterator[Case]:
+def limit_preparation(cases: list[Case], found: list[EnginePoint]) -> Iterator[Case]:
     """Yield the first case, then the others within the time limit; every second one if preparing the first was slow."""
     yield cases[0]
     is_slow = bool(found) and found[0].done.cost.prepare > SLOW_PREPARATION
@@ -103,7 +103,7 @@ def limit_preparation(cases: list[Case], found: list[Point]) -> Iterator[Case]:
         yield case
 
 
-def order_of(study: Study, scene: Scene, method: Method, found: list[Point]) -> list[Measurement]:
+def order_of(study: Study, scene: Scene, method: Method, found: list[EnginePoint]) -> list[Measurement]:
     """Return the observed order and its standard error, or the reason why there is no order."""
     case, names = Case(study.name, scene, method, step_ladder.samples(scene, method)), (Measure.ORDER, Measure.ORDER_STDERR)
     if failed := no_order(case, study.skip_missing):
@@ -113,7 +113,7 @@ def order_of(study: Study, scene: Scene, method: Method, found: list[Point]) -> 
     return order_rows(case, names, order, WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason)
 
 
-def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
+def time_rows(study: Study, found: list[EnginePoint]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
     quick = {point: point.done.run for point in found if point.done.cost.first_call <= study.longest_run}
     with time_limit(study.hang_limit):
@@ -125,7 +125,7 @@ def time_rows(study: Study, found: list[Point]) -> Iterator[Measurement]:
             yield time_row(point, point.done.cost.first_call, OK, "a single run")
 
 
-def time_row(point: Point, spent: float, outcome: Outcome, detail: str) -> Measurement:
+def time_row(point: EnginePoint, spent: float, outcome: Outcome, detail: str) -> Measurement:
     """Return the row of a run that took `spent` s."""
     grid = point.case.grid
     value = Value(Measure.TIME, spent / (grid.dt * grid.n_steps))

@@ -126,7 +126,7 @@ def precise(scene: Scene, grid: Grid) -> Truth:
 
 
 @dataclass(frozen=True)
-class Point:
+class TimedSetting:
     """A setting whose run succeeded: its error, rad, and its estimated time, s per simulated second."""
 
     case: Case
@@ -140,7 +140,7 @@ class Point:
         return Role.OURS if self.case.method.role == Role.OURS else self.case.method.family
 
 
-Line = list[Point]
+Line = list[TimedSetting]
 """The points of one line, coarse to fine."""
 
 
@@ -194,7 +194,7 @@ def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Gener
             yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)
             continue
         error = float(angle_between(truth.R_WB, outcome.trajectory.R_WB).max())
-        line.append(Point(case, outcome, error, estimate(outcome) / case.scene.t_end))
+        line.append(TimedSetting(case, outcome, error, estimate(outcome) / case.scene.t_end))
         yield case.row(Value(Measure.ATTITUDE_MAX, error))
     return line
 
@@ -205,7 +205,7 @@ def estimate(done: Success) -> float:
     return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
 
 
-def worth_timing(lines: Iterable[Line]) -> list[Point]:
+def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
 
     Of each line whose estimated time is at most `MARGIN` times that of the fastest of its side, these are the coarsest point
@@ -217,7 +217,7 @@ def worth_timing(lines: Iterable[Line]) -> list[Point]:
     return list({id(point): point for side in sides.values() for error in DECADES for point in _deciding(side, error)}.values())
 
 
-def _deciding(lines: list[Line], error: float) -> Iterator[Point]:
+def _deciding(lines: list[Line], error: float) -> Iterator[TimedSetting]:
     costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in lines]
     least = min((each for each in costs if not math.isnan(each)), default=math.nan)
     for line, each in zip(lines, costs, strict=True):
@@ -226,7 +226,7 @@ def _deciding(lines: list[Line], error: float) -> Iterator[Point]:
             yield from line[max(first - 1, 0) : first + 1]
 
 
-def time_rows(study: Study, points: list[Point]) -> Iterator[Measurement]:
+def time_rows(study: Study, points: list[TimedSetting]) -> Iterator[Measurement]:
     """Yield the times of the points of a body, s per simulated second, in interleaved rounds."""
     runs: dict[tuple[int, Case], Run] = {}
     with time_limit(study.hang_limit):
@@ -260,7 +260,7 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
     return run if outcome.ok else outcome
 
 
-def longer(point: Point) -> Case:
+def longer(point: TimedSetting) -> Case:
     """Return the case whose run is timed, final state only: the motion, `DURATIONS` times as long if it is fast."""
     quick = point.spent * point.case.scene.t_end < LONG
     return replace(point.case, grid=keep_end(point.case.grid, DURATIONS if quick else 1))

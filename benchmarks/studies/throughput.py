@@ -130,7 +130,7 @@ class Kind:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class BatchSetting:
     """A setting and a way whose run succeeded: errors, rad, by statistic, and the time per body, s.
 
     The time is a share of a call and of its preparation without compilation.
@@ -158,7 +158,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             case = Case(study.name, scene, Missing("heyoka", "heyoka", "heyoka"), grid, Drawn(scene.name, study.seed))
             yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
             continue
-        points: list[Point] = []
+        points: list[BatchSetting] = []
         for way in ways:
             tell(f"{scene.name}: errors of {way.method.name}")
             points += decide((yield from measure_errors(kind, way)))
@@ -203,9 +203,9 @@ def _grid(n: int) -> Grid:
     return Grid(DURATION / n, n, n // SAMPLES)
 
 
-def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Point]]:
+def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[BatchSetting]]:
     """Yield the errors of a line, coarse to fine, down to the last of `ERRORS` or to the time budget; return its points."""
-    line: list[Point] = []
+    line: list[BatchSetting] = []
     for case in list_cases(kind, way.method):
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
             break
@@ -219,7 +219,7 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Po
             continue
         errors = read_errors(found, kind.truth)
         n = len(kind.few)
-        line.append(Point(way, case, errors, found.spent / n, found.prepare / n))
+        line.append(BatchSetting(way, case, errors, found.spent / n, found.prepare / n))
         detail = EXACT if takes_exact_steps(case.method) else ""
         for statistic, error in errors.items():
             yield case.row(Value(Measure.ATTITUDE_MAX, error, statistic), detail=detail, bodies=n, way=way.text)
@@ -234,7 +234,7 @@ def read_errors(found: ManyDone, truth: Array) -> dict[str, float]:
     return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 
 
-def decide(line: list[Point]) -> list[Point]:
+def decide(line: list[BatchSetting]) -> list[BatchSetting]:
     """Return the points of a line that determine the cost at an error."""
     if line and takes_exact_steps(line[0].case.method):
         return line
@@ -246,10 +246,10 @@ def decide(line: list[Point]) -> list[Point]:
     return [line[i] for i in sorted(chosen)]
 
 
-def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measurement, None, list[Point]]:
+def time_rows(kind: Kind, points: list[BatchSetting], size: int) -> Generator[Measurement, None, list[BatchSetting]]:
     """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
     study = kind.study
-    ready: dict[Point, ManyDone] = {}
+    ready: dict[BatchSetting, ManyDone] = {}
     for point in points:
         if reason := too_long(point, size, study.longest_run):
             yield point.case.row(Value(Measure.TIME, math.nan), reason, bodies=size, way=point.way.text)
@@ -270,7 +270,7 @@ def time_rows(kind: Kind, points: list[Point], size: int) -> Generator[Measureme
     return done
 
 
-def too_long(point: Point, size: int, limit: float) -> Outcome | None:
+def too_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
     """Return the outcome of a skipped run if a call with `size` bodies would take longer than `limit`, s."""
     for what, seconds, most in (("a call", point.spent, limit), ("preparing a call", point.prepare, PREPARATION * limit)):
         if size > 1 and seconds * size > most:
@@ -278,7 +278,7 @@ def too_long(point: Point, size: int, limit: float) -> Outcome | None:
     return None
 
 
-def rows_of(point: Point, size: int, timing: Timing) -> Iterator[Measurement]:
+def rows_of(point: BatchSetting, size: int, timing: Timing) -> Iterator[Measurement]:
     """Yield the cost of a body in a batch: time, s per simulated second, steps per second, and preparation, s."""
     case, a_body = point.case, timing.minimum / size
     values = {

@@ -109,15 +109,15 @@ class ProjectSide:
         """Return a run that gives a trajectory."""
         return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, states)
 
-    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> TimedRun:
+    def timed(self, scene: str, method: str, dt: float, n_steps: int) -> VersionRun:
         """Return a prepared run of n_steps steps dt, s, to be timed."""
         values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
-        run = TimedRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, States())
+        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, States())
         run.prepare()
         return run
 
 
-class TimedRun(WorkerRun[Trajectory]):
+class VersionRun(WorkerRun[Trajectory]):
     """A run that is only timed."""
 
     def __call__(self) -> Any:

@@ -21,7 +21,7 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..engine import load, principal_axes, unsupported_reason, version
-from ..environments.plain_numbers import ManySamples, Samples, describe, take_axes
+from ..environments.plain_numbers import EngineSamples, ManySamples, describe, take_axes
 from .mujoco_versions import INTEGRATORS, prepare_many_with, prepare_with
 
 
@@ -88,7 +88,7 @@ class MuJoCo(Method):
         """Compile MuJoCo's model. Raises `Unsupported` for an integrator that this version does not have."""
         mj = load("mujoco", "mujoco", "MuJoCo")
         axes = principal_axes(scene)
-        samples = Samples(axes, grid, self.label)
+        samples = EngineSamples(axes, grid, self.label)
         try:
             march = prepare_with(mj, SimpleNamespace(integrator=self.integrator, **describe(axes, grid)))
         except NotImplementedError as error:  # an integrator that another version has

@@ -19,7 +19,7 @@ from conservative.methods.units import in_own_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import Axes, load, mass_model, principal_axes, unsupported_reason, version
+from ..engine import EngineAxes, load, mass_model, principal_axes, unsupported_reason, version
 from ..environments.plain_numbers import ManySamples, take_axes
 
 SCHEMES = ("Euler", "RK4")
@@ -108,7 +108,7 @@ class Pinocchio(Method):
         return run
 
 
-def _model(pin: Any, axes: Axes) -> Any:
+def _model(pin: Any, axes: EngineAxes) -> Any:
     mass = mass_model(axes)
     assert mass is not None  # `unsupported` has seen to it
     model = pin.Model()

@@ -21,7 +21,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import Axes, limit_reason, load, principal_axes, version
+from ..engine import EngineAxes, limit_reason, load, principal_axes, version
 from ..heyoka_equations.accelerations import READERS, FieldInAxes, express_field
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
@@ -128,12 +128,12 @@ def _count_steps(solver: Any) -> Any:
     return counting
 
 
-def _rate_scale(axes: Axes) -> float:
+def _rate_scale(axes: EngineAxes) -> float:
     """Return a size of the rates that is above 0 even for a scene that starts at rest, rad/s."""
     return float(np.sqrt(2 * axes.scene.energy_scale / axes.J.max()))
 
 
-def _express(scene: Scene) -> tuple[Axes, Array, Acceleration | None, Array | None]:
+def _express(scene: Scene) -> tuple[EngineAxes, Array, Acceleration | None, Array | None]:
     """Return principal axes F, axes D (3, 3) with the field's as the third, the field as a function of F in D, rates of D.
 
     The last, (3,), rad/s, in D, is None where D does not turn.
@@ -149,7 +149,7 @@ def _express(scene: Scene) -> tuple[Axes, Array, Acceleration | None, Array | No
     return axes, np.eye(3), _general(potential, axes), None
 
 
-def _derivative(axes: Axes, acceleration: Acceleration | None, turn_D: Array | None = None) -> Derivative:
+def _derivative(axes: EngineAxes, acceleration: Acceleration | None, turn_D: Array | None = None) -> Derivative:
     """Return Euler's equations and q' = (q w - turn q) / 2 in plain floats: arrays of three cost more than their arithmetic."""
     J1, J2, J3 = axes.J.tolist()
     a1, a2, a3 = (J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3
@@ -189,7 +189,7 @@ def _derivative(axes: Axes, acceleration: Acceleration | None, turn_D: Array | N
     return in_turning_field
 
 
-def _uniform(axes: Axes) -> Acceleration:
+def _uniform(axes: EngineAxes) -> Acceleration:
     (m1, m2, m3), (J1, J2, J3) = axes.moment.tolist(), axes.J.tolist()
 
     def acceleration(_: float, *q: float) -> tuple[float, float, float]:
@@ -204,7 +204,7 @@ def _written_out(field: FieldInAxes) -> Acceleration:
     return lambda _, *q: field.acceleration(parameters, _unit_row(*q))
 
 
-def _general(potential: AnyPotential, axes: Axes) -> Acceleration:
+def _general(potential: AnyPotential, axes: EngineAxes) -> Acceleration:
     def acceleration(t: float, *q: float) -> list[float]:
         R_WF = from_quaternion(q)
         return (torque_W(potential, R_WF @ axes.R_BF.T, np.asarray(t)) @ R_WF / axes.J).tolist()

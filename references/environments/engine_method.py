@@ -27,7 +27,7 @@ from conservative.scene import Scene
 from ..engine import principal_axes, unsupported_reason
 from ..worker.client import Worker
 from .environment import Distribution, Environment, find_environment, worker_of
-from .plain_numbers import ManySamples, Samples, describe, describe_many, take_axes
+from .plain_numbers import EngineSamples, ManySamples, describe, describe_many, take_axes
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ class EngineMethod(Method):
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Prepare the run in the worker. Raise `Unsupported` if this version does not support it."""
         axes = principal_axes(scene)
-        samples = Samples(axes, grid, self.label)
+        samples = EngineSamples(axes, grid, self.label)
         run = self._run(describe(axes, grid), samples)
         try:
             run.prepare()

@@ -16,14 +16,14 @@ from conservative.methods.units import SI, find_units
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from ..engine import Axes, mass_model, principal_axes
+from ..engine import EngineAxes, mass_model, principal_axes
 from ..worker.client import EngineCrashed
 
 SHARED = ("free", "dt", "n_steps", "every", "steps")
 """Numbers that all bodies of a run have in common."""
 
 
-def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
+def describe(axes: EngineAxes, grid: Grid) -> dict[str, Any]:
     """Return a scene and a grid as the numbers of a `prepare` request, in SI units."""
     mass = mass_model(axes)
     assert mass is not None  # checked by `unsupported`
@@ -47,7 +47,7 @@ def describe(axes: Axes, grid: Grid) -> dict[str, Any]:
     }
 
 
-def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | None]) -> list[Axes] | None:
+def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | None]) -> list[EngineAxes] | None:
     """Return each body's initial state in principal axes; None if one is not supported, or not of order one in SI units."""
     scenes = [bodies.take(i) for i in range(len(bodies))]
     if not scenes or any(unsupported(scene) or find_units(scene, grid.dt) != SI for scene in scenes):
@@ -55,7 +55,7 @@ def take_axes(bodies: Batch, grid: Grid, unsupported: Callable[[Scene], str | No
     return [principal_axes(scene) for scene in scenes]
 
 
-def describe_many(axes: Sequence[Axes], grid: Grid) -> dict[str, Any]:
+def describe_many(axes: Sequence[EngineAxes], grid: Grid) -> dict[str, Any]:
     """Return the numbers of n scenes of one kind. Those named in `rows` have a row for each scene."""
     every = [describe(each, grid) for each in axes]
     shared = {name: value for name, value in every[0].items() if name in SHARED}
@@ -79,7 +79,7 @@ def _read(answer: Mapping[str, Any], shape: tuple[int, ...]) -> tuple[Array, Arr
 class ManySamples:
     """Converts the answer of an engine for n bodies into a block of samples in body axes."""
 
-    def __init__(self, axes: Sequence[Axes], grid: Grid) -> None:
+    def __init__(self, axes: Sequence[EngineAxes], grid: Grid) -> None:
         self._R_FB, self._shape = np.array([each.R_BF.T for each in axes])[:, None], (len(axes), grid.n_samples)
 
     def trajectory(self, answer: Mapping[str, Any]) -> Block:
@@ -91,10 +91,10 @@ class ManySamples:
         raise failure
 
 
-class Samples:
+class EngineSamples:
     """Converts the answer of an engine into a trajectory in body axes."""
 
-    def __init__(self, axes: Axes, grid: Grid, label: str) -> None:
+    def __init__(self, axes: EngineAxes, grid: Grid, label: str) -> None:
         self.axes, self.grid, self.label = axes, grid, label
 
     def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:

@@ -29,7 +29,7 @@ from conservative.potentials.turning import Turning, static_part
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from ..engine import Axes, principal_axes
+from ..engine import EngineAxes, principal_axes
 from .forms import Expression, is_zero, product
 
 Expressions = Sequence[Expression]
@@ -56,7 +56,7 @@ class FieldInAxes:
         Rates (3,) of the axes D, rad/s, in D. The first is 0. The field is constant in D.
     """
 
-    axes: Axes
+    axes: EngineAxes
     R_WD: Array
     acceleration: Acceleration
     parameters: list[float]
@@ -125,22 +125,24 @@ def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], E
     return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
 
 
-def _read_uniform(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_uniform(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
     return FieldInAxes(axes, R_WD, uniform, _turning(axes, potential.moment_B @ axes.R_BF))
 
 
-def _read_spring(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_spring(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
     if potential.rest_length == 0:
         moment = -potential.stiffness * np.linalg.norm(potential.anchor_W) * (potential.point_B @ axes.R_BF)
         return FieldInAxes(axes, R_WD, uniform, _turning(axes, moment))
     return _read_points(axes, R_WD, potential, (spring, potential.stiffness, potential.rest_length))
 
 
-def _read_attraction(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_attraction(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
     return _read_points(axes, R_WD, potential, (attraction, potential.strength, 1.0))
 
 
-def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[Acceleration, float, float]) -> FieldInAxes:
+def _read_points(
+    axes: EngineAxes, R_WD: Array, potential: PointPotential, law: tuple[Acceleration, float, float]
+) -> FieldInAxes:
     """Return the field of a force along the line between two points; `law` has expressions, strength and unit of length."""
     acceleration, strength, unit = law
     if not potential.point_B.any():
@@ -152,7 +154,7 @@ def _read_points(axes: Axes, R_WD: Array, potential: PointPotential, law: tuple[
     return FieldInAxes(axes, R_WD, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()])
 
 
-def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
+def _read_gradient(axes: EngineAxes, R_WD: Array, potential: Any) -> FieldInAxes:
     inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -161,7 +163,7 @@ def _read_gradient(axes: Axes, R_WD: Array, potential: Any) -> FieldInAxes:
     return FieldInAxes(axes, R_WD, gradient, [*(A / axes.J[:, None]).ravel().tolist(), *(B / axes.J).tolist()])
 
 
-READERS: dict[type[Potential], Callable[[Axes, Array, Any], FieldInAxes]] = {
+READERS: dict[type[Potential], Callable[[EngineAxes, Array, Any], FieldInAxes]] = {
     UniformGravity: _read_uniform,
     LinearSpring: _read_spring,
     PointAttraction: _read_attraction,
@@ -170,10 +172,10 @@ READERS: dict[type[Potential], Callable[[Axes, Array, Any], FieldInAxes]] = {
 """Functions that express a potential, by its type."""
 
 
-def order_axes(axes: Axes, third: int) -> Axes:
+def order_axes(axes: EngineAxes, third: int) -> EngineAxes:
     """Return principal axes in the order in which axis number `third` is the third."""
     turn = np.roll(np.eye(3), 2 - third, axis=1)
-    return Axes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
+    return EngineAxes(axes.scene, axes.R_BF @ turn, axes.J @ turn)
 
 
 def _drop_round_off(components: Array) -> Array:
@@ -181,6 +183,6 @@ def _drop_round_off(components: Array) -> Array:
     return np.where(np.abs(components) <= _ROUND_OFF * np.abs(components).max(), 0.0, components)
 
 
-def _turning(axes: Axes, moment: Array) -> list[float]:
+def _turning(axes: EngineAxes, moment: Array) -> list[float]:
     """Return the matrix (9) of J^-1 (g x m), row by row."""
     return (-hat(moment) / axes.J[:, None]).ravel().tolist()

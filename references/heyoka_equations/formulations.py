@@ -17,7 +17,7 @@ from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.potentials.turning import Turning
 from conservative.scene import Scene
 
-from ..engine import Axes, principal_axes, symmetric_axes
+from ..engine import EngineAxes, principal_axes, symmetric_axes
 from . import forms
 from .accelerations import express_field, order_axes
 
@@ -46,7 +46,7 @@ class Formulation:
         If R_WF is R_WD attitudes(states without rates), this function and R_WD; otherwise None and the identity.
     """
 
-    axes: Axes
+    axes: EngineAxes
     form: forms.Form
     parameters: list[float]
     start: Array
@@ -144,7 +144,7 @@ def _free_rates_and_angle(scene: Scene) -> Formulation:
     return Formulation(axes, form, parameters, np.append(axes.w0, 0.0), readout)
 
 
-def _axis_and_angle(axes: Axes, world: Array) -> Formulation:
+def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
     R0 = world @ axes.R_WF0
     u0, spin = _slow_rates(axes)
     u0, n0, k = world @ u0, R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
@@ -160,31 +160,31 @@ def _axis_and_angle(axes: Axes, world: Array) -> Formulation:
     return Formulation(axes, form, parameters, np.array([*n0, *u0[:2], p0]), readout)
 
 
-def _gyroscopic(axes: Axes) -> list[float]:
+def _gyroscopic(axes: EngineAxes) -> list[float]:
     J1, J2, J3 = axes.J.tolist()
     return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
 
 
-def _symmetric(scene: Scene) -> Axes:
+def _symmetric(scene: Scene) -> EngineAxes:
     axes = symmetric_axes(scene)
     assert axes is not None  # checked by `Heyoka.unsupported`
     return axes
 
 
-def _slow_rates(axes: Axes) -> tuple[Array, float]:
+def _slow_rates(axes: EngineAxes) -> tuple[Array, float]:
     """Return the rates l/J1 of the slow frame, world axes, and the spin of the body in it."""
     J1, _, J3 = axes.J.tolist()
     return axes.R_WF0 @ (axes.J * axes.w0) / J1, (1 - J3 / J1) * float(axes.w0[2])
 
 
-def _body_rates(axes: Axes, R_WF: Array, u12: Array, u3: float) -> Array:
+def _body_rates(axes: EngineAxes, R_WF: Array, u12: Array, u3: float) -> Array:
     """Return body rates (n, 3) from u = l/J1, whose third component is constant."""
     u = np.empty((len(u12), 1, 3))
     u[:, 0, :2], u[:, 0, 2] = u12, u3
     return (u @ R_WF)[:, 0] * (axes.J[0] / axes.J)
 
 
-def _heights(axes: Axes) -> tuple[float, float]:
+def _heights(axes: EngineAxes) -> tuple[float, float]:
     """Return the lowest and highest n_z of a symmetric top: the roots around its initial value of the cubic J1^2 n_z'^2."""
     (J1, _, J3), M = axes.J.tolist(), float(axes.moment[2])
     n = float(axes.R_WF0[2, 2])
@@ -203,7 +203,7 @@ def _heights(axes: Axes) -> tuple[float, float]:
     return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
 
 
-def _order_axes(axes: Axes) -> Axes:
+def _order_axes(axes: EngineAxes) -> EngineAxes:
     """Return principal axes in the order in which a free body's momentum circulates about the third axis, L3 > 0.
 
     The third is the axis of the largest moment if l^2 > 2 T J_middle, of the smallest otherwise.
@@ -212,7 +212,7 @@ def _order_axes(axes: Axes) -> Axes:
     order = np.argsort(axes.J)
     third = order[2] if L0 @ axes.w0 * axes.J[order[1]] < L0 @ L0 else order[0]
     ordered = order_axes(axes, int(third))
-    return Axes(axes.scene, ordered.R_BF @ _DOWN, ordered.J) if L0[third] < 0 else ordered
+    return EngineAxes(axes.scene, ordered.R_BF @ _DOWN, ordered.J) if L0[third] < 0 else ordered
 
 
 def _least(n: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from .model import Block, Document, Facts, Figure, Items, Paragraph, Role, Section, Table
+from .model import Block, Document, Emphasis, Facts, Figure, Items, Paragraph, Section, Table
 
 Draw = Callable[[Figure], str]
 """Draws the picture of a figure into a file and returns the name of the file."""
@@ -27,7 +27,7 @@ def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
                     yield f"{'#' * level} {block.title}"
                     yield from content
             case Paragraph():
-                yield f"**{block.text}**" if block.role is Role.LEAD else block.text
+                yield f"**{block.text}**" if block.role is Emphasis.LEAD else block.text
             case Items():
                 yield "\n".join(f"- {f'**{item.subject}**: ' * bool(item.subject)}{item.text}" for item in block.items)
             case Facts():

@@ -66,7 +66,7 @@ class Table:
     style: Style = Style.SORTED
 
 
-class Role(StrEnum):
+class Emphasis(StrEnum):
     """How a paragraph is emphasized."""
 
     BODY = ""
@@ -79,7 +79,7 @@ class Paragraph:
     """A paragraph."""
 
     text: str
-    role: Role = Role.BODY
+    role: Emphasis = Emphasis.BODY
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import click
 
-from .model import Block, Document, Facts, Items, Paragraph, Role, Section, Table
+from .model import Block, Document, Emphasis, Facts, Items, Paragraph, Section, Table
 
 
 def show(document: Document) -> None:
@@ -27,7 +27,7 @@ def print_blocks(blocks: Iterable[Block]) -> None:
                 print_blocks(block.blocks)
                 click.echo()
             case Paragraph():
-                click.secho(_wrapped(block.text), bold=block.role is Role.LEAD)
+                click.secho(_wrapped(block.text), bold=block.role is Emphasis.LEAD)
             case Items():
                 for item in block.items:
                     click.echo(f"  {f'{item.subject}: ' * bool(item.subject)}{item.text}")

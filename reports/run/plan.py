@@ -11,7 +11,7 @@ from conservative.check import positive_number
 from conservative.method import Method
 from conservative.scene import Scene
 
-from .provenance import Lock, locks_of
+from .provenance import LockedEngine, locks_of
 
 MAIN_TIME_LIMIT = 0.15
 """Time budget of a run, s, in a default report, which then takes a minute. A full report has that of `Study`."""
@@ -45,7 +45,7 @@ class Plan:
     seed: int = 0
 
     @property
-    def locks(self) -> tuple[Lock, ...]:
+    def locks(self) -> tuple[LockedEngine, ...]:
         """The locks of the environments that engines run in."""
         return locks_of((*self.methods, *self.engines))
 

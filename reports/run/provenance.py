@@ -20,7 +20,7 @@ COMPARED = ("conservative-rotation", "mujoco", "pin", "heyoka", "scipy", "numpy"
 
 
 @dataclass(frozen=True)
-class Lock:
+class LockedEngine:
     """Contents of an engine's environment: `name`, as `exudyn==1.13.6`, `python`, and all `packages`, as `name==version`."""
 
     name: str
@@ -28,10 +28,10 @@ class Lock:
     packages: tuple[str, ...]
 
 
-def locks_of(methods: Iterable[Method]) -> tuple[Lock, ...]:
+def locks_of(methods: Iterable[Method]) -> tuple[LockedEngine, ...]:
     """Return the locks of the environments that some methods run in, each once, by name."""
     found = {method.environment.folder: method.environment for method in methods if isinstance(method, EngineMethod)}
-    locks = (Lock(f"{each.engine}=={each.version}", each.python, each.packages) for each in found.values())
+    locks = (LockedEngine(f"{each.engine}=={each.version}", each.python, each.packages) for each in found.values())
     return tuple(sorted(locks, key=lambda lock: lock.name))
 
 
@@ -50,7 +50,7 @@ class Provenance:
     commit: str
     date: str
     resumed: tuple[str, ...] = ()
-    environments: tuple[Lock, ...] = ()
+    environments: tuple[LockedEngine, ...] = ()
 
     @property
     def compared(self) -> dict[str, str]:

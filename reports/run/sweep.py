@@ -123,7 +123,7 @@ def plan(
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class SweepResult:
     """The ensemble of a sweep, the wall time of the run, s, and its last progress, None if there was nothing to do."""
 
     ensemble: Ensemble
@@ -131,7 +131,7 @@ class Result:
     last: ProgressOfMany | None
 
 
-def run_sweep(sweep: Sweep, step: Step) -> Result:
+def run_sweep(sweep: Sweep, step: Step) -> SweepResult:
     """Return the result of a sweep. `step` is called with the finished share and the rate in words.
 
     Raises
@@ -158,7 +158,7 @@ def run_sweep(sweep: Sweep, step: Step) -> Result:
         raise
     except BadInput as error:
         raise _in_options(error) from None
-    return Result(found, perf_counter() - begin, last)
+    return SweepResult(found, perf_counter() - begin, last)
 
 
 def _in_options(error: BadInput) -> BadInput:
@@ -188,7 +188,7 @@ def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
     return f"{rate_text(progress.rate)} bodies/s{steps}"
 
 
-def summarize(sweep: Sweep, result: Result) -> Summary:
+def summarize(sweep: Sweep, result: SweepResult) -> Summary:
     """Return outcomes, drifts, spread of attitudes, and rates."""
     found, last, choice = result.ensemble, result.last, result.ensemble.choice
     rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0

@@ -16,7 +16,7 @@ from conservative.outcome import OutcomeKind
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
 from ..document.cells import DASH, number, tolerance
-from ..document.model import Cell, Figure, Items, Layout, Paragraph, Role, Section, Style, Table, filled
+from ..document.model import Cell, Emphasis, Figure, Items, Layout, Paragraph, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, MethodClass, class_of
 from .random_bodies import grade, ratio_text
 
@@ -55,7 +55,7 @@ def section(table: pd.DataFrame) -> Section:
         as_table(compared),
         cost_table(rows, reached),
         more,
-        Paragraph(TERMS, Role.NOTE),
+        Paragraph(TERMS, Emphasis.NOTE),
     )
     return Section("Many bodies", blocks, "many-bodies")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..document.model import Facts, Paragraph, Section, filled
-from ..run.provenance import Lock, Provenance
+from ..run.provenance import LockedEngine, Provenance
 
 
 def section(source: Provenance) -> Section:
@@ -24,7 +24,7 @@ def section(source: Provenance) -> Section:
     return Section("How this was made", filled(Facts(facts), others, locks), "made")
 
 
-def lock_sections(locks: Sequence[Lock]) -> list[Section]:
+def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:
     """Return the packages of each environment, folded."""
     return [
         Section(

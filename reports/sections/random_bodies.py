@@ -19,7 +19,7 @@ from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, factor, finite_or_none, number, tolerance
-from ..document.model import Cell, Figure, Grade, Items, Layout, Paragraph, Role, Row, Section, Style, Table, filled
+from ..document.model import Cell, Emphasis, Figure, Grade, Items, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, MethodClass, display_name, of_classes, without_outcome
 from ..rows.points import first_names, joined, points
 from .summary import ERRORS, HEADER, MIDDLE, Summary, keeps, microseconds
@@ -91,7 +91,7 @@ def section(found: Sequence[RandomRatios], bodies: int, seed: int) -> Section:
         figure,
         as_table(found),
         by_engine(found),
-        Paragraph(TERMS, Role.NOTE),
+        Paragraph(TERMS, Emphasis.NOTE),
     )
     return Section("Random bodies: what a statement about speed is about", blocks, "random", "Random bodies")
 

@@ -11,7 +11,7 @@ from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..document.model import Block, Document, Items, Paragraph, Role, Section, Table
+from ..document.model import Block, Document, Emphasis, Items, Paragraph, Section, Table
 from ..rows.names import method_text, setting_text
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
@@ -26,7 +26,7 @@ def build(recommendation: Recommendation) -> Document:
     conditions = recommendation.conditions
     title = f"{conditions.scene.name}: attitude error of at most {conditions.error:g} rad over {conditions.duration:g} s"
     blocks: list[Block] = [*tables(recommendation), Section("Basis of the numbers", [Items.of(notes(recommendation))])]
-    question = Paragraph(f"{title}\n", Role.LEAD)
+    question = Paragraph(f"{title}\n", Emphasis.LEAD)
     return Document("conservative recommend", title, blocks, brief=[question, *blocks], data=_data(recommendation))
 
 

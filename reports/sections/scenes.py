@@ -16,7 +16,7 @@ from conservative.scene import Scene
 from ..charts import figures, spheres, vega_embed
 from ..charts.style import colours, families_of
 from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
-from ..document.model import Block, Figure, Layout, LegendEntry, Paragraph, Role, Row, Section, Style, Table, filled
+from ..document.model import Block, Emphasis, Figure, Layout, LegendEntry, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
 from ..rows.names import of_measure, of_study, outcomes, without_solutions
 from ..rows.points import front, under
@@ -68,7 +68,7 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     return Section(
         name,
         filled(
-            Paragraph(summary.sentence, Role.LEAD),
+            Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
             Section("Work against precision", work),
             Section("Drift over time", drifts),

@@ -12,7 +12,7 @@ from conservative.benchmarks.versions.engine import EngineComparison, EngineLine
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.cells import DASH, number, outcome_cell, outcome_text
-from ..document.model import Cell, Check, Document, Facts, Grade, Items, Paragraph, Role, Row, Section, Style, Table, filled
+from ..document.model import Cell, Check, Document, Emphasis, Facts, Grade, Items, Paragraph, Row, Section, Style, Table, filled
 
 NOTHING_CHANGED = "No conclusion changed."
 NO_END = "no setting reaches the end of a run"
@@ -59,7 +59,9 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
     verdict = []
     if gated:
         was, now = names[-2:]
-        verdict = filled(Paragraph(f"{now} against {was}: {'FAILED' if failures else 'passed'}", Role.LEAD), Items.of(failures))
+        verdict = filled(
+            Paragraph(f"{now} against {was}: {'FAILED' if failures else 'passed'}", Emphasis.LEAD), Items.of(failures)
+        )
     versions = [(each.version, each.python, ", ".join(each.packages)) for each in environments]
     data = {
         "made": dict(made),

@@ -12,7 +12,7 @@ from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.studies.each_step import ERROR
 
 from ..document.cells import factor, tolerance
-from ..document.model import Item, Items, Paragraph, Role, Section, filled
+from ..document.model import Emphasis, Item, Items, Paragraph, Section, filled
 from ..rows.names import OF_ENGINES, MethodClass, of_classes
 from ..rows.points import DECADES
 from . import random_bodies
@@ -44,11 +44,11 @@ def section(measured: Measured, of_scenes: dict[str, Summary]) -> Section:
     quick = " This is a quick run: fewer steps, fewer rounds of timing." if measured.plan.quick else ""
     beaten = Section("Where an engine beats us", [Paragraph(_BEATEN), Items(list(_statements(measured)))])
     blocks = filled(
-        Paragraph(summary.sentence, Role.LEAD),
+        Paragraph(summary.sentence, Emphasis.LEAD),
         families_figure(summary, "first", about),
         replace(summary.classes, caption=f"{about}: µs of computing per simulated second, by class of methods"),
-        Paragraph(f"{summaries.TERMS} {summaries.SAMPLE_TERMS}", Role.NOTE),
-        Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{quick}", Role.NOTE),
+        Paragraph(f"{summaries.TERMS} {summaries.SAMPLE_TERMS}", Emphasis.NOTE),
+        Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{quick}", Emphasis.NOTE),
         beaten,
     )
     return Section(f"Verdict: {about}", blocks, "verdict", "Verdict")

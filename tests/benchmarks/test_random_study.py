@@ -10,7 +10,7 @@ from conservative.attitude import angle_between
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import Case
-from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, Point
+from conservative.benchmarks.studies.random import DECADES, DURATIONS, SAMPLES, TimedSetting
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
@@ -33,7 +33,7 @@ def rows():
 
 def made_up(name, error, spent):
     """A point of a line, with no run behind it."""
-    return Point(Case("random", SCENE, method(name), Grid(0.1, 12)), None, error, spent)
+    return TimedSetting(Case("random", SCENE, method(name), Grid(0.1, 12)), None, error, spent)
 
 
 def line_of(value, quick=False):

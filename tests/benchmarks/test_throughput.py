@@ -120,10 +120,10 @@ def test_ways_give_the_same_numbers():
 
 
 def test_a_setting_that_would_take_too_long_says_so():
-    point = throughput.Point(Way(Ours()), None, {}, spent=0.01, prepare=0.02)
+    point = throughput.BatchSetting(Way(Ours()), None, {}, spent=0.01, prepare=0.02)
     assert throughput.too_long(point, 10, 0.2) is None
     assert throughput.too_long(point, 30, 0.2).reason.startswith("a call would take 0.3 s")
-    assert "preparing" in throughput.too_long(throughput.Point(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
+    assert "preparing" in throughput.too_long(throughput.BatchSetting(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
     assert throughput.too_long(point, 1, 1e-9) is None  # one body is always tried
 
 
@@ -135,7 +135,7 @@ def test_an_exact_setting_stands_for_its_family_in_the_coarse_study():
 
 def test_a_lucky_setting_decides_nothing():
     errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
-    line = [throughput.Point(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
+    line = [throughput.BatchSetting(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
     assert throughput.decide(line) == line[1:]
 
 

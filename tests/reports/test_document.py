@@ -15,6 +15,7 @@ from conservative.reports.document.model import (
     Cell,
     Check,
     Document,
+    Emphasis,
     Facts,
     Figure,
     Grade,
@@ -23,7 +24,6 @@ from conservative.reports.document.model import (
     Items,
     LegendEntry,
     Paragraph,
-    Role,
     Section,
     Style,
     Table,
@@ -49,7 +49,7 @@ DOCUMENT = Document(
         Section(
             "First",
             [
-                Paragraph("The verdict: 1e-3 rad.", Role.LEAD),
+                Paragraph("The verdict: 1e-3 rad.", Emphasis.LEAD),
                 PICTURE,
                 Items([Item("is slow", "engine", marked=True)]),
                 Section("Nothing for Markdown", [Figure("page_only", "On the page", panels=[])]),
