@@ -40,7 +40,7 @@ GRID = Table(
     ["case", "m"], [["needle", Cell("both", parts=(Cell("✓ 1", Grade.GOOD), Cell("✗ 2", Grade.BAD)))]], "Grid", Style.GRID
 )
 CARDS = Table(["class", "µs"], [[Cell("ours", note="a, b"), Cell("12", note="a")]], "Cards", Style.CARDS)
-SORTED = Table(["method", "ratio"], [["<b>", Cell("1.100", Grade.BAD, interval=Interval(1.1, 1.0, 1.2, 1.05))]], "Sorted")
+SORTED = Table(["method", "ratio"], [["<b>|", Cell("1.100", Grade.BAD, interval=Interval(1.1, 1.0, 1.2, 1.05))]], "Sorted")
 FACTS = Facts([("command", "`conservative`")])
 DOCUMENT = Document(
     "conservative test",
@@ -83,7 +83,7 @@ def test_markdown_has_every_block_and_the_picture_in_a_file():
         "| class | µs |\n| --- | ---: |\n| ours (a, b) | 12 (a) |",
         "### Folded",
         "Sorted",
-        "| method | ratio |\n| --- | ---: |\n| <b> | 1.100 |",
+        "| method | ratio |\n| --- | ---: |\n| <b>\\| | 1.100 |",
         "|  |  |\n| --- | ---: |\n| command | `conservative` |",
     ]
     assert text == "\n\n".join(parts) + "\n"

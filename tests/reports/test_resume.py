@@ -1,4 +1,4 @@
-"""A report that is interrupted keeps what is finished, and --resume goes on with it: tried with real signals."""
+"""What an unfinished report keeps, what may be resumed, and interruptions of a real process."""
 
 import json
 import re
@@ -7,20 +7,162 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
+from conservative import BadInput, NotConverged
+from conservative.benchmarks.measures.measurement import Samples
+from conservative.method import Role
+from conservative.reports import report
+from conservative.reports.cli.main import main
 from conservative.reports.run import checkpoint
 from conservative.reports.run.measure import measure
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
 
 from ..environments import programs
+from .rows import row
 
-pytestmark = pytest.mark.slow
-
+OUTCOME = NotConverged(3, 0.02, 0.5, "why").outcome
 SMALL = ["report", "--quick", "--scenes", "brick_flip", "--methods", "reduced:order=4,moser_veselov:order=2"]
+
+
+@pytest.fixture
+def unfinished(tmp_path, monkeypatch):
+    """A folder with the file of a report that has finished one study."""
+    monkeypatch.chdir(tmp_path)
+    made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
+    source = provenance(SMALL)
+    kept = checkpoint.begin(made, Path("report"), source, resume=False)
+    line = {
+        "study": "paper",
+        "scene": "brick_flip",
+        "method": "reduced",
+        "label": "reduced",
+        "series": "reduced",
+        "role": Role.OURS,
+        "dt": 0.1,
+    }
+    lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
+    kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
+    return tmp_path
+
+
+def test_floats_come_back_as_they_are(unfinished):
+    _, found = checkpoint.read(unfinished / "report.partial.json")
+    assert found["paper"].rows[0].dt == 0.1
+    assert found["paper"].rows[0].value != found["paper"].rows[0].value
+    assert found["paper"].rows[0].outcome == OUTCOME
+    assert found["paper"].samples[0].t[0] == 0.1 + 0.2
+    assert np.isnan(found["paper"].samples[0].value[0])
+
+
+@pytest.mark.parametrize(
+    ("changed", "parts"),
+    [
+        (SMALL[:1] + SMALL[2:], ["--quick True, now False"]),
+        ([*SMALL[:3], "turned_brick", *SMALL[4:]], ["scenes: brick_flip (now without)", "turned_brick missing (now with)"]),
+        ([*SMALL[:5], "reduced:order=4"], ["methods: moser_veselov:order=2 (now without)"]),
+        ([*SMALL, "--time-limit", "7"], ["--time-limit ", "now 7"]),
+        ([*SMALL, "--bodies", "2", "--seed", "5"], ["--bodies ", "--seed 0, now 5"]),
+        ([*SMALL, "--skip-missing"], ["--skip-missing False, now True"]),
+        ([*SMALL[:3], "brick_flip:disturbance=1e-6", *SMALL[4:]], ["scenes: brick_flip"]),
+    ],
+)
+def test_what_differs_cannot_be_put_together(changed, parts, unfinished):
+    done = CliRunner().invoke(main, [*changed, "--resume"])
+    assert done.exit_code == 2
+    assert done.stderr.count("\n") == 1
+    for part in [*parts, "resume: got 'report.partial.json'", f"it was `conservative {' '.join(SMALL)}`", "no --resume"]:
+        assert part in done.stderr
+    assert [path.name for path in unfinished.iterdir()] == ["report.partial.json"]
+
+
+@pytest.mark.parametrize(("key", "part"), [("source", "source abc, now"), ("versions", "versions: numpy 1.0, now 2")])
+def test_neither_can_other_versions_or_source(key, part, unfinished):
+    path = unfinished / "report.partial.json"
+    content = json.loads(path.read_text())
+    content["terms"][key] = "abc" if key == "source" else {**content["terms"][key], "numpy": "1.0"}
+    path.write_text(json.dumps(content))
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert done.exit_code == 2
+    assert part in done.stderr
+
+
+def test_there_has_to_be_something_to_resume(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert done.exit_code == 2
+    assert done.stderr.startswith("Error: resume: got no 'report.partial.json'; expected ")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["mine", "[]", ""])
+@pytest.mark.parametrize("resume", [[], ["--resume"]])
+def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "report.partial.json").write_text(content)
+    done = CliRunner().invoke(main, [*SMALL, *resume])
+    assert done.exit_code == 2
+    assert "out: got 'report.partial.json'" in done.stderr
+    assert (tmp_path / "report.partial.json").read_text() == content
+
+
+@pytest.mark.parametrize(
+    "content", ['{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}', '{"format": 2, "comm']
+)
+def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kept = tmp_path / "report.partial.json"
+    kept.write_text(content)
+    done = CliRunner().invoke(main, [*SMALL, "--resume"])
+    assert (done.exit_code, kept.read_text()) == (2, content)
+    assert "resume: got 'report.partial.json', which is damaged" in done.stderr
+    again = CliRunner().invoke(main, [*SMALL[:-1], "moser_veselov:order=2"])
+    assert again.exit_code == 0, again.output
+    assert not kept.exists()
+
+
+def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finished(unfinished):
+    before = (unfinished / "report.partial.json").read_text()
+
+    def stop(share, what):
+        raise KeyboardInterrupt
+
+    made = plan_report(["brick_flip"], ["reduced:order=4"], quick=True)
+    with pytest.raises(KeyboardInterrupt):
+        report.write(made, unfinished / "report", stop)
+    assert (unfinished / "report.partial.json").read_text() == before
+
+
+def test_an_error_keeps_what_is_finished_too(tmp_path):
+    def fail(share, what):
+        if "convergence" in what:
+            raise BadInput("dt", "0", "above 0")
+
+    made = plan_report(["brick_flip"], ["moser_veselov:order=2"], quick=True)
+    with pytest.raises(BadInput) as caught:
+        report.write(made, tmp_path / "report", fail)
+    assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
+    assert list(json.loads((tmp_path / "report.partial.json").read_text())["pieces"]) == ["paper"]
+
+
+@pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])
+def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    found = (here / checkpoint.path_for(Path(out))).resolve()
+    folder = (here / out).resolve()
+    assert found == folder.parent / f"{folder.name}.partial.json"
+
+
+# Interruptions of a real process.
+
 TIMES = ("s", "s/s")
 HANG = 600
 """Time, s, after which a process hangs for sure."""
@@ -71,6 +213,7 @@ def resumed(tmp_path_factory):
     return folder, (code, out, err), left, earlier, content, again, (done.returncode, *said)
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     _, (code, out, err), left, earlier, content, again, _ = resumed
     assert code == 130
@@ -86,6 +229,7 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
     assert len(earlier) == 3
 
 
+@pytest.mark.slow
 def test_resume_does_the_rest_and_tidies_up(resumed):
     folder, *_, (code, out, err) = resumed
     assert code == 0, err
@@ -96,6 +240,7 @@ def test_resume_does_the_rest_and_tidies_up(resumed):
     assert (folder / "report" / "mine.txt").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(resumed, tmp_path):
     made = plan_report(["brick_flip"], ["reduced:order=4", "moser_veselov:order=2"], quick=True)
     kept = checkpoint.begin(made, tmp_path / "report", provenance(SMALL), resume=False)
@@ -109,6 +254,7 @@ def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(r
     pd.testing.assert_frame_equal(found.loc[timed, same], whole.loc[timed, same], check_exact=True)
 
 
+@pytest.mark.slow
 def test_what_was_finished_is_not_measured_again(resumed):
     folder, content = resumed[0], resumed[4]
     rows = json.loads((folder / "report" / "measurements.json").read_text())["rows"]
@@ -118,6 +264,7 @@ def test_what_was_finished_is_not_measured_again(resumed):
     assert times == pytest.approx([row["value"] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
 
 
+@pytest.mark.slow
 def test_a_resumed_report_says_so(resumed):
     folder, content = resumed[0], resumed[4]
     by = content["pieces"]["paper"]["by"]
@@ -128,6 +275,7 @@ def test_a_resumed_report_says_so(resumed):
     assert made["command"].endswith("--resume")
 
 
+@pytest.mark.slow
 def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
     def at_work():
         return any(path.name.startswith(".report-") for path in tmp_path.iterdir())

@@ -13,8 +13,8 @@ from conservative.errors import Diverged
 from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.reports.document import cells, markdown
 from conservative.reports.document.cells import grade_drift
-from conservative.reports.document.model import Cell, Grade, Table
-from conservative.reports.rows import lines, names
+from conservative.reports.document.model import Cell, Grade
+from conservative.reports.rows import lines
 from conservative.reports.rows.points import points
 from conservative.reports.run import single_run
 from conservative.reports.sections import failures, hard_cases, recommendation, scene_contests, scenes
@@ -38,22 +38,10 @@ def cannot(reason, kind="unsupported"):
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (1.0, "1"), (0.0123, "0.012"), (1.234e-5, "1.2e-5"), (-2e6, "-2.0e6"), (math.nan, "–")],
+    [(0.0, "0"), (1.0, "1"), (0.0123, "0.012"), (1.234e-5, "1.2e-5"), (-2e6, "-2.0e6"), (-0.25, "-0.25"), (math.nan, "–")],
 )
 def test_number(value, text):
     assert cells.number(value) == text
-
-
-@pytest.mark.parametrize(
-    ("parts", "text"),
-    [
-        (("mujoco", "4.0.0", "RK4"), "mujoco 4.0.0 RK4"),
-        (("gauss", "", "stages=2"), "gauss stages=2"),
-        (("reduced", "", ""), "reduced"),
-    ],
-)
-def test_what_a_method_is_called(parts, text):
-    assert names.display_name(*parts) == text
 
 
 def test_rows_have_the_names_of_their_method_and_of_their_line():
@@ -162,15 +150,6 @@ def test_what_a_method_cannot_do_is_told_once_with_its_first_reason():
     ]
 
 
-def test_markdown_escapes_what_would_end_a_cell():
-    assert markdown.table(Table(["a", "b"], [["|w|", "1"]])) == "| a | b |\n| --- | ---: |\n| \\|w\\| | 1 |"
-
-
-@pytest.mark.parametrize("value", [0.25, 12.0, 0.01, 3.1e-7, 5e4])
-def test_a_number_below_nothing_is_shown_as_its_size_is(value):
-    assert cells.number(-value, 3) == "-" + cells.number(value, 3)
-
-
 def test_contests_are_in_microseconds():
     lines = [*point("gauss", "ours", 1e-3, 2e-6), *point("scipy", "engine", 1e-3, 8e-6), *point("lame", "ours", 1e-3, 1e-6)]
     table = scene_contests.as_table(points(frame(lines)), 0.5)
@@ -225,14 +204,6 @@ def test_the_largest_drift_is_shown_and_not_the_last(bumped):
     assert summary["drift"]["energy"] == pytest.approx(2.001e-3, rel=1e-6)
     assert "2.00e-03 (relative)" in markdown.render(single.build([summary]))
     assert (summary["last"]["t"], summary["last"]["energy"]) == (bumped.t[-1], bumped.energy[-1])
-
-
-def test_columns_of_samples_are_what_they_are_called(bumped):
-    found = bumped.to_pandas()
-    np.testing.assert_array_equal(found["energy"], bumped.energy)
-    np.testing.assert_array_equal(found[[f"momentum_W_{axis}" for axis in "123"]], bumped.momentum_W)
-    np.testing.assert_array_equal(found[[f"w_WB_B_{axis}" for axis in "123"]], bumped.w_WB_B)
-    np.testing.assert_array_equal(found["R_WB_13"], bumped.R_WB[:, 0, 2])
 
 
 def test_methods_are_ranked_by_what_they_keep():
