@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +13,6 @@ from numpy.typing import ArrayLike
 from conservative.attitude import Array
 from conservative.check import finite_array
 from conservative.errors import BadInput
-
-from .line import fit_line
 
 MIN_POINTS = 3
 SHRINKING = 1 / 3
@@ -163,3 +162,25 @@ def _without_preasymptotic(x: Array, y: Array, used: list[int]) -> list[int]:
 def _pair(x: Array, y: Array, pair: Sequence[int]) -> float:
     i, j = pair
     return float((y[i] - y[j]) / (x[i] - x[j]))
+
+
+class FittedLine(NamedTuple):
+    """A fitted line: slope, its standard error, and the scatter of the points in the unit of y."""
+
+    slope: float
+    stderr: float
+    scatter: float
+
+
+def fit_line(x: Array, y: Array) -> FittedLine:
+    """Return the line through three points or more, x (n,) and y (n,).
+
+    The scatter is computed from the residuals, because the standard error of `linregress`, from 1 - r^2, loses its digits if
+    the points lie on a line.
+    """
+    from scipy.stats import linregress  # here, as importing it takes as long as everything else of a command
+
+    found = linregress(x, y)
+    residuals = (y - y.mean()) - found.slope * (x - x.mean())
+    scatter = float(np.sqrt(np.sum(residuals**2) / (len(x) - 2)))
+    return FittedLine(float(found.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)

@@ -12,17 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from conservative.attitude import Array
 from conservative.grid import Grid, grid_for
 from conservative.invariants import find_energy
 from conservative.outcome import OK, Outcome
 from conservative.references.worker.client import time_limit
+from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures import errors
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved
-from ..measures.turns_over import count_turns_over
 from .case import Case, Failure, Success
 from .engine_selection import is_as_installed
 from .selection import Missing
@@ -36,6 +37,8 @@ AS_INSTALLED = "as installed"
 FIRST_LIMIT = 180.0
 """Time, s, that the first run of a setting may take: importing and compiling an engine can take a minute."""
 TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
+FAR_SIDE = 0.5
+"""Fraction of the initial momentum along the spin axis that the reversed momentum has to reach for a flip."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -106,3 +109,23 @@ def direction(value: Value, trajectory: Trajectory) -> str:
     if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
         return ""
     return "gained" if trajectory.drift(energy)[-1] > 0 else "lost"
+
+
+def count_turns_over(trajectory: Trajectory) -> int:
+    """Return how often a body turned over.
+
+    That is how often the component of its momentum along one principal axis changed sides: the axis that has most of it at the
+    start, about which a body of three different moments turns over where that is the middle one. A side counts from `FAR_SIDE`
+    of the component at the start on, so that a wobble across zero does not.
+    """
+    along = momentum_along_spin(trajectory.scene, trajectory.w_WB_B)
+    sides = np.sign(along[np.abs(along) >= FAR_SIDE * abs(along[0])])
+    return int(np.count_nonzero(np.diff(sides)))
+
+
+def momentum_along_spin(scene: Scene, w_WB_B: Array) -> Array:
+    """Return the momentum (n,), kg m^2/s, along the principal axis that has most at the start, for rates (n, 3), rad/s."""
+    along = scene.body.momentum(w_WB_B) @ scene.body.R_BP
+    start = scene.body.momentum(scene.w_WB_B0) @ scene.body.R_BP
+    found: Array = along[:, int(np.argmax(np.abs(start)))]
+    return found

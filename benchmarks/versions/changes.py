@@ -13,7 +13,7 @@ from enum import Enum
 
 from conservative.outcome import Outcome
 
-from ..measures.drift_class import DriftClass, classify
+from ..measures.errors import DriftClass, classify
 from .engine import EngineComparison, Fit, Observation, Spread, StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0

@@ -35,7 +35,7 @@ SVG_MARK = "<!-- Written by conservative -->"
     required=True,
     metavar="WHAT=HOW,...",
     shell_complete=completion.spreads,
-    help="Standard deviations: attitude=5deg or 0.1 (rad); rate=5deg/s, 0.1 (rad/s) or 10%; inertia=1%; potential.weight=2%. "
+    help="Standard deviations: attitude=5deg or 0.1rad; rate=5deg/s, 0.1rad/s or 10%; inertia=1%; potential.weight=2%. "
     "attitude=any and rate=any: uniformly distributed attitudes and directions.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help="Seed of the random numbers.")

@@ -6,8 +6,8 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from conservative.benchmarks.measures.drift_class import CONSERVED as CONSERVED
-from conservative.benchmarks.measures.drift_class import SMALL as SMALL
+from conservative.benchmarks.measures.errors import CONSERVED as CONSERVED
+from conservative.benchmarks.measures.errors import SMALL as SMALL
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.model import Cell as Cell

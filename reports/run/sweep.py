@@ -28,6 +28,8 @@ from conservative.scene import Scene
 KINDS = ("attitude", "rate", "inertia")
 FIELD = "potential."
 _SPREAD = "what varies, and how, such as attitude=5deg, rate=2%, inertia=1% or potential.weight=2%"
+_UNITS = {"attitude": "attitude=5deg or attitude=0.1rad", "rate": "rate=5deg/s, rate=0.1rad/s or rate=10%"}
+"""Quantities whose unit must be given: 5 could be degrees or radians."""
 MOST_TIMES = 6
 """Largest number of times in the summary of the spread of attitudes."""
 MOST_FAILURES = 10
@@ -65,7 +67,7 @@ def read_spread(items: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     BadInput
-        A text is not of that form, or a quantity is named twice.
+        A text is not of that form, has no unit, or a quantity is named twice.
     """
     found: dict[str, str] = {}
     for item in items:
@@ -74,6 +76,8 @@ def read_spread(items: Iterable[str]) -> dict[str, str]:
             raise BadInput("spread", repr(item), _SPREAD)
         if name not in KINDS and not name.startswith(FIELD):
             raise BadInput("spread", repr(name), f"{nearest(name, KINDS)}, or {FIELD} and the name of a number of the field")
+        if name in _UNITS and value[-1:] in {*"0123456789."}:
+            raise BadInput("spread", repr(item), f"a number with its unit, such as {_UNITS[name]}")
         if name in found:
             raise BadInput("spread", f"{item!r} after {name}={found[name]}", "each quantity once")
         found[name] = value

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.contest import cheapest, costs
-from conservative.benchmarks.measures.drift_class import CONSERVED, SMALL
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.studies.each_step import ERROR
 from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.outcome import OutcomeKind

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from conservative.benchmarks.measures.drift_class import SMALL, DriftClass, classify
+from conservative.benchmarks.measures.errors import SMALL, DriftClass, classify
 from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
 from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Fit, Observation, Spread, ratio
 from conservative.outcome import Outcome, OutcomeKind

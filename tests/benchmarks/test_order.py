@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from conservative.benchmarks.measures.convergence_order import SHRINKING, observed_order
-from conservative.benchmarks.measures.line import fit_line
+from conservative.benchmarks.measures.convergence_order import SHRINKING, fit_line, observed_order
 from conservative.errors import BadInput
 
 STEPS = 0.1 / 2.0 ** np.arange(9)
