@@ -1,8 +1,9 @@
-"""Files that are written as a whole or not at all.
+"""Files that are written completely or not at all.
 
-A file is written under a temporary name next to its place, and renamed once all of it is on the disk. A full disk, an exception
-or a kill leaves the previous file. The process that makes a temporary file holds a lock on it, which ends with the process. A
-temporary file without a lock is left over from a kill, and is removed when the same place is written next.
+A file is written under a temporary name next to its place, and renamed once all of it is on the disk. After a full disk, an
+exception or a kill, the previous file is unchanged. The process that creates a temporary file holds a lock on it, which ends
+with the process. A temporary file without a lock is a leftover of a killed process. It is removed when the same file is written
+again.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from .errors import NotWritten
 
 try:
     fcntl: Any = import_module("fcntl")
-except ImportError:  # not POSIX: no locks, and nothing is known to be left over
+except ImportError:  # not POSIX: no locks, so leftovers are unknown
     fcntl = None
 
 
 @contextmanager
 def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
-    """Yield a text stream whose contents become the file `target` when the block ends well.
+    """Yield a text stream whose contents become the file `target` when the block succeeds.
 
-    A place that cannot be written is an error before the block. A link stays a link, a file keeps its permissions, and a device
+    A file that cannot be written is an error before the block. A link stays a link, a file keeps its permissions, and a device
     or a pipe, such as /dev/null, is written directly.
 
     Raises
@@ -52,12 +53,12 @@ def text_file(target: Path, argument: str) -> Iterator[IO[str]]:
 
 
 def write_text(target: Path, text: str, argument: str) -> None:
-    """Make a text the content of the file `target`. Raise `NotWritten` as `text_file` does."""
+    """Write a text to the file `target`. Raise `NotWritten` as `text_file` does."""
     write_bytes(target, text.encode(), argument)
 
 
 def write_bytes(target: Path, content: bytes, argument: str) -> None:
-    """Make bytes the content of the file `target`. Raise `NotWritten` as `text_file` does."""
+    """Write bytes to the file `target`. Raise `NotWritten` as `text_file` does."""
     with _raw_file(target, argument) as raw:
         left = memoryview(content)
         while left:
@@ -65,16 +66,17 @@ def write_bytes(target: Path, content: bytes, argument: str) -> None:
 
 
 def make_folder(folder: Path, argument: str) -> None:
-    """Make a folder, and those above it, unless they are there. Raise `NotWritten`, which names `argument`, if that fails."""
+    """Create a folder and its missing parents. Raise `NotWritten` for `argument` if that fails."""
     with _errors(folder, argument):
         folder.mkdir(parents=True, exist_ok=True)
 
 
 @contextmanager
 def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, int]]:
-    """Yield the name of a temporary beside a place, and its handle; `make` creates and opens it. It is gone after the block.
+    """Yield the name and the handle of a temporary next to a place, which `make` creates and opens. It is removed after the
+    block.
 
-    Leftovers of the place go first. An `OSError` stays one: the caller knows what to make of it.
+    Leftovers are removed first. An `OSError` is not converted.
     """
     remove_leftovers(place)
     fresh, handle = _make_locked(place, make)
@@ -86,13 +88,13 @@ def temporary(place: Path, make: Callable[[Path], int]) -> Iterator[tuple[Path, 
 
 
 def remove_leftovers(place: Path) -> None:
-    """Remove the temporaries of a place whose makers are gone."""
+    """Remove the temporaries of processes that have ended."""
     for path in leftovers(place):
         remove(path)
 
 
 def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
-    """Yield the temporaries of a place whose makers are gone; each is locked until the next is asked for."""
+    """Yield the temporaries of processes that have ended. Each is locked until the next one."""
     for path in _temporaries(place, suffix):
         if (handle := lock(path)) is not None:
             yield path
@@ -101,13 +103,13 @@ def leftovers(place: Path, suffix: str = "") -> Iterator[Path]:
 
 def _temporaries(place: Path, suffix: str = "") -> list[Path]:
     pattern = re.compile(rf"\.{re.escape(place.name)}-[0-9a-f]{{12}}{suffix}")
-    with suppress(OSError):  # in a folder that cannot be read there are none that could be removed
+    with suppress(OSError):  # in a folder that cannot be read, nothing can be removed
         return [path for path in place.parent.iterdir() if pattern.fullmatch(path.name)]
     return []
 
 
 def lock(path: Path) -> int | None:
-    """Return the handle of a file or a folder, locked; None where another process has the lock, or nothing is there."""
+    """Lock a file or a folder and return its handle; None if another process has the lock, or it does not exist."""
     with suppress(OSError):
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
         if try_lock(handle, without=False) and _is_at(handle, path):
@@ -117,7 +119,7 @@ def lock(path: Path) -> int | None:
 
 
 def try_lock(handle: int, without: bool = True) -> bool:
-    """Lock a file or a folder, and return False if another process has the lock, `without` if the file system has no locks."""
+    """Lock a file or a folder. Return False if another process has the lock, `without` if the file system has no locks."""
     try:
         if fcntl is None:
             return without
@@ -128,7 +130,7 @@ def try_lock(handle: int, without: bool = True) -> bool:
 
 
 def release(handle: int) -> None:
-    """Unlock and close: a process that was forked meanwhile has the handle too, and would keep the lock."""
+    """Unlock and close. Closing alone would leave the lock to processes forked in the meantime."""
     with suppress(OSError):
         if fcntl is not None:
             fcntl.flock(handle, fcntl.LOCK_UN)
@@ -136,7 +138,7 @@ def release(handle: int) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, or a folder with all that is in it, if it is there and can be removed."""
+    """Remove a file, or a folder with its contents, if it exists and can be removed."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:
@@ -145,7 +147,7 @@ def remove(path: Path) -> None:
 
 
 def sync(path: Path) -> None:
-    """Have a file, or the names in a folder, on the disk, where the file system can."""
+    """Flush a file, or the names in a folder, to the disk, if the file system supports it."""
     with suppress(OSError):
         handle = os.open(path, os.O_RDONLY)
         try:
@@ -155,7 +157,7 @@ def sync(path: Path) -> None:
 
 
 class _RawFile(io.FileIO):
-    """A file whose errors name the place that its contents are for; with `ignore` it takes what is left and forgets it."""
+    """A file whose errors contain the name of its target. With `ignore` it discards everything written to it."""
 
     def __init__(self, handle: int, target: Path, argument: str) -> None:
         super().__init__(handle, "w", closefd=False)
@@ -173,7 +175,7 @@ class _RawFile(io.FileIO):
 
 @contextmanager
 def _raw_file(target: Path, argument: str) -> Iterator[_RawFile]:
-    """Yield a raw file that takes the place of `target` when the block ends well."""
+    """Yield a raw file that replaces `target` when the block succeeds."""
     with ExitStack() as stack:
         with _errors(target, argument):
             is_file = target.is_file() or not target.exists()
@@ -197,7 +199,7 @@ def _errors(target: Path, argument: str) -> Iterator[None]:
 
 @contextmanager
 def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
-    """Yield what to write into: a temporary with the permissions of the file, or the place itself where it is no file."""
+    """Yield the file to write: a temporary with the permissions of the target, or the target if it is a device or pipe."""
     if place.exists() and not os.access(place, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     if place.exists() and not place.is_file():
@@ -213,7 +215,7 @@ def _open_target(place: Path) -> Iterator[tuple[Path, int]]:
 
 
 def _make_locked(place: Path, make: Callable[[Path], int]) -> tuple[Path, int]:
-    """Return a new temporary and its handle, locked; another where somebody took it for a leftover before it was."""
+    """Return a new temporary and its handle, locked. Retry if another process removed it as a leftover before it was locked."""
     while True:
         fresh = place.with_name(f".{place.name}-{os.urandom(6).hex()}")
         handle = make(fresh)

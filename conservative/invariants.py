@@ -1,4 +1,4 @@
-"""What the exact motion conserves, as functions of attitude and rates. Source: definitions of any mechanics textbook."""
+"""Invariants of the exact motion, as functions of attitude and rates."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .potentials.uniform_gravity import UniformGravity
 _NAME = "a text of one character or more"
 MOMENTUM_UNIT = "kg m^2/s"
 JACOBI_INTEGRAL = "Jacobi integral"
-"""Name of what a field that turns conserves in place of the energy."""
+"""Name of the invariant that replaces the energy in a turning field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +54,17 @@ class Invariant:
 
 
 def sizes(drift: Array) -> Array:
-    """Return |x| of each of n relative values (n,), and of vectors (n, 3) their lengths (n,): no unit."""
+    """Return the magnitudes (n,) of relative values (n,) or (n, 3)."""
     return np.abs(drift) if drift.ndim == 1 else np.linalg.norm(drift, axis=-1)
 
 
 def find_invariant(invariant: Invariant | str, known: Iterable[Invariant]) -> Invariant:
-    """Return an invariant, which may be given by its name among those that are known.
+    """Return an invariant, which can be given by its name.
 
     Raises
     ------
     BadInput
-        None of them has this name.
+        No known invariant has this name.
     """
     if not isinstance(invariant, str):
         return invariant
@@ -86,10 +86,10 @@ def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B:
 
 
 def conserved_part(body: RigidBody, potential: AnyPotential | None, R: Array, w_WB_B: Array) -> Array:
-    """Return what makes a conserved quantity of the kinetic energy, (...), J: V, or V - rate n.l of a field that turns.
+    """Return the part (...), J, that added to the kinetic energy is conserved: V, or V - rate n.l in a turning field.
 
-    Attitudes (..., 3, 3) are those in axes that the field is fixed in (`Scene.in_field_axes`), rates (..., 3), rad/s, those of
-    the body in the world. It is 0 for a free body, and where nothing of the kind is conserved.
+    Attitudes (..., 3, 3) are relative to the axes in which the field is constant (`Scene.in_field_axes`), rates (..., 3),
+    rad/s, are those of the body in the world. The result is 0 for a free body, and if no energy is conserved.
     """
     if isinstance(potential, Turning):
         return potential.potential.energy(R) - potential.orbit.rate * (momentum_W(body, R, w_WB_B) @ potential.orbit.normal_W)
@@ -99,7 +99,7 @@ def conserved_part(body: RigidBody, potential: AnyPotential | None, R: Array, w_
 
 
 def jacobi_scale(body: RigidBody, field: Turning, energy_scale: float) -> float:
-    """Return what errors of the Jacobi integral are relative to, J: the energy's scale and what the turning adds to it."""
+    """Return the reference scale of the Jacobi integral, J: the scale of the energy plus the contribution of the turning."""
     return energy_scale + field.orbit.rate * math.sqrt(2 * energy_scale * float(body.moments.max()))
 
 
@@ -114,23 +114,23 @@ def momentum_W(body: RigidBody, R_WB: Array, w_WB_B: Array) -> Array:
 def invariants_of(
     body: RigidBody, potential: AnyPotential | None, w_WB_B0: Array, energy_scale: float
 ) -> tuple[Invariant, ...]:
-    """Return what follows from the body and the potential alone; drifts are relative to sizes at the start.
+    """Return the invariants that follow from body and potential, with scales from the initial state.
 
-    Energy, unless the field depends on the time; the Jacobi integral where it turns. World momentum (a vector) for a free body,
-    its component along the axis of a field that has one (the vertical in uniform gravity). The axial momentum where body and
-    field are symmetric about one axis.
+    These are the energy, unless the field depends on time; the Jacobi integral in a turning field; the world momentum (a
+    vector) of a free body, or its component along the axis of the field (the vertical in uniform gravity); and the axial
+    momentum if body and field are symmetric about one axis.
 
     Parameters
     ----------
     body, potential
-        What moves, and what acts on it.
+        The body and its field.
     w_WB_B0
         Angular velocity at the start (3,), rad/s, body axes.
     energy_scale
-        What energy errors are relative to, J, above 0.
+        Reference scale of the energy, J, above 0.
     """
     found = list(_energies(body, potential, energy_scale))
-    # A scene that starts at rest has no momentum to be relative to; what gravity can give it is the next best scale.
+    # A scene that starts at rest has no momentum. The momentum that gravity can produce is the scale instead.
     scale = float(np.linalg.norm(body.momentum(w_WB_B0))) or math.sqrt(float(body.moments.max()) * energy_scale)
     if potential is None:
         found.append(Invariant("momentum", MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w)))
@@ -156,15 +156,15 @@ def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: flo
 
 
 def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
-    """Return the energy among invariants, in a field that turns the Jacobi integral, None where neither is conserved."""
+    """Return the energy or, in a turning field, the Jacobi integral among invariants; None if neither is conserved."""
     return next((each for each in invariants if each.name in ("energy", JACOBI_INTEGRAL)), None)
 
 
 def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
-    """Return those invariants of a `Scene` that follow from body and field, by names, and what rounding errors are relative to.
+    """Return the invariants named `kept` that follow from body and field, and the scales of their round-off.
 
-    Those sizes have the units of the invariants. That of a momentum is all that the energy can make of it, which is more than
-    its scale where a body starts near rest.
+    The scale of a momentum is the largest momentum that the energy allows, which exceeds its reference scale if a body starts
+    near rest.
     """
     most = math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
     found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
@@ -172,9 +172,9 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
 
 
 def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
-    """Return the inertia (3, 3), kg m^2, and constants (5, 4) of a `Scene`, as `conservative.kernels.drifts` takes them.
+    """Return the inertia (3, 3), kg m^2, and constants (5, 4) of a `Scene` for `conservative.kernels.drifts`.
 
-    Those of invariants whose names are not among `kept` are 0. This file is below that of scenes.
+    The constants of invariants whose names are not among `kept` are 0.
     """
     body, potential, rows = scene.body, scene.potential, np.zeros((5, 4))
     for invariant, size in kept_sizes(scene, kept).items():
@@ -191,9 +191,9 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
 
 
 def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-14) -> Array | None:
-    """Return the unit vector (3,), body axes, about which body and field are symmetric; None where they are not.
+    """Return the unit vector (3,), body axes, about which body and field are symmetric, or None.
 
-    In uniform gravity it points to the side of the centre of mass. Fields of other kinds are not looked into: None.
+    In uniform gravity it points towards the centre of mass. The result is None for other kinds of field.
     """
     if potential is not None and not isinstance(potential, UniformGravity):
         return None

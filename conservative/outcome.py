@@ -1,6 +1,6 @@
-"""How a run ended, what it cost in work, and what was chosen for it.
+"""Outcome of a run, its work counters, progress, and the result of an automatic choice.
 
-An end is a kind out of a fixed list, and the fields that belong to it. Text is made of it only where it is shown.
+An outcome is a kind from a fixed list and the fields that belong to it. It becomes text only for display.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ class OutcomeKind(StrEnum):
     WRONG_BRANCH = "wrong branch"
     DIVERGED = "diverged"
     NOT_CONSERVED = "not conserved"
-    """Orthonormality, or an invariant that the method names, left the bound that the method states."""
+    """Orthonormality, or an invariant that the method conserves, exceeded the method's bound."""
     INVALID = "invalid result"
-    """What a method gave has the wrong shape, type, times or number of samples."""
+    """The result of a method has the wrong shape, type, times or number of samples."""
     TIMEOUT = "timeout"
     CRASHED = "crashed"
     UNSUPPORTED = "unsupported"
     MISSING = "missing"
     SKIPPED = "skipped"
     NO_ORDER = "no order"
-    """Of studies alone, no end of a run: an order of convergence cannot be fitted to the errors."""
+    """In studies only: no order of convergence can be fitted to the errors."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Outcome:
     Attributes
     ----------
     kind
-        Kind of end.
-        reason
+        Kind of outcome.
+    reason
         Details in words; may be empty.
     step
         Number of the step that failed, from 1.
     time
-        Time of the last good state, s.
+        Time of the last valid state, s.
     residual
         Last residual of a step's equations, or last correction relative to the unknown; dimensionless.
     """
@@ -61,7 +61,7 @@ class Outcome:
         return self.kind is OutcomeKind.OK
 
     def __str__(self) -> str:
-        """Return the outcome as people read it, such as `not converged in step 3 at t = 0.02 s (residual 0.1)`."""
+        """Return the outcome as text, such as `not converged in step 3 at t = 0.02 s (residual 0.1)`."""
         where = (f" in step {self.step}" if self.step is not None else "") + (
             f" {'at' if self.step is not None else 'after'} t = {self.time:g} s" if self.time is not None else ""
         )
@@ -71,12 +71,12 @@ class Outcome:
 
 
 OK = Outcome(OutcomeKind.OK)
-"""The outcome of every run that reaches its end."""
+"""The outcome of a successful run."""
 
 
 @dataclass(frozen=True)
 class Counters:
-    """Work done: steps, stages solved, corrections of the nonlinear solver, evaluations of the right-hand side.
+    """Work counters: steps, stages, corrections of the nonlinear solver, evaluations of the right-hand side.
 
     None means that the method or its engine does not provide the count.
     """
@@ -89,16 +89,16 @@ class Counters:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far `integrate(scene, error=...)` has got with its trial runs; its text is a line for people.
+    """Progress of `integrate(scene, error=...)`. Its text is one line.
 
     Attributes
     ----------
     elapsed
         Time since the call, s.
     runs
-        Runs made so far.
+        Number of finished trial runs.
     method, dt, n_steps
-        The `Method` that runs next, its step, s, and the number of its steps.
+        The next `Method`, its step size, s, and its number of steps.
     """
 
     elapsed: float
@@ -113,16 +113,16 @@ class Progress:
 
 @dataclass(frozen=True)
 class ProgressOfMany:
-    """How far `integrate_many` has got; its text is a line for people.
+    """Progress of `integrate_many`. Its text is one line.
 
     Attributes
     ----------
     elapsed
-        Time since the first block was begun, s.
+        Time since the start of the first block, s.
     done, total
-        Bodies that are done, and all bodies.
+        Numbers of finished bodies and of all bodies.
     found
-        How many of those that are done were done before, and are there because a run was resumed.
+        Number of finished bodies from an earlier run that was resumed.
     """
 
     elapsed: float
@@ -132,12 +132,12 @@ class ProgressOfMany:
 
     @property
     def rate(self) -> float:
-        """Bodies a second, 1/s, since the first block was begun."""
+        """Bodies per second since the start of the first block."""
         return (self.done - self.found) / self.elapsed if self.elapsed > 0 else 0.0
 
     @property
     def left(self) -> float:
-        """Time that the bodies left will take at this rate, s; infinite as long as nothing is known."""
+        """Remaining time at this rate, s; infinite if the rate is unknown."""
         return (self.total - self.done) / self.rate if self.rate > 0 else math.inf
 
     def __str__(self) -> str:
@@ -148,21 +148,21 @@ class ProgressOfMany:
 
 @dataclass(frozen=True)
 class Choice:
-    """What `integrate(scene, error=...)` chose.
+    """The result of the automatic choice of `integrate(scene, error=...)`.
 
     Attributes
     ----------
     method, dt
-        The `Method` that made the trajectory, and its step, s.
+        The `Method` of the trajectory and its step size, s.
     error
-        Attitude error asked for over the run, rad.
+        Requested attitude error over the run, rad.
     estimate
-        Estimated attitude error over the run, rad, from the same run at twice the step.
+        Estimated attitude error over the run, rad, from the same run with twice the step size.
     attempts
-        Steps tried on the whole run, s, with the estimate of each, rad.
+        Step sizes of runs over the whole duration, s, and their estimates, rad.
     """
 
-    method: Any  # a `Method`: naming the type would close a circle, as that file imports this one
+    method: Any  # a `Method`; its file imports this one
     dt: float
     error: float
     estimate: float
@@ -170,21 +170,22 @@ class Choice:
 
     @property
     def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
+        """Whether the estimate is at most the requested error."""
         return self.estimate <= self.error
 
 
 @dataclass(frozen=True)
 class ChoiceForMany(Choice):
-    """What `integrate_many(scene, ..., error=...)` chose; `estimate` is the largest of those bodies that were looked at.
+    """The result of the automatic choice of `integrate_many(scene, ..., error=...)`; `estimate` is the largest of the examined
+    bodies.
 
     Attributes
     ----------
     bodies
-        On how many bodies it was estimated, those that turn fastest among them. Others may be further off.
+        Number of examined bodies, including the fastest ones. Errors of other bodies may be larger.
     grid
-        The `Grid` of steps that all bodies have.
+        The `Grid` of all bodies.
     """
 
     bodies: int = 1
-    grid: Any = None  # a `Grid`, whose file is above this one
+    grid: Any = None  # a `Grid`; its file imports this one

@@ -1,4 +1,4 @@
-"""How a trajectory looks: as a table, as a picture, as a card in a notebook. pandas and Altair are imported when asked for."""
+"""A trajectory as a table, a chart, and a card in a notebook. pandas and Altair are imported on demand."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ COLUMNS = (
 """Columns of a table of samples: s; R_WB by rows; rad/s, body axes; J; kg m^2/s, world axes."""
 
 LEAST_DRAWN = 1e-17
-"""Relative drift at which smaller ones are drawn, 0 too: a tenth of the round-off of one number."""
+"""Smallest relative drift in a chart, also drawn for smaller ones and 0: a tenth of the round-off of one number."""
 
 MOST_DRAWN = 1000
-"""Samples that a picture has at most, evenly chosen: more than its pixels, fewer than the 5,000 rows that Altair takes."""
+"""Largest number of samples in a chart, evenly chosen: more than its pixels, fewer than the 5,000 rows that Altair accepts."""
 
 _WIDTH, _HEIGHT = 480, 160
 
 
 class Sampled(Protocol):
-    """What is presented: a `Trajectory`, whose file imports this one, so that naming the class would close a circle."""
+    """A `Trajectory`, whose file imports this one."""
 
     @property
     def scene(self) -> Scene:
-        """What was integrated."""
+        """The scene."""
 
     @property
     def t(self) -> Array:
@@ -65,7 +65,7 @@ class Sampled(Protocol):
 
     @property
     def label(self) -> str:
-        """Who made it."""
+        """Method with version and setting."""
 
     @property
     def outcome(self) -> Outcome:
@@ -88,7 +88,7 @@ def samples(trajectory: Sampled) -> Array:
 
 
 def table(trajectory: Sampled) -> pandas.DataFrame:
-    """Return the samples as a table under `COLUMNS`; its `attrs` say scene, method and outcome.
+    """Return the samples as a table with `COLUMNS`; its `attrs` contain scene, method and outcome.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def table(trajectory: Sampled) -> pandas.DataFrame:
 
 
 def picture(trajectory: Sampled) -> altair.VConcatChart:
-    """Return the body rates, and under them the drift of every invariant, over time; zoom and hover for values.
+    """Return an interactive chart of the body rates and of the drift of every invariant over time.
 
     Raises
     ------
@@ -133,8 +133,8 @@ def picture(trajectory: Sampled) -> altair.VConcatChart:
 def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
     """Return a chart that a notebook shows without a network.
 
-    A notebook that draws Vega-Lite by itself, as JupyterLab does, gets the specification, any other one an SVG. Altair's own
-    way is a page that asks a server for its scripts.
+    A notebook that renders Vega-Lite itself, such as JupyterLab, gets the specification, others an SVG. Altair's default is a
+    page that loads scripts from a server.
     """
     import altair as alt
 
@@ -146,7 +146,7 @@ def _offline(chart: altair.VConcatChart) -> altair.VConcatChart:
 
 
 def _mimebundle(chart: altair.VConcatChart) -> dict[str, Any]:
-    """Return what a notebook may show of a chart: the specification, and an SVG where `vl-convert` is there to draw it."""
+    """Return the specification of a chart, and an SVG if `vl-convert` is installed."""
     specification = chart.to_dict()
     version = str(specification["$schema"]).rpartition("/")[2].partition(".")[0]
     name = "chart of body rates and drifts"
@@ -187,7 +187,7 @@ def _lines(trajectory: Sampled, series: dict[str, Array], quantity: str, scale: 
 
 
 def card(trajectory: Sampled) -> str:
-    """Return a small HTML table: what was run, how it ended, what it cost and what drifted."""
+    """Return a small HTML table with scene, method, outcome, work and drifts."""
     work = [f"{count} {name}" for name, count in trajectory.work.items()]
     end = f"{trajectory.t[-1]:g} s" if len(trajectory) else "nothing"
     rows = [

@@ -1,4 +1,4 @@
-"""A scene: a body, what acts on it, how it starts and for how long. Only what the motion needs."""
+"""A scene: body, potential, initial state and duration."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 Settings = TypeVarTuple("Settings")
 _NAME = "a text of one character or more"
 MOST_DERIVATIONS = 64
-"""Results that `Scene.derive` keeps at most."""
+"""Largest number of results in the cache of `Scene.derive`."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -33,7 +33,7 @@ class Scene:
     """A rigid body that rotates about a fixed point: body, potential, initial state and duration.
 
     Numbers with units are 0 or of magnitude 1e-30 to 1e30 in SI units, of vectors the largest component. In that range our
-    own methods are right or say what failed; engines are given the numbers as they are.
+    methods are correct or report a failure. Engines get the numbers unchanged.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Scene:
         return {}
 
     def derive(self, function: Callable[[Scene, *Settings], T], *settings: *Settings) -> T:
-        """Return `function(self, *settings)`, kept as long as the scene is: a scene never changes. Settings are hashable."""
+        """Return `function(self, *settings)`, cached with the scene, which never changes. Settings are hashable."""
         known, key = self._derivations, (function, settings)
         try:
             return known[key]
@@ -181,10 +181,10 @@ class Scene:
 
 
 def _invariants(value: object) -> tuple[Invariant, ...]:
-    """Return invariants as a tuple; raise `BadInput` for what is none of them."""
+    """Return invariants as a tuple. Raise `BadInput` for anything else."""
     try:
         found: tuple[Any, ...] = tuple(value)  # type: ignore[arg-type]
-    except Exception:  # no iterable, or one that fails
+    except Exception:  # not an iterable, or one that fails
         found = (value,)
     if not all(isinstance(each, Invariant) for each in found):
         raise BadInput("extra_invariants", describe(value), "Invariants, in a tuple or a list")
@@ -192,6 +192,6 @@ def _invariants(value: object) -> tuple[Invariant, ...]:
 
 
 def _usual_step(w_WB_B0: Array, t_end: float) -> float:
-    """Return the time, s, in which the body turns by a 20th of a radian, or a hundredth of the duration if that is shorter."""
+    """Return the time, s, of a rotation by 0.05 rad, or a hundredth of the duration if that is shorter."""
     speed = float(np.linalg.norm(w_WB_B0))
     return max(SMALLEST, min(t_end / 100, 0.05 / speed) if speed > 0 else t_end / 100)

@@ -1,4 +1,4 @@
-"""What a method hands back: samples of a motion, what they cost in work, how it ended, and whether that may be called ok."""
+"""Trajectories, the results of methods, and the checks of a run."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Trajectory:
 
 
 START_TOLERANCE = 1e-6
-"""How far the first sample may be from the start of the scene: in attitudes, and in rates relative to their size."""
+"""Largest difference of the first sample from the initial state: of attitudes, and of rates relative to their size."""
 
 
 @dataclass(frozen=True)
@@ -144,17 +144,17 @@ class Bounds:
 
 
 def accept(found: Any, scene: Scene, steps: Grid, method: Any, bounds: Bounds) -> Trajectory:
-    """Return what a run gave if it may be called ok, else what is good of it, with the failure.
+    """Return the trajectory if it passes every check, otherwise its valid samples and the failure.
 
     Parameters
     ----------
     found
-        What it gave, which should be a `Trajectory`.
+        The result of a run, which should be a `Trajectory`.
     scene, steps
-        What it was asked for.
+        Scene and grid of the run.
     method, bounds
-        The `Method`, and how well it is to keep the invariants that it names. Where it has a kernel, compiled code looks first,
-        and if that finds nothing, that is that.
+        The `Method`, and its bounds on the invariants that it conserves. If it has a kernel, a compiled check runs first. If
+        that passes, no other check is made.
     """
     mistake = _find_mistake(found, scene, steps)
     kept = method.conserves
@@ -169,13 +169,13 @@ def accept(found: Any, scene: Scene, steps: Grid, method: Any, bounds: Bounds) -
 
 
 def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return samples at any times of a run, those up to the first that breaks the bounds of invariants of the names `kept`."""
+    """Return the samples of a run, at any times, before the first one outside the bounds of the invariants named `kept`."""
     with np.errstate(all="ignore"):
         return _cut_at_drift(_cut_to_finite(found), kept, bounds)
 
 
 def _find_mistake(found: Any, scene: Scene, steps: Grid) -> str | None:
-    """Return what is wrong with the form of a result, None if nothing is."""
+    """Return the error in type, shape or scene of a result, or None."""
     if not isinstance(found, Trajectory):
         return f"a {type(found).__name__}, no Trajectory"
     if found.scene is not scene:
@@ -184,7 +184,7 @@ def _find_mistake(found: Any, scene: Scene, steps: Grid) -> str | None:
 
 
 def _find_mistyped(found: Any, steps: Grid) -> str | None:
-    """Return which field of a `Trajectory` has another type or shape than it should, None if none has."""
+    """Return the error in type or shape of a field of a `Trajectory`, or None."""
     if not isinstance(found.counters, Counters) or not isinstance(found.failure, IntegrationFailed | None):
         return "counters or a failure of another type"
     n = len(found.t) if found.failure is not None and isinstance(found.t, np.ndarray) else steps.n_samples
@@ -197,7 +197,7 @@ def _find_mistyped(found: Any, steps: Grid) -> str | None:
 
 
 def _find_misplaced(found: Trajectory, steps: Grid) -> str | None:
-    """Return which samples are not those asked for, None if all are."""
+    """Return the error in times or initial state of the samples, or None."""
     t = steps.t
     if len(found) > len(t) or not np.allclose(found.t, t[: len(found)], rtol=1e-12, atol=0):
         return "samples at other times than those of the grid"
