@@ -122,16 +122,32 @@ def fail_unsupported(reason: str) -> Failure:
     return Failure(Outcome(OutcomeKind.UNSUPPORTED, reason))
 
 
-def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
-
-    Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome. Exceptions of our
-    methods are bugs and are not caught.
+def outcome_of_error(method: Method, error: Exception, skip_missing: bool = False) -> Outcome:
+    """Return the outcome of a run that ended in an exception.
 
     Raises
     ------
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
+    Exception
+        It came out of a method of ours: that is a bug. An engine may raise anything, and must not end a run of twenty.
+    """
+    if isinstance(error, MissingEngine) and skip_missing:
+        return Outcome(OutcomeKind.MISSING, str(error))
+    if isinstance(error, IntegrationFailed):
+        return error.outcome
+    if isinstance(error, BadInput) and not isinstance(error, MissingEngine):  # a step that the method does not have
+        return Outcome(OutcomeKind.UNSUPPORTED, str(error))
+    if isinstance(error, MissingEngine) or method.role != Role.ENGINE:
+        raise error
+    return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+
+
+def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
+    """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
+
+    Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome; see
+    `outcome_of_error`.
     """
     try:
         reason = case.method.unsupported(case.scene)
@@ -139,16 +155,6 @@ def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
             return fail_unsupported(reason)
         run, found, cost = prepare_and_run(lambda: case.method.prepare(case.scene, case.grid))
         done = Success(run, case.method.check(case.scene, case.grid, found), cost)
-    except MissingEngine as error:
-        if not skip_missing:
-            raise
-        return Failure(Outcome(OutcomeKind.MISSING, str(error)))
-    except BadInput as error:  # a step that the method does not have
-        return fail_unsupported(str(error))
-    except IntegrationFailed as failure:
-        return Failure(failure.outcome)
-    except Exception as error:  # an engine may raise anything, and one engine must not end a run of twenty
-        if case.method.role != Role.ENGINE:
-            raise
-        return Failure(Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}"))
+    except Exception as error:
+        return Failure(outcome_of_error(case.method, error, skip_missing))
     return done if done.trajectory.ok else Failure(done.trajectory.outcome)

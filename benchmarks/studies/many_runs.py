@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from conservative.batch import Batch
-from conservative.errors import BadInput, IntegrationFailed, MissingEngine
 from conservative.grid import Grid
 from conservative.method import Method, Role
 from conservative.methods.many import Block, RunMany
@@ -19,6 +18,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.worker.client import time_limit
 
 from ..measures.timing import wall_time
+from .case import outcome_of_error
 from .selection import takes_exact_steps
 
 BLOCK = 1024
@@ -76,7 +76,7 @@ class RunBlocks:
             for run in self._runs[:-1]:
                 run()
             return self._runs[-1]()
-        return list(self._pool.map(_call, self._runs))[-1]
+        return list(self._pool.map(lambda run: run(), self._runs))[-1]
 
     def wall_time(self, calls: int) -> float:
         """Return the wall time of calls, s, without the communication with engines in other processes."""
@@ -85,19 +85,15 @@ class RunBlocks:
         return wall_time(self.__call__, calls)
 
 
-def _call(run: RunMany) -> Block:
-    return run()
-
-
 def prepare_blocks(way: Way, bodies: Batch, grid: Grid) -> RunBlocks:
     """Return the run of bodies, prepared block by block."""
-    blocks = (bodies[first : first + BLOCK] for first in range(0, len(bodies), BLOCK))
-    return RunBlocks(way, [_prepare_block(way, block, grid) for block in blocks])
-
-
-def _prepare_block(way: Way, bodies: Batch, grid: Grid) -> RunMany:
-    found: RunMany | None = way.method.prepare_many(bodies, grid) if way.together else None
-    return _Loop([way.method.prepare(bodies.take(i), grid) for i in range(len(bodies))], grid) if found is None else found
+    runs: list[RunMany] = []
+    for first in range(0, len(bodies), BLOCK):
+        block = bodies[first : first + BLOCK]
+        together = way.method.prepare_many(block, grid) if way.together else None
+        alone = (way.method.prepare(block.take(i), grid) for i in range(len(block)))
+        runs.append(_Loop(list(alone), grid) if together is None else together)
+    return RunBlocks(way, runs)
 
 
 class _Loop:
@@ -117,11 +113,7 @@ class _Loop:
     def wall_time(self, calls: int) -> float:
         """Return the wall time of calls, s, without the communication with engines in other processes."""
         own = [run for run in self._runs if hasattr(run, "wall_time")]
-        return sum(wall_time(run, calls) for run in own) if own else _time_here(self, calls)
-
-
-def _time_here(run: Callable[[], Any], calls: int) -> float:
-    return wall_time(lambda: run(), calls)
+        return sum(wall_time(run, calls) for run in own) if own else wall_time(self.__call__, calls)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +127,7 @@ class ManyDone:
 
 
 def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing: bool = False) -> ManyDone | Outcome:
-    """Return the run of bodies after two calls, the second one timed, or the outcome of its failure.
-
-    Exceptions of our methods are bugs and are not caught.
-
-    Raises
-    ------
-    MissingEngine
-        The engine is not installed, and `skip_missing` is False.
-    """
+    """Return the run of bodies after two calls, the second one timed, or the outcome of its failure (`outcome_of_error`)."""
     if reason := way.method.unsupported(bodies.take(0)):
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     try:
@@ -155,18 +139,8 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
                 run = prepare_blocks(way, bodies, grid)
                 spent = perf_counter() - start
             return ManyDone(run, run(), spent, wall_time(run))
-    except MissingEngine as error:
-        if not skip_missing:
-            raise
-        return Outcome(OutcomeKind.MISSING, str(error))
-    except BadInput as error:  # a step that the method does not have
-        return Outcome(OutcomeKind.UNSUPPORTED, str(error))
-    except IntegrationFailed as failure:
-        return failure.outcome
-    except Exception as error:  # an engine may raise anything
-        if way.method.role != Role.ENGINE:
-            raise
-        return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+    except Exception as error:
+        return outcome_of_error(way.method, error, skip_missing)
 
 
 def settings(method: Method) -> tuple[Method, ...]:

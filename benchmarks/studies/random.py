@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
-from conservative.errors import BadInput, IntegrationFailed
+from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.outcome import Outcome, OutcomeKind
@@ -41,7 +41,7 @@ from ..contest import cost, credit, first_within
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
-from .case import NOT_DRAWN, Case, Drawn, Failure, Success
+from .case import NOT_DRAWN, Case, Drawn, Failure, Success, outcome_of_error
 from .selection import Missing, at_tolerance, series, takes_exact_steps, tolerance_setting
 from .speed import keep_end
 from .study import Progress, Study, Truths
@@ -251,12 +251,8 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
     try:
         run = case.method.prepare(case.scene, case.grid)
         outcome = run().outcome
-    except IntegrationFailed as failure:
-        return failure.outcome
-    except Exception as error:  # an engine may raise anything
-        if case.method.role != Role.ENGINE:
-            raise
-        return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
+    except Exception as error:
+        return outcome_of_error(case.method, error)
     return run if outcome.ok else outcome
 
 

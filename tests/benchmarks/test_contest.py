@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from conservative.benchmarks.contest import SMALLEST, cost, credit, first_within
+from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within
 
 ERRORS, TIMES = [1e-1, 1e-3, 1e-5], [1.0, 2.0, 4.0]
 
@@ -55,3 +56,23 @@ def test_a_method_of_an_order_is_interpolated_exactly():
 def test_a_line_without_settings_has_no_cost():
     assert math.isnan(cost([], [], 1e-3))
     assert first_within([], 1e-3) is None
+
+
+def ratios(*values):
+    return Ratios(
+        tuple(Contest(str(i), 1e-6, Cheapest(1.0, "ours"), Cheapest(value, "theirs")) for i, value in enumerate(values))
+    )
+
+
+def test_the_interval_of_the_mean_is_that_of_the_logarithms():
+    found = ratios(2.0, 4.0, 8.0)
+    half = 4.302652729911275 * math.log(2) / math.sqrt(3)  # Student's t of two degrees of freedom, 97.5 %
+    assert found.mean == pytest.approx(4.0)
+    assert found.interval == pytest.approx((4.0 * math.exp(-half), 4.0 * math.exp(half)))
+    assert all(map(math.isnan, ratios(2.0).interval))
+
+
+def test_the_interval_holds_the_mean_as_often_as_it_should():
+    rng = np.random.default_rng(7)
+    found = [ratios(*np.exp(rng.normal(0.5, 0.3, 10))).interval for _ in range(400)]
+    assert 0.92 < np.mean([low <= math.exp(0.5) <= high for low, high in found]) < 0.98  # measured 0.935
