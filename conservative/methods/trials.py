@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
 from time import monotonic
 from typing import Any
@@ -92,11 +92,11 @@ class Trials:
         """Make a run and return its estimate, with its `sensitivity` if requested, and its trajectory."""
         self.observe(method, grid)
         error, fine, coarse = run_twice(method, self.scene, grid)
-        estimate = Estimate(error, count_work(method, fine))
-        if sensitivity:
-            # If the run at twice the step failed, the step is too long to tell.
-            moved = find_sensitivity(method, coarse, coarse_grid(grid)) if coarse is not None else 0.0
-            estimate = replace(estimate, sensitivity=moved)
+        cost, counters = method.card.cost(method), fine.counters
+        work = cost.correction * (counters.iterations or 0) + cost.step * counters.steps
+        # If the run at twice the step failed, the step is too long to measure the sensitivity.
+        moved = None if not sensitivity else 0.0 if coarse is None else find_sensitivity(method, coarse, coarse_grid(grid))
+        estimate = Estimate(error, work, moved)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
         self.known[method, grid] = estimate
@@ -109,7 +109,7 @@ def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None
         known = recall(content_of(scene))
     except TypeError:  # a field that cannot be hashed
         known = recall(scene)
-    return Trials(scene, known, (lambda method, grid: None) if progress is None else tell(progress))
+    return Trials(scene, known, (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)
@@ -120,19 +120,19 @@ def recall(content: object) -> Known:
 
 def content_of(scene: Scene) -> tuple[Any, ...]:
     """Return everything that trial runs of a scene depend on, as a hashable value."""
-    return tuple(map(plain, (scene.body, scene.R_WB0, scene.w_WB_B0, scene.potential, scene.dt)))
+    return tuple(map(hashable, (scene.body, scene.R_WB0, scene.w_WB_B0, scene.potential, scene.dt)))
 
 
-def plain(value: Any) -> Any:
+def hashable(value: Any) -> Any:
     """Return an array or a frozen dataclass as a tuple of numbers, and anything else unchanged."""
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()
     if is_dataclass(value) and not isinstance(value, type) and type(value).__dataclass_params__.frozen:  # type: ignore[attr-defined]
-        return type(value), *(plain(getattr(value, field.name)) for field in fields(value))
+        return type(value), *(hashable(getattr(value, field.name)) for field in fields(value))
     return value
 
 
-def tell(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:
+def throttle(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:
     """Return a function that calls `progress` before a run: not in the first `QUIET` seconds, then at most every `PAUSE`."""
     start, runs, due = clock(), 0, QUIET
 
@@ -190,8 +190,8 @@ def nearby_scene(scene: Scene) -> Scene:
     Moments of any other tensor are known to an ulp of the largest, and rates along its axes to an ulp of the whole rate.
     """
     body, w = scene.body, scene.w_WB_B0
-    plain = np.array_equal(body.R_BP, np.eye(3))
-    sizes, rates = (body.moments, np.abs(w)) if plain else (body.moments.max(), np.linalg.norm(w))
+    diagonal = np.array_equal(body.R_BP, np.eye(3))
+    sizes, rates = (body.moments, np.abs(w)) if diagonal else (body.moments.max(), np.linalg.norm(w))
     moved = body.R_BP @ np.diag(ROUNDED * sizes * _SIGNS[0]) @ body.R_BP.T
     return scene.rename(
         scene.name,
@@ -217,9 +217,3 @@ def rounding_error(trajectory: Trajectory) -> float:
         return math.inf
     speed = float(np.linalg.norm(trajectory.w_WB_B, axis=1).max())
     return float(np.finfo(float).eps / 2 * speed * trajectory.t[-1])
-
-
-def count_work(method: Method, trajectory: Trajectory) -> float:
-    """Return the work of a run, ns, from its numbers of steps and corrections."""
-    cost, counters = method.card.cost(method), trajectory.counters
-    return cost.correction * (counters.iterations or 0) + cost.step * counters.steps
