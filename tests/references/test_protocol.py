@@ -20,7 +20,7 @@ from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import EngineSamples, describe
 from conservative.references.worker import program
 from conservative.references.worker.calls import python_worker
-from conservative.references.worker.client import EngineCrashed, EngineTimeout, Worker, time_limit
+from conservative.references.worker.client import EngineCrashed, EngineTimeout, Worker
 
 PROGRAMS = Path(__file__).parent / "programs"
 NO_NODE = pytest.mark.skipif(not shutil.which("node"), reason="needs node")
@@ -200,8 +200,3 @@ def test_the_page_names_what_is_sent():
     table = page[page.index("## Numbers of a run") : page.index("## Process")]
     sent = describe(principal_axes(BRICK), grid_for(BRICK, 0.01))
     assert {*sent, "rows"} <= set(re.findall(r"`(\w+)`", table))
-
-
-def test_a_limit_may_be_any_number_of_seconds(start):
-    with time_limit(1e100):
-        assert start(*COMMANDS[0].values[0]).ask("check") == {}

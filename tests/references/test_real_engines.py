@@ -96,7 +96,7 @@ def test_an_adapter_finds_what_a_plain_script_finds(engine, setting, figures):
 
 def check_row(engine, setting, figures):
     found = install(engine, BUILT).environment
-    (method,) = registry.method(f"{found.engine}@{found.version}:{setting}")
+    method = registry.method(f"{found.engine}@{found.version}:{setting}")
     coarse, fine = (cv.integrate(SCENE, dt, method=method) for dt in (0.01, 0.005))
     error, energy, momentum, order = figures
     wrong = [float(angle_between(each.R_WB[-1], END)) for each in (coarse, fine)]
@@ -112,7 +112,7 @@ def check_row(engine, setting, figures):
 def test_samples_and_a_turned_start_are_those_of_the_grid(engine):
     scene = cv.scenes.turned_brick(t_end=0.5)
     install(engine, BUILT)
-    (method,) = registry.method(engine)
+    method = registry.method(engine)
     every, some = (cv.integrate(scene, 0.01, method=method, sample_every=count) for count in (1, 7))
     truth = cv.integrate(scene, 0.01, method=registry.method("exact"))
     assert np.abs(every.R_WB - truth.R_WB).max() < 1e-4
@@ -213,7 +213,7 @@ def end(heavy):
 @pytest.mark.parametrize(("engine", "setting", "error", "order"), [of(*key, *figures) for key, figures in ERRORS.items()])
 def test_a_heavy_top_is_as_right_as_a_free_body(heavy, end, engine, setting, error, order):
     found = install(engine).environment
-    (method,) = registry.method(f"{found.engine}@{found.version}:{setting}")
+    method = registry.method(f"{found.engine}@{found.version}:{setting}")
     wrong = [float(angle_between(cv.integrate(heavy, dt, method=method).R_WB[-1], end)) for dt in (0.02, 0.01)]
     assert 0.5 < wrong[1] / error < 2
     assert order is None or abs(np.log2(wrong[0] / wrong[1]) - order) < 0.3
@@ -235,7 +235,7 @@ def test_an_engine_without_fixed_points_says_so(heavy, engine):
 def test_some_solvers_of_newton_have_free_bodies_only(heavy, free):
     install("newton")
     for solver in ("SemiImplicit", "XPBD"):
-        (method,) = registry.method(f"newton:{solver}")
+        method = registry.method(f"newton:{solver}")
         assert solver in method.unsupported(heavy)
         assert method.unsupported(free) is None
     assert registry.method("newton:Featherstone").unsupported(heavy) is None
@@ -255,7 +255,7 @@ def test_drake_says_where_its_angles_end(setting):
 @pytest.mark.engine("sapien")
 def test_an_engine_refuses_a_scene_beyond_its_limit_of_rates():
     install("sapien")
-    (method,) = registry.method("sapien:as_installed=true")
+    method = registry.method("sapien:as_installed=true")
     assert "lagrange_top:slow=4" in method.unsupported(cv.scenes.lagrange_top())
     assert method.unsupported(cv.scenes.lagrange_top(slow=4)) is None
     assert registry.method("sapien").unsupported(cv.scenes.lagrange_top()) is None
