@@ -1,8 +1,8 @@
-"""Who is cheapest at an error.
+"""The fastest side at an error.
 
-Errors of single settings scatter: a coarse one can be right by accident. A setting is therefore credited with the largest error
-of itself and of all finer settings of its line. Where that falls from one setting to the next, errors in between cost what the
-log-log interpolation gives, which is exact for a method with an order. Nothing is extrapolated.
+Errors of single settings scatter: a coarse setting can be accurate by accident. A setting is therefore credited with the
+largest error of itself and of all finer settings of its line. The cost of an error between two settings is interpolated
+(log-log), which is exact for a method with an order. Nothing is extrapolated.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ CONFIDENCE = 0.95
 
 
 def credit(errors: Sequence[float]) -> list[float]:
-    """Return for each error, coarse to fine, the largest of it and of all that come after it."""
+    """Return for each error, coarse to fine, the largest of it and of all finer ones."""
     return list(accumulate((max(error, SMALLEST) for error in reversed(errors)), max))[::-1]
 
 
 def first_within(credited: Sequence[float], error: float) -> int | None:
-    """Return the index of the coarsest setting that is credited with an error or less; None if there is none."""
+    """Return the index of the coarsest setting that is credited with at most `error`, or None."""
     return next((i for i, each in enumerate(credited) if each <= error), None)
 
 
@@ -117,7 +117,7 @@ class Contest:
 
 
 def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]) -> tuple[Contest, ...]:
-    """Return the contest of two sides, given by rows of `costs`, at each error on each scene, also where nobody reaches it."""
+    """Return the contest of two sides, given by rows of `costs`, at each error on each scene, even if no side reaches it."""
     best = [_cheapest_of_each(side) for side in (ours, theirs)]
     return tuple(Contest(scene, error, *(side.get((scene, error)) for side in best)) for scene in scenes for error in errors)
 

@@ -87,7 +87,7 @@ class Batch:
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
-        """Principal moments (n, 3), kg m^2, and rotations R_BP (n, 3, 3), as `RigidBody` has them, body by body."""
+        """Principal moments (n, 3), kg m^2, and rotations R_BP (n, 3, 3), as in `RigidBody`."""
         n = len(self)
         if self.inertia is None:
             body = self.scene.body

@@ -22,8 +22,8 @@ from .terminal.report_folder import MANIFEST, report_folder
 def write(plan: Plan, out: Path, step: Step, resume: bool = False) -> Document:
     """Measure and write the report into the folder `out`, and return its document.
 
-    If the report is interrupted or fails, finished studies are kept (see `checkpoint`), and a note on the exception says so.
-    With `resume` they are not measured again.
+    If the report is interrupted or fails, finished studies are stored (see `checkpoint`), and a note of the exception contains
+    their file. With `resume` they are not measured again.
 
     Raises
     ------

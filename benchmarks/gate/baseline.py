@@ -20,7 +20,7 @@ from ..measures.measure import Measure
 from .results import Results, Row, Status, find_runaway
 
 PATH = Path("benchmarks") / "baseline.json"
-"""Where a project keeps its baseline, relative to its root."""
+"""Path of a project's baseline, relative to its root."""
 FORMAT, WITH_TIMES = 2, 1
 """Format of the file, and the format of baselines that also held times."""
 ORDER = Measure.ORDER.text

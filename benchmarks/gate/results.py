@@ -14,7 +14,7 @@ from conservative.files import make_folder, write_text
 from ..measures.measure import Measure, key
 
 FOLDER = Path(".benchmarks") / "gate"
-"""Where a gated run leaves its results, relative to the root of the project."""
+"""Path of the results of a gated run, relative to the root of the project."""
 FILE = "results.json"
 RUNAWAY = 1.0
 """Relative energy drift above which a run has failed, even if it ended without an error."""

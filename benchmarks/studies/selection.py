@@ -108,7 +108,7 @@ def main_methods(skip_missing: bool = False) -> tuple[Method, ...]:
 
 
 def tolerance_setting(method: Method) -> str | None:
-    """Return the name of the setting that determines the accuracy of an adaptive method; None if there is none."""
+    """Return the name of the setting that determines the accuracy of an adaptive method, or None."""
     if method.order is not None:
         return None
     return next((field.name for field in fields(method) if field.name in TOLERANCES), None)

@@ -1,4 +1,4 @@
-"""A limit on how long one run may take, so that no engine holds up a study: what goes on beyond it is ended."""
+"""A time limit for single runs, so that no engine blocks a study."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .case import Case, Failure, Success, attempt
 from .selection import Missing
 
 _timeouts: WeakKeyDictionary[Scene, dict[Method, tuple[float, Grid]]] = WeakKeyDictionary()
-"""Limit, s, and grid of the last run that was ended, by scene and method: nobody waits for the same twice."""
+"""Limit, s, and grid of the last run that was stopped, by scene and method, so that it is not tried again."""
 
 
 def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:

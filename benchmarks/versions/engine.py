@@ -77,7 +77,7 @@ NOTHING = Spread(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True)
 class Fit:
-    """An order of convergence: its slope and standard error, NaN if there is none for a reason."""
+    """An order of convergence: slope and standard error, or NaN and the reason."""
 
     slope: float = math.nan
     stderr: float = math.nan
@@ -104,7 +104,7 @@ class Observation:
     Attributes
     ----------
     scene, setting, version, label
-        Names; setting and label as the method has them.
+        Names; setting and label are those of the method.
     dt
         Step, s, of everything but the orders.
     outcome

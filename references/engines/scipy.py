@@ -1,4 +1,4 @@
-"""SciPy's `solve_ivp` on quaternion and body rates: what one writes without an engine. Source: Euler's equations."""
+"""SciPy's `solve_ivp` on quaternion and body rates, the usual approach without an engine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SMALLEST_RTOL = 2.3e-14  # 100 rounding units; SciPy raises smaller ones to thi
 
 Derivative = Callable[[float, Array], list[float]]
 Acceleration = Callable[[float, float, float, float, float], Sequence[float]]
-"""Takes time and quaternion to what the field adds to the rates' derivatives, rad/s^2, axes F."""
+"""Maps time and quaternion to the angular acceleration by the field, rad/s^2, axes F."""
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def _third_row(q0: float, q1: float, q2: float, q3: float) -> tuple[float, float
 
 
 def _unit_row(*q: float) -> tuple[float, float, float]:
-    """Return it of length one, also within a step that a loose tolerance makes too long: roots are taken of what follows."""
+    """Return the row with length 1: fields take roots of it, and loose tolerances let the quaternion drift."""
     g1, g2, g3 = _third_row(*q)
     square = sum(x * x for x in q)
     return g1 / square, g2 / square, g3 / square

@@ -1,1 +1,1 @@
-"""Environments of engines that are not installed beside us: how they are made, kept whole, and asked to integrate."""
+"""Environments of engines: installation, locks, and the method that integrates in one."""

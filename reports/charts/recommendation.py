@@ -1,4 +1,4 @@
-"""The picture of a recommendation: error to expect against step and against tolerance, and what it costs."""
+"""The chart of a recommendation: expected error over step size and over tolerance, and cost."""
 
 from __future__ import annotations
 

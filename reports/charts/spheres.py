@@ -11,7 +11,7 @@ from .style import PALETTE, colours
 from .vega_embed import Spec, as_csv
 
 TURN, TILT = np.deg2rad(35.0), np.deg2rad(25.0)
-"""Where the spheres are looked at from, rad: about the vertical axis, and above the horizontal plane."""
+"""Direction of the view of the spheres, rad: about the vertical axis, and above the horizontal plane."""
 BEHIND = 0.3
 """Opacity of points behind the sphere."""
 

@@ -1,7 +1,7 @@
 """One look for every picture: colours by family, marks by setting, sizes, and a number format.
 
-The colours are those of Okabe and Ito (2008), then of Tol's muted scheme: colour-blind readers tell them apart. A setting is
-told by its mark and dash.
+The colours are those of Okabe and Ito (2008), then of Tol's muted scheme, which colour-blind readers can distinguish. Marks and
+dashes distinguish settings.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ def _fields(spec: Any) -> Iterator[str]:
 
 
 def as_csv(rows: Sequence[dict[str, Any]], fields: Iterable[str]) -> Spec:
-    """Return rows as Vega data in CSV, which is a third as long as JSON; only what is in `fields`, to `DIGITS` digits."""
+    """Return the columns `fields` of rows as Vega data in CSV, with `DIGITS` digits: a third of the length of JSON."""
     first = rows[0] if rows else {}
     columns = [name for name in first if name in set(fields)]
     text = io.StringIO()

@@ -1,4 +1,4 @@
-"""`conservative engines`: environments of engines that are not installed beside us."""
+"""`conservative engines`: engines in environments of their own."""
 
 from __future__ import annotations
 

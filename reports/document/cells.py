@@ -45,7 +45,7 @@ def factor(ratio: float, digits: int = 2) -> str:
 
 
 def _power(text: str) -> str:
-    """Return a number with an exponent without what nobody writes: `1e-3` for `1e-03`."""
+    """Return a number with a short exponent: `1e-3` for `1e-03`."""
     mantissa, _, exponent = text.partition("e")
     return f"{mantissa}e{int(exponent)}" if exponent else text
 
@@ -69,7 +69,7 @@ def finite_or_none(value: float) -> float | None:
 
 
 def outcome_record(outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of an outcome as JSON has them."""
+    """Return the fields of an outcome for JSON."""
     residual = None if outcome.residual is None else finite_or_none(outcome.residual)
     return asdict(outcome) | {"kind": outcome.kind.value, "residual": residual}
 

@@ -21,7 +21,7 @@ def colours_in(text: str) -> frozenset[str]:
 
 
 def stand_ins(colours: Iterable[str], paper: str) -> dict[str, str]:
-    """Return what stands for each colour that has too little contrast with the paper: mixed with white, or with black."""
+    """Return a replacement for each colour with too little contrast to the paper, mixed with white or black."""
     return {colour: _readable(colour, paper) for colour in sorted(colours) if contrast(colour, paper) < LEAST}
 
 

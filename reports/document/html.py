@@ -60,7 +60,7 @@ def _datatables() -> str:
 
 
 def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
-    """Return what the script draws, with replacements for the colours that have too little contrast on a light or dark page."""
+    """Return charts with replacements for the colours that have too little contrast on a light or dark page."""
     from . import contrast
 
     found = contrast.colours_in(json.dumps(charts))

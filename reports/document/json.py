@@ -1,4 +1,4 @@
-"""JSON of what a command found."""
+"""JSON of the results of a command."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from .model import Block, Document, Emphasis, Facts, Items, Paragraph, Section, 
 
 
 def show(document: Document) -> None:
-    """Print what a document has for the terminal."""
+    """Print the part of a document for the terminal."""
     print_blocks(document.blocks if document.brief is None else document.brief)
 
 

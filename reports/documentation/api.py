@@ -31,7 +31,7 @@ MODULES = (
 )
 """What a user's program imports, as pdoc has it: packages with all that is public in them; an exclamation mark leaves out."""
 ALIASES = {"Array": "A NumPy array of float64.", "ArrayLike": "What NumPy makes an array of."}
-"""Names in signatures, in whose place pdoc would write half a line of NumPy's types, and what they stand for."""
+"""Short names in signatures for NumPy's long types."""
 
 
 def write(folder: Path) -> Path:
@@ -46,7 +46,7 @@ def write(folder: Path) -> Path:
     import pdoc
 
     tuple(pdoc.extract.load_module(name) for name in pdoc.extract.walk_specs(MODULES))
-    tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows what is imported, and these come on demand
+    tuple(getattr(conservative, name) for name in conservative.__all__)  # pdoc shows imported names only
     _name_aliases()
     pdoc.render.configure(docformat="numpy", footer_text=f"conservative {VERSION}")
     pdoc.pdoc(*MODULES, output_directory=folder)

@@ -30,7 +30,7 @@ class SceneEntry:
 
 @dataclass(frozen=True)
 class MethodEntry:
-    """A method as the list shows it. Without its engine, `available` is False and `reason` says how to get it."""
+    """A method in the list. Without its engine, `available` is False and `reason` contains the command that installs it."""
 
     name: str
     role: Role | None

@@ -47,7 +47,7 @@ def _steps(members: pd.DataFrame) -> str:
 
 
 def unsupported(table: pd.DataFrame) -> Table:
-    """Return what is unsupported or not installed: a row for each reason, with all its methods."""
+    """Return the unsupported and missing methods, one row per reason."""
     rows = with_outcome(table[~table["study"].isin(_ELSEWHERE)], *_ABSENT)
     # A reason can contain numbers that differ from step to step: the first one stands for all of a method.
     rows = rows.assign(reason=rows.groupby(["scene", "outcome", "name"])["reason"].transform("first"))

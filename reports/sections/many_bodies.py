@@ -1,4 +1,4 @@
-"""The study of throughput: what a body costs among many at an error, and ratios of each engine to ours."""
+"""The study of throughput: time per body in batches at an error, and ratios of each engine to our methods."""
 
 from __future__ import annotations
 

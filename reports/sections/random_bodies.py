@@ -111,7 +111,7 @@ def _ratio_row(found: RandomRatios) -> list[str | Cell]:
 
 
 def records(found: Iterable[RandomRatios]) -> list[dict[str, Any]]:
-    """Return the ratios for JSON: mean with its interval, worst and best; null where there is none."""
+    """Return the ratios for JSON: mean with its interval, worst and best, or null."""
     return [
         {
             "field": each.field,
@@ -247,7 +247,7 @@ def sentence(found: Iterable[RandomRatios]) -> str:
         parts.append(f"on {left} more, not both get there")
     bodies = "one random body" if len(each.both) == 1 else f"{len(each.both)} random bodies"
     times = f"{factor(max(each.mean, 1 / each.mean))} times as fast as {sides[1]} ({'; '.join(parts)})."
-    return f"On {bodies} in fields, not integrable, {sides[0]} gets to {tolerance(MIDDLE)} rad {times}"
+    return f"On {bodies} in fields, not integrable, {sides[0]} reaches {tolerance(MIDDLE)} rad {times}"
 
 
 def _cheapest(reached: pd.DataFrame, by: str) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""What a reader is told of a scene, or of random bodies, first: a sentence, a picture, and a table of classes of methods."""
+"""The summary of a scene or of random bodies: a sentence, a chart, and a table of classes of methods."""
 
 from __future__ import annotations
 
@@ -21,47 +21,47 @@ from ..rows.points import first_names, picture
 from .scene_contests import EachStep
 
 ERRORS = (1e-3, 1e-6, 1e-9)
-"""Attitude errors, rad, that classes are compared at."""
+"""Attitude errors, rad, at which classes are compared."""
 MIDDLE = ERRORS[1]
-"""Of the sentence, and of the cost that errors are compared at."""
+"""Attitude error, rad, of the sentence, and of the cost at which errors are compared."""
 FINE = tuple(10 ** (-quarter / 4) for quarter in range(4, 57))
-"""Errors, rad, that are looked for at a given cost."""
+"""Errors, rad, for the comparison at equal cost."""
 HEADER = ("class", "keeps", "error at equal cost", *(f"µs at {tolerance(error)} rad" for error in ERRORS), "where it fails")
 SCENE_HEADER = (*HEADER[:-1], "µs a sample, each step kept", HEADER[-1])
-"""Of a scene; random bodies have no study of samples at each step."""
+"""Header for a scene; random bodies have no study `each_step`."""
 TERMS = (
-    "µs of computing per simulated second at an attitude error, by the cheapest of the class; – where none was measured to get "
-    "there. Error at equal cost: that of a class at the cost at which the cheapest engine gets to "
-    f"{tolerance(MIDDLE)} rad. Kept over long runs (✓ "
-    f"within {tolerance(CONSERVED)}, ≈ within {tolerance(SMALL)}, ✗ more; relative), by the setting that keeps it best."
+    "µs of wall time per simulated second at an attitude error, for the fastest method of the class; – if the error was not "
+    "reached. Error at equal cost: the error of a class at the cost at which the fastest engine reaches "
+    f"{tolerance(MIDDLE)} rad. Conservation over long runs (✓ within {tolerance(CONSERVED)}, ≈ within {tolerance(SMALL)}, "
+    "✗ more; relative), for the setting that conserves best."
 )
-"""What the table says, in words."""
+"""Explanation of the table."""
 SAMPLE_TERMS = (
-    f"All methods share the samples that errors are read at: {SAMPLES} in the duration of a scene. A solution's steps "
-    "may be as long as they are apart: what it costs per simulated second depends on how many there are. Therefore the "
-    f"cost of a sample is told where each of the scene's own steps is one, at {tolerance(ERROR)} rad over all of them: of a "
-    "run that keeps them all, as attitude matrices and rates (for an engine with our conversion of its state, which for "
-    "heyoka is a large part, so that this says little of heyoka itself), and of one "
-    "that keeps the end alone, where a solver need not stop at each."
+    f"All methods have the same {SAMPLES} samples in the duration of a scene. An exact solution can take one step from sample "
+    "to sample, so its cost per simulated second depends on their number. The cost of a sample is therefore measured with "
+    f"every step of the scene stored, at {tolerance(ERROR)} rad over all samples: for a run that stores them all as attitude "
+    "matrices and rates (for an engine including our conversion of its state, which is a large part for heyoka), and for a run "
+    "that stores the final state only, in which a solver can take longer steps."
 )
-"""What a sample is, and what it costs."""
+"""Explanation of samples and their cost."""
 CAVEAT = (
-    "MuJoCo and Pinocchio are general engines, made for trees of many bodies. Most of the time of Pinocchio's RK4 is the loop "
-    "in Python around it, which is ours; SciPy's is in Python, too. This says what a rotation costs in them, and ranks none."
+    "MuJoCo and Pinocchio are made for trees of many bodies. Most of the time of Pinocchio's RK4 is our loop in Python around "
+    "it; SciPy's right-hand side is in Python as well. The numbers show the cost of a single rotation and do not rank these "
+    "engines."
 )
-"""What the comparison is not."""
+"""Limits of the comparison."""
 
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """What is told first.
+    """The summary of a scene or of random bodies.
 
     Attributes
     ----------
     sentence
-        The verdict, with its ratio.
+        The verdict with its ratio.
     points, shown
-        Data of the picture (see `families`), and the names of the families that are shown at first.
+        Data of the chart (see `families`), and the families that are visible at first.
     classes
         A row for each class of methods.
     """
@@ -96,7 +96,7 @@ def of_scene(
                 "; ".join(_failures(troubles[troubles["family"].isin(families)])) or "nowhere here",
             ]
         rows.append(row)
-    if each is None or each.kept.empty:  # the report has no study of samples at each step
+    if each is None or each.kept.empty:  # the report has no study `each_step`
         return Summary(sentence, data, first_names(data), Table(HEADER, rows, style=Style.CARDS))
     rows = [[*row[:-1], _sample(kind, each), row[-1]] for kind, row in zip(MethodClass, rows, strict=True)]
     return Summary(sentence, data, first_names(data), Table(SCENE_HEADER, rows, style=Style.CARDS))
@@ -113,7 +113,7 @@ def _sample(kind: MethodClass, each: EachStep) -> str:
 
 
 def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
-    """Return which side reaches `MIDDLE` faster without our solutions of integrable motions, and how fast those are."""
+    """Return a sentence on the faster side at `MIDDLE`, without our closed forms, and on the speed of the closed forms."""
     ours, engine = cheapest(of_classes(reached, MethodClass.GENERAL)), cheapest(of_classes(reached, *OF_ENGINES))
     solution = cheapest(of_classes(reached, MethodClass.SOLUTION))
     parts = [f"{scene} {'is integrable, with a closed form' if integrable else 'is not integrable: no closed form is known'}."]
@@ -122,11 +122,11 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
         first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
         sides = ["our cheapest general integrator", "the cheapest engine"][:: 1 if first is ours else -1]
         times = f"{factor(second.time / first.time)} times as fast as {sides[1]}, {second.name}."
-        parts.append(f"{sides[0].capitalize()}, {first.name}, gets to {goal} {times}")
+        parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
     elif there := ours or engine:
-        parts.append(f"Only {there.name} gets to {goal}.")
+        parts.append(f"Only {there.name} reaches {goal}.")
     else:
-        parts.append(f"Nothing measured gets to {goal}.")
+        parts.append(f"Nothing measured reaches {goal}.")
     if solution and engine:
         ratio = factor(engine.time / solution.time)
         parts.append(f"{solution.name}, which solves integrable motions only, is {ratio} times as fast as {engine.name} there.")
@@ -134,12 +134,12 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
 
 
 def microseconds(time: float) -> str:
-    """Return a time, s, in µs as people write it."""
+    """Return a time, s, as text in µs."""
     return factor(1e6 * time)
 
 
 def keeps(drifts: pd.DataFrame) -> str:
-    """Return what the best setting of some methods keeps, and what it does not, with how far that goes."""
+    """Return the invariants that the best setting of some methods conserves, and the drifts of the others."""
     rows = drifts.dropna(subset=["value"])
     if rows.empty:
         return "not measured"
@@ -151,17 +151,17 @@ def keeps(drifts: pd.DataFrame) -> str:
 
 
 def _kind(quantity: str) -> str:
-    """Return what an invariant is, in a word: momenta differ by scene."""
+    """Return the kind of an invariant in one word: the momentum differs between scenes."""
     return "momenta" if "moment" in quantity else quantity
 
 
 def _error_at(found: pd.DataFrame, budget: float) -> str:
-    """Return the smallest of `FINE` that a class reaches at a cost, s per simulated second."""
+    """Return the smallest error of `FINE` that a class reaches at a cost, s per simulated second."""
     within = found[found["time"] <= budget * (1 + 1e-9)]["error"]
     return number(float(within.min()), 1) if len(within) else DASH if math.isnan(budget) else f"over {FINE[0]:g}"
 
 
 def _failures(troubles: pd.DataFrame) -> Iterator[str]:
-    """Yield each kind of failure with the families whose settings had it; a form that does not take the scene is none."""
+    """Yield each kind of failure with its families. An unsupported formulation does not count."""
     for outcome, members in without_outcome(troubles, OutcomeKind.UNSUPPORTED).groupby("outcome", sort=False):
         yield f"{outcome} at some settings: {', '.join(members['family'].unique())}"

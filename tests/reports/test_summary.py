@@ -67,7 +67,7 @@ def test_a_sentence_compares_general_integrators_and_tells_of_a_solution_apart()
     between = 6e-6 * (8 / 6) ** 0.75 / (2e-6 * 2**0.75)  # three of four decades from 1e-3 to 1e-7
     sentence = told(OURS, SOLVER, SOLUTION).sentence
     assert sentence.startswith(
-        "made_up is integrable, with a closed form. Our cheapest general integrator, gauss, gets to 1e-6 rad "
+        "made_up is integrable, with a closed form. Our cheapest general integrator, gauss, reaches 1e-6 rad "
     )
     assert (
         f"{between:.1f} times as fast as the cheapest engine, scipy. lame, which solves integrable motions only, is" in sentence
@@ -79,11 +79,11 @@ def test_what_is_lost_is_said_of_the_engine():
     slow = [*point("gauss", "ours", 1e-3, 2e-5), *point("gauss", "ours", 1e-7, 4e-5, 0.01)]
     sentence = told(slow, SOLVER, integrable=False).sentence
     assert sentence.startswith(
-        "made_up is not integrable: no closed form is known. The cheapest engine, scipy, gets to 1e-6 rad 4.5 times as fast"
+        "made_up is not integrable: no closed form is known. The cheapest engine, scipy, reaches 1e-6 rad 4.5 times as fast"
     )
 
 
-@pytest.mark.parametrize(("lines", "words"), [((OURS,), "Only gauss gets to"), ((ENGINE,), "Nothing measured gets to 1e-6")])
+@pytest.mark.parametrize(("lines", "words"), [((OURS,), "Only gauss reaches"), ((ENGINE,), "Nothing measured reaches 1e-6")])
 def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
     assert words in told(*lines).sentence
 
