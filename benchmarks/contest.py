@@ -88,11 +88,11 @@ class Cheapest:
     name: str
 
 
-def cheapest(found: pd.DataFrame) -> Cheapest | None:
+def cheapest(reached: pd.DataFrame) -> Cheapest | None:
     """Return the cheapest of some rows of `costs`, which are at one error; None if there are none."""
-    if found.empty:
+    if reached.empty:
         return None
-    first = found.iloc[int(found["time"].argmin())]
+    first = reached.iloc[int(reached["time"].argmin())]
     return Cheapest(float(first["time"]), str(first["name"]))
 
 
@@ -122,8 +122,8 @@ def contests(ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], er
     return tuple(Contest(scene, error, *(side.get((scene, error)) for side in best)) for scene in scenes for error in errors)
 
 
-def _cheapest_of_each(found: pd.DataFrame) -> dict[tuple[str, float], Cheapest]:
-    rows = found.loc[found.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(found) else found
+def _cheapest_of_each(reached: pd.DataFrame) -> dict[tuple[str, float], Cheapest]:
+    rows = reached.loc[reached.groupby(["scene", "error"], sort=False)["time"].idxmin()] if len(reached) else reached
     keys = zip(rows["scene"], rows["error"], strict=True)
     return dict(zip(keys, map(Cheapest, rows["time"], rows["name"]), strict=True))
 

@@ -140,11 +140,11 @@ def read(path: Path, also_with_times: bool = False) -> Baseline:
         raise NoBaseline("baseline", f"no baseline: {path} ({error.strerror})", allowed) from None
     except ValueError as error:
         raise NoBaseline("baseline", f"truncated or damaged: {path} ({error})", allowed) from None
-    found = content.get("format") if isinstance(content, dict) else None
-    if found == WITH_TIMES and not also_with_times:
+    version = content.get("format") if isinstance(content, dict) else None
+    if version == WITH_TIMES and not also_with_times:
         again = f'format {FORMAT}; run the benchmarks, then `conservative gate --update "REASON"`'
         raise NoBaseline("baseline", f"format {WITH_TIMES} of an earlier version, with times: {path}", again)
-    if found not in (FORMAT, WITH_TIMES):
+    if version not in (FORMAT, WITH_TIMES):
         raise NoBaseline("baseline", f"another format: {path}", f"{allowed}, of format {FORMAT}")
     if content.pop("sha256", None) != _digest(content):
         raise NoBaseline("baseline", f"edited by hand: {path}, whose content does not have its own sha256", allowed)

@@ -86,10 +86,10 @@ class Gate:
         NoBaseline
             There is nothing to compare with.
         """
-        found = Results(machine().title, self.rows, commit(self.root))
-        results.write(found, self.folder / results.FILE)
+        run = Results(machine().title, self.rows, commit(self.root))
+        results.write(run, self.folder / results.FILE)
         try:
-            self.verdict = compare.judge(baseline.read(self.baseline), found)
+            self.verdict = compare.judge(baseline.read(self.baseline), run)
         except baseline.NoBaseline:
             self.without_baseline = True
             raise

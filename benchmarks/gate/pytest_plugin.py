@@ -147,8 +147,8 @@ def table_lines(benchmarks: Sequence[Mapping[str, Any]]) -> list[str]:
         values = [row["min"], row["median"], *(row["extra_info"].get(name) for name in names)]
         table.append([row["param"] or row["name"], *("" if value is None else f"{value:.3g}" for value in values)])
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    found = []
+    lines = []
     for first, *rest in table:
         numbers = (cell.rjust(width) for cell, width in zip(rest, widths[1:], strict=True))
-        found.append("  ".join([first.ljust(widths[0]), *numbers]).rstrip())
-    return found
+        lines.append("  ".join([first.ljust(widths[0]), *numbers]).rstrip())
+    return lines

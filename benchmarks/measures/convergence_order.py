@@ -180,7 +180,7 @@ def fit_line(x: Array, y: Array) -> FittedLine:
     """
     from scipy.stats import linregress  # here, as importing it takes as long as everything else of a command
 
-    found = linregress(x, y)
-    residuals = (y - y.mean()) - found.slope * (x - x.mean())
+    fitted = linregress(x, y)
+    residuals = (y - y.mean()) - fitted.slope * (x - x.mean())
     scatter = float(np.sqrt(np.sum(residuals**2) / (len(x) - 2)))
-    return FittedLine(float(found.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)
+    return FittedLine(float(fitted.slope), scatter / float(np.linalg.norm(x - x.mean())), scatter)

@@ -69,7 +69,7 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     R_ref, w_ref = truth.R_WB[:n], truth.w_WB_B[:n]
     attitude = angle_between(R_ref, trajectory.R_WB)
     rates = np.linalg.norm(trajectory.w_WB_B - w_ref, axis=1) / (np.linalg.norm(truth.w_WB_B, axis=1).max() or 1.0)
-    found = [
+    measured = [
         Value(Measure.ATTITUDE_MAX, float(attitude.max())),
         Value(Measure.ATTITUDE_FINAL, float(attitude[-1])),
         Value(Measure.ATTITUDE_RMS, float(np.sqrt(np.mean(attitude**2)))),
@@ -79,30 +79,30 @@ def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:
     potential = trajectory.scene.potential
     if isinstance(potential, UniformGravity):
         position = np.linalg.norm((trajectory.R_WB - R_ref) @ potential.com_B, axis=1)
-        found += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
-    return found + measure_drifts(trajectory)
+        measured += [Value(Measure.POSITION_MAX, float(position.max())), Value(Measure.POSITION_FINAL, float(position[-1]))]
+    return measured + measure_drifts(trajectory)
 
 
 def measure_drifts(trajectory: Trajectory) -> list[Value]:
     """Return the measures that need no reference solution: drift of each invariant, and orthonormality."""
-    found: list[Value] = []
+    drifts: list[Value] = []
     for invariant in trajectory.scene.invariants:
         relative = trajectory.drift(invariant)
         size = sizes(relative)
         slope = secular_slope(trajectory.t, relative)
-        found += [
+        drifts += [
             Value(Measure.DRIFT_MAX, float(size.max()), invariant.name),
             Value(Measure.DRIFT_FINAL, float(size[-1]), invariant.name),
             Value(Measure.DRIFT_SLOPE, slope.value, invariant.name),
             Value(Measure.DRIFT_SLOPE_STDERR, slope.stderr, invariant.name),
         ]
-    return [*found, Value(Measure.ORTHONORMALITY, float(orthonormality(trajectory.R_WB).max()))]
+    return [*drifts, Value(Measure.ORTHONORMALITY, float(orthonormality(trajectory.R_WB).max()))]
 
 
 def blanks(scene: Scene) -> list[Value]:
     """Return the measures of `measure_errors` for a scene without values, for a run that failed."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
-    return [found.blank for found in measure_errors(start, start)]
+    return [each.blank for each in measure_errors(start, start)]
 
 
 def secular_slope(t: Array, drift: Array) -> Slope:

@@ -153,8 +153,8 @@ def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
         reason = case.method.unsupported(case.scene)
         if reason:
             return fail_unsupported(reason)
-        run, found, cost = prepare_and_run(lambda: case.method.prepare(case.scene, case.grid))
-        done = Success(run, case.method.check(case.scene, case.grid, found), cost)
+        run, result, cost = prepare_and_run(lambda: case.method.prepare(case.scene, case.grid))
+        done = Success(run, case.method.check(case.scene, case.grid, result), cost)
     except Exception as error:
         return Failure(outcome_of_error(case.method, error, skip_missing))
     return done if done.trajectory.ok else Failure(done.trajectory.outcome)

@@ -59,18 +59,18 @@ def no_order(case: Case, skip_missing: bool) -> Failure | None:
 def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement]:
     """Yield the errors of one method at all step sizes, then the observed orders."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-    found: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
+    errors_by_step: dict[Measure, dict[float, float]] = {measure: {} for measure in ERRORS}
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
     for case, outcome in attempt_each(study, cases):
         if isinstance(outcome, Failure):
             yield from case.blanks(blanks(*ERRORS), outcome.outcome)
             continue
         for value in errors.measure_errors(outcome.trajectory, truth):
-            if value.measure in found:
-                found[value.measure][case.grid.dt] = value.value
+            if value.measure in errors_by_step:
+                errors_by_step[value.measure][case.grid.dt] = value.value
                 yield case.row(value)
     for measure, names in ORDERS.items():
-        order = observed_order(list(found[measure]), list(found[measure].values()))
+        order = observed_order(list(errors_by_step[measure]), list(errors_by_step[measure].values()))
         yield from order_rows(cases[0], names, order, order.reason)
 
 

@@ -48,10 +48,10 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
         An engine is not installed, and `skip_missing` is False.
     """
     every = [each for name in names for each in (list_installed() if name == ALL else (name,))]
-    found = [method for name in dict.fromkeys(every) for method in _settings(name, skip_missing)]
-    if not found:
+    methods = [method for name in dict.fromkeys(every) for method in _settings(name, skip_missing)]
+    if not methods:
         raise BadInput("engines", repr(ALL), "engines that are installed: conservative engines install NAME")
-    return tuple({method.label: method for method in reversed(found)}.values())[::-1]
+    return tuple({method.label: method for method in reversed(methods)}.values())[::-1]
 
 
 def list_installed() -> tuple[str, ...]:
@@ -102,8 +102,8 @@ def _family(engine: str, version: str) -> type[Method]:
         raise BadInput("engines", repr(engine), f"{ALL!r}, or {nearest(engine, known)}")
     if engine in beside_us and not version:
         return registry.list_families()[engine]
-    found: Any = registry.engine(engine)
-    return found.at_version(version) if version else found
+    engine_class: Any = registry.engine(engine)
+    return engine_class.at_version(version) if version else engine_class
 
 
 def is_as_installed(method: Method) -> bool:

@@ -98,9 +98,9 @@ def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[
         return case.blanks([*errors.blanks(case.scene), *blanks(*counted)], outcome.outcome)
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
         values = errors.measure_errors(outcome.trajectory, truth)
-        found = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
+        rows = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
     turns = (count_turns_over(outcome.trajectory), count_turns_over(truth)) if counted else ()
-    return found + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
+    return rows + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
 
 
 def direction(value: Value, trajectory: Trajectory) -> str:
@@ -127,5 +127,5 @@ def momentum_along_spin(scene: Scene, w_WB_B: Array) -> Array:
     """Return the momentum (n,), kg m^2/s, along the principal axis that has most at the start, for rates (n, 3), rad/s."""
     along = scene.body.momentum(w_WB_B) @ scene.body.R_BP
     start = scene.body.momentum(scene.w_WB_B0) @ scene.body.R_BP
-    found: Array = along[:, int(np.argmax(np.abs(start)))]
-    return found
+    component: Array = along[:, int(np.argmax(np.abs(start)))]
+    return component

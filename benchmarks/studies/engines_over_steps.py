@@ -54,13 +54,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     methods = one_of_each_series(study)
     tell = study.count(progress, len(methods) + 1)
     for scene in study.scenes:
-        found: list[EnginePoint] = []
+        points: list[EnginePoint] = []
         for method in methods:
             tell(f"{scene.name}: errors of {method.name}")
             mine = yield from converge(study, scene, method)
             yield from order_of(study, scene, method, mine)
-            found += mine
-        good = [point for point in found if point.error <= TIMED]
+            points += mine
+        good = [point for point in points if point.error <= TIMED]
         tell(f"{scene.name}: timing {len(good)} runs")
         yield from time_rows(study, good)
 
@@ -76,10 +76,10 @@ def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
 def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[EnginePoint]]:
     """Yield the errors of one method; return its points."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-    found: list[EnginePoint] = []
+    points_so_far: list[EnginePoint] = []
     cases = cases_of(study, scene, method)
     tried: list[Case] = []
-    for case, outcome in attempt_each(study, limit_preparation(cases, found)):
+    for case, outcome in attempt_each(study, limit_preparation(cases, points_so_far)):
         tried.append(case)
         if isinstance(outcome, Failure):
             yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
@@ -87,40 +87,40 @@ def converge(study: Study, scene: Scene, method: Method) -> Generator[Measuremen
         with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
             values = errors.measure_errors(outcome.trajectory, truth)
         error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
-        found.append(EnginePoint(case, outcome, error.value))
+        points_so_far.append(EnginePoint(case, outcome, error.value))
         yield case.row(error)
     yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), SKIPPED) for case in cases if case not in tried)
-    return found
+    return points_so_far
 
 
-def limit_preparation(cases: list[Case], found: list[EnginePoint]) -> Iterator[Case]:
+def limit_preparation(cases: list[Case], points_so_far: list[EnginePoint]) -> Iterator[Case]:
     """Yield the first case, then the others within the time limit; every second one if preparing the first was slow."""
     yield cases[0]
-    is_slow = bool(found) and found[0].done.cost.prepare > SLOW_PREPARATION
+    is_slow = bool(points_so_far) and points_so_far[0].done.cost.prepare > SLOW_PREPARATION
     for case in cases[2::2] if is_slow else cases[1:]:
-        if sum(point.done.cost.prepare for point in found) > PREPARATIONS:
+        if sum(point.done.cost.prepare for point in points_so_far) > PREPARATIONS:
             return
         yield case
 
 
-def order_of(study: Study, scene: Scene, method: Method, found: list[EnginePoint]) -> list[Measurement]:
+def order_of(study: Study, scene: Scene, method: Method, points: list[EnginePoint]) -> list[Measurement]:
     """Return the observed order and its standard error, or the reason why there is no order."""
     case, names = Case(study.name, scene, method, step_ladder.samples(scene, method)), (Measure.ORDER, Measure.ORDER_STDERR)
     if failed := no_order(case, study.skip_missing):
         return [drop_step(row) for row in case.blanks(blanks(*names), failed.outcome)]
-    steps, values = [point.case.grid.dt for point in found], [point.error for point in found]
+    steps, values = [point.case.grid.dt for point in points], [point.error for point in points]
     order = observed_order(steps, values)
     return order_rows(case, names, order, WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason)
 
 
-def time_rows(study: Study, found: list[EnginePoint]) -> Iterator[Measurement]:
+def time_rows(study: Study, points: list[EnginePoint]) -> Iterator[Measurement]:
     """Yield the times of all points of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
-    quick = {point: point.done.run for point in found if point.done.cost.first_call <= study.longest_run}
+    quick = {point: point.done.run for point in points if point.done.cost.first_call <= study.longest_run}
     with time_limit(study.hang_limit):
         timings = time_interleaved(quick, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
     for point, timing in timings.items():
         yield time_row(point, timing.minimum, timing.outcome, str(timing))
-    for point in found:
+    for point in points:
         if point not in quick:
             yield time_row(point, point.done.cost.first_call, OK, "a single run")
 

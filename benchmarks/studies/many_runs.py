@@ -106,8 +106,8 @@ class _Loop:
         n, samples = len(self._runs), self._samples
         R_WB, w_WB_B = np.full((n, samples, 3, 3), np.nan), np.full((n, samples, 3), np.nan)
         for i, run in enumerate(self._runs):
-            found = run()
-            R_WB[i, : len(found)], w_WB_B[i, : len(found)] = found.R_WB, found.w_WB_B
+            trajectory = run()
+            R_WB[i, : len(trajectory)], w_WB_B[i, : len(trajectory)] = trajectory.R_WB, trajectory.w_WB_B
         return Block(R_WB, w_WB_B, np.isfinite(R_WB).all(axis=(1, 2, 3)))
 
     def wall_time(self, calls: int) -> float:
@@ -154,5 +154,5 @@ def families(methods: tuple[Method, ...], quick: bool = False) -> Iterator[Metho
     If `quick`, each family has one setting: one without truncation error if there is one, otherwise the first.
     """
     for family in dict.fromkeys(type(method) for method in methods):
-        found = settings(next(method for method in methods if type(method) is family))
-        yield from sorted(found, key=takes_exact_steps, reverse=True)[:1] if quick else found
+        offered = settings(next(method for method in methods if type(method) is family))
+        yield from sorted(offered, key=takes_exact_steps, reverse=True)[:1] if quick else offered

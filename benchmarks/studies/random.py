@@ -107,11 +107,11 @@ def settings(method: Method) -> tuple[Method, ...]:
 
     For our methods these are the candidates of the automatic choice and those with a tolerance, for engines all settings.
     """
-    found = method.settings_for("variants")
+    variants = method.settings_for("variants")
     if method.role == Role.OURS:
         approximate = method.card.rank is not None and not method.card.exact
-        found = (*method.settings_for("candidates"), *filter(tolerance_setting, found)) if approximate else ()
-    return tuple(each for each in found if (each.order or ORDER) >= ORDER)
+        variants = (*method.settings_for("candidates"), *filter(tolerance_setting, variants)) if approximate else ()
+    return tuple(each for each in variants if (each.order or ORDER) >= ORDER)
 
 
 def select(methods: Iterable[Method]) -> tuple[Method, ...]:
@@ -153,15 +153,15 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         tell(f"{scene.name}: truth")
         coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
         truth = study.truth(scene, coarsest).trajectory
-        found: list[Line] = []
+        lines: list[Line] = []
         for method in methods:
             tell(f"{scene.name}: errors of {method.name}")
             line = cases(study.quick, Case(study.name, scene, method, coarsest, drawn))
-            found.append((yield from measure_line(study, line, truth)))
-        chosen = worth_timing(found)
+            lines.append((yield from measure_line(study, line, truth)))
+        chosen = worth_timing(lines)
         tell(f"{scene.name}: timing {len(chosen)} settings")
         yield from time_rows(study, chosen)
-        yield from (point.case.row(TIME, UNTIMED) for line in found for point in line if point not in chosen)
+        yield from (point.case.row(TIME, UNTIMED) for line in lines for point in line if point not in chosen)
 
 
 def cases(quick: bool, case: Case) -> list[Case]:

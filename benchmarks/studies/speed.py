@@ -69,10 +69,10 @@ def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Exten
     while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
         times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
         longer = replace(bare, grid=extend(bare.grid, times))
-        found = attempt_here(limit, longer)
-        if not isinstance(found, Success):
+        outcome = attempt_here(limit, longer)
+        if not isinstance(outcome, Success):
             break
-        case, done = longer, found
+        case, done = longer, outcome
     return case, done
 
 

@@ -172,16 +172,16 @@ def find_kind(study: ThroughputStudy, name: str) -> Generator[Measurement, None,
     bodies = draw(name, max(*study.sizes, study.bodies), study.seed)
     grid, few = Grid(DURATION / SAMPLES, SAMPLES), bodies[: study.bodies]
     methods = [Heyoka(SMALLEST_TOL, frame) for frame in ("base_vectors", "body")]
-    found = [_attitudes(attempt_many(Way(method, together=False), few, grid, study.hang_limit)) for method in methods]
-    kind = Kind(study, bodies, found[0])
-    agreement = float(angle_between(*found).max(axis=1).max())
+    attitudes = [_attitudes(attempt_many(Way(method, together=False), few, grid, study.hang_limit)) for method in methods]
+    kind = Kind(study, bodies, attitudes[0])
+    agreement = float(angle_between(*attitudes).max(axis=1).max())
     yield _case(kind, methods[0], grid).row(Value(Measure.AGREEMENT, agreement), detail=methods[1].label)
     return kind
 
 
-def _attitudes(found: ManyDone | Outcome) -> Array:
-    assert isinstance(found, ManyDone), found
-    return found.block.R_WB
+def _attitudes(done: ManyDone | Outcome) -> Array:
+    assert isinstance(done, ManyDone), done
+    return done.block.R_WB
 
 
 def _case(kind: Kind, method: Method, grid: Grid) -> Case:
@@ -209,28 +209,28 @@ def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[Ba
     for case in list_cases(kind, way.method):
         if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
             break
-        found = attempt_many(
+        done = attempt_many(
             replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit, kind.study.skip_missing
         )
-        if isinstance(found, Outcome):
-            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), found, bodies=len(kind.few), way=way.text)
+        if isinstance(done, Outcome):
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done, bodies=len(kind.few), way=way.text)
             if way.method.unsupported(kind.bodies.scene):
                 break
             continue
-        errors = read_errors(found, kind.truth)
+        errors = read_errors(done, kind.truth)
         n = len(kind.few)
-        line.append(BatchSetting(way, case, errors, found.spent / n, found.prepare / n))
+        line.append(BatchSetting(way, case, errors, done.spent / n, done.prepare / n))
         detail = EXACT if takes_exact_steps(case.method) else ""
         for statistic, error in errors.items():
             yield case.row(Value(Measure.ATTITUDE_MAX, error, statistic), detail=detail, bodies=n, way=way.text)
     return line
 
 
-def read_errors(found: ManyDone, truth: Array) -> dict[str, float]:
+def read_errors(done: ManyDone, truth: Array) -> dict[str, float]:
     """Return the median and the 95th percentile, rad, of the bodies' errors; a failed body has an error of pi."""
     with np.errstate(all="ignore"):  # too long a step can overflow
-        off = angle_between(truth, found.block.R_WB).max(axis=1)
-    off = np.where(found.block.finished & np.isfinite(off), off, math.pi)
+        off = angle_between(truth, done.block.R_WB).max(axis=1)
+    off = np.where(done.block.finished & np.isfinite(off), off, math.pi)
     return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 
 
@@ -255,12 +255,12 @@ def time_rows(kind: Kind, points: list[BatchSetting], size: int) -> Generator[Me
             yield point.case.row(Value(Measure.TIME, math.nan), reason, bodies=size, way=point.way.text)
             continue
         way = replace(point.way, method=point.case.method)
-        found = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
-        if isinstance(found, Outcome):
-            yield point.case.row(Value(Measure.TIME, math.nan), found, bodies=size, way=point.way.text)
+        attempted = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
+        if isinstance(attempted, Outcome):
+            yield point.case.row(Value(Measure.TIME, math.nan), attempted, bodies=size, way=point.way.text)
         else:
-            ready[point] = found
-    runs = {point: found.run for point, found in ready.items()}
+            ready[point] = attempted
+    runs = {point: attempted.run for point, attempted in ready.items()}
     timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=study.timing_budget)
     done = []
     for point, timing in timings.items():

@@ -66,8 +66,8 @@ def error_rows(case: Case, outcome: Success | Failure, truth: Trajectory) -> lis
     """Return the errors of one point, or all its rows without values if it failed."""
     if isinstance(outcome, Failure):
         return case.blanks(blanks(*ERRORS, Measure.TIME), outcome.outcome)
-    found = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
-    return [case.row(found[measure]) for measure in ERRORS]
+    by_measure = {value.measure: value for value in errors.measure_errors(outcome.trajectory, truth)}
+    return [case.row(by_measure[measure]) for measure in ERRORS]
 
 
 def time_rows(study: Study, cases: list[Case], kept: Mapping[Measure, Extend]) -> Iterator[Measurement]:

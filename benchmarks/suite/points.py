@@ -112,8 +112,8 @@ def _hash(content: object) -> str:
 
 def points() -> Iterator[Point]:
     """Yield the points: the settings of `Card.suite` of every registered method on every scene of the suite."""
-    found = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
-    methods = [method for method in found if method.role != Role.TRUTH]
+    every = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
+    methods = [method for method in every if method.role != Role.TRUTH]
     truths = Truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
@@ -122,8 +122,8 @@ def measure(point: Point) -> dict[str, GatedValue]:
     """Return errors, drifts, work and, in the paper's scenes, the observed order; all of a run that reaches its end."""
     exact = point.truths(point.scene, point.grid).trajectory
     runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
-    found = [_measure_run(point.method.solve(scene, point.grid), exact) for scene in runs]
-    values = {name: GatedValue(found[0][name], _range([each[name] for each in found])) for name in found[0]}
+    measured = [_measure_run(point.method.solve(scene, point.grid), exact) for scene in runs]
+    values = {name: GatedValue(measured[0][name], _range([each[name] for each in measured])) for name in measured[0]}
     return values | (fit_order(point) if point.scene.name in PAPER else {})
 
 
@@ -136,8 +136,8 @@ def nudge(scene: Scene, units: int) -> Scene:
 def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
     """Return errors and drifts at their largest, and the method's counters."""
     counters = {name: float(count) for name, count in vars(trajectory.counters).items() if count is not None}
-    found = errors.measure_errors(trajectory, exact)
-    return {value.key: value.value for value in found if value.measure in LARGEST} | counters
+    measured = errors.measure_errors(trajectory, exact)
+    return {value.key: value.value for value in measured if value.measure in LARGEST} | counters
 
 
 def fit_order(point: Point) -> dict[str, GatedValue]:
@@ -147,8 +147,10 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
         return {}
     exact = point.truths(scene, step_ladder.samples(scene, method)).trajectory
     grids = step_ladder.steps(scene, method)[: STEPS if method.order < step_ladder.HIGH_ORDER else None]
-    found = [attempt(Case("order", scene, method, grid)) for grid in grids]
-    sizes = [errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in found]
+    attempts = [attempt(Case("order", scene, method, grid)) for grid in grids]
+    sizes = [
+        errors.measure_errors(each.trajectory, exact)[0].value if isinstance(each, Success) else np.nan for each in attempts
+    ]
     order = observed_order([grid.dt for grid in grids], sizes)
     return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
 

@@ -22,17 +22,17 @@ def test_speed(benchmark: Any, point: Point) -> None:
         pytest.skip(reason)
     benchmark.group = scene.name
     grid = keep_end(point.grid)
-    run, found, cost = prepare_and_run(lambda: method.prepare(scene, grid))
-    last = method.check(scene, grid, found)
+    run, result, cost = prepare_and_run(lambda: method.prepare(scene, grid))
+    last = method.check(scene, grid, result)
     if method.role == Role.ENGINE and not last.ok:
         pytest.xfail(f"{method.label}: {last.outcome}")  # a finding, which the studies report, and no time to compare
     assert last.ok, last.outcome
     values = points.measure(point)
-    runaway = find_runaway({name: found.value for name, found in values.items()})
+    runaway = find_runaway({name: each.value for name, each in values.items()})
     if method.role == Role.ENGINE and runaway:
         pytest.xfail(f"{method.label}: {runaway}")
     assert not runaway
     benchmark.extra_info.update(point.labels, order=method.order, prepare_s=cost.prepare, first_call_s=cost.first_call)
-    benchmark.extra_info.update({name: found.value for name, found in values.items()})
-    benchmark.extra_info["spreads"] = {name: found.spread for name, found in values.items()}
+    benchmark.extra_info.update({name: each.value for name, each in values.items()})
+    benchmark.extra_info["spreads"] = {name: each.spread for name, each in values.items()}
     benchmark(run)

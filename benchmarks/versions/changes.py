@@ -72,12 +72,12 @@ def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_t
         return (Change(Aspect.OUTCOME, was.outcome, now.outcome, lost=was.outcome.ok),)
     if not was.outcome.ok:
         return ()
-    found = [*_orders(was, now), *_drifts(was, now)]
+    changes = [*_orders(was, now), *_drifts(was, now)]
     if max(was.error.value, now.error.value) > ROUND_OFF and direction(was.error, now.error):
-        found.append(Change(Aspect.ERROR, was.error, now.error))
+        changes.append(Change(Aspect.ERROR, was.error, now.error))
     if differ(was_times, now_times):
-        found.append(Change(Aspect.TIME, Spread.of(was_times), ratio(was_times, now_times)))
-    return tuple(found)
+        changes.append(Change(Aspect.TIME, Spread.of(was_times), ratio(was_times, now_times)))
+    return tuple(changes)
 
 
 def _orders(was: Observation, now: Observation) -> Iterator[Change]:

@@ -73,12 +73,12 @@ def compare(
     """
     lines: list[Line[Result, Times]] = []
     for number, scene in enumerate(scenes):
-        found: list[dict[str, Result]] = []
+        by_version: list[dict[str, Result]] = []
         for place, side in enumerate(sides):
             tell(TIMING * (number + place / len(sides)) / len(scenes), f"{scene}: {side.version.name}")
-            found.append(dict(side.measure(scene)))
-        settings = dict.fromkeys(setting for results in found for setting in results)
-        lines += [Line(scene, setting, tuple(results.get(setting) for results in found)) for setting in settings]
+            by_version.append(dict(side.measure(scene)))
+        settings = dict.fromkeys(setting for results in by_version for setting in results)
+        lines += [Line(scene, setting, tuple(results.get(setting) for results in by_version)) for setting in settings]
     tell(TIMING, f"timing {len(lines)} rows")
     times = finish(lines)
     timed = (replace(line, times=times.get((line.scene, line.setting))) for line in lines)

@@ -138,14 +138,14 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     counts = [n + more for more in MORE_STEPS]
     cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
     setting, dt = method.setting(), cases[0].grid.dt
-    found = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
+    observation = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
     first = attempt_within(study.hang_limit, cases[0], study.skip_missing)
     if isinstance(first, Failure):
-        return replace(found, outcome=first.outcome)
+        return replace(observation, outcome=first.outcome)
     done = [first, *(attempt_within(study.hang_limit, case, study.skip_missing) for case in cases[1:])]
     runs = [each.trajectory for each in done if isinstance(each, Success)]
     return replace(
-        found,
+        observation,
         points=tuple(_points(study, scene, method)),
         error=Spread.of(_largest_error(study, run, case.grid) for run, case in zip(runs, cases, strict=False)),
         drifts={invariant.name: Spread.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
@@ -172,8 +172,8 @@ def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
     for case, done in convergence.attempt_each(study, cases):
         if isinstance(done, Success):
-            found = {each.measure: each.value for each in measure_errors(done.trajectory, truth)}
-            yield StepError(case.grid.dt, found[Measure.ATTITUDE_MAX], found[Measure.RATES_MAX])
+            by_measure = {each.measure: each.value for each in measure_errors(done.trajectory, truth)}
+            yield StepError(case.grid.dt, by_measure[Measure.ATTITUDE_MAX], by_measure[Measure.RATES_MAX])
         else:
             yield StepError(case.grid.dt, math.nan, math.nan, reached=done.outcome.kind not in NO_TIME)
 

@@ -109,26 +109,26 @@ def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes
     """Return the times of two versions by scene and method; rows that are slower beyond doubt are measured again."""
     clock = Clock(base, head)
     first = settle(clock, rows, processes)
-    found = {row.key: ratio_of(first[row.key]) for row in rows}
-    slower = [row for row in rows if found[row.key].slower]
+    ratios = {row.key: ratio_of(first[row.key]) for row in rows}
+    slower = [row for row in rows if ratios[row.key].slower]
     again = settle(clock, slower, processes)
     repeated = {row.key: ratio_of(again[row.key]) for row in slower}
     every = {row.key: [*first[row.key], *again.get(row.key, [])] for row in rows}
-    rows_found = {}
+    time_rows = {}
     for key, times in every.items():
         was, now = np.min(times, axis=0) if times else (math.nan, math.nan)
-        rows_found[key] = TimeRow(float(was), float(now), found[key], repeated.get(key), clock.failures.get(key, ""))
-    return rows_found
+        time_rows[key] = TimeRow(float(was), float(now), ratios[key], repeated.get(key), clock.failures.get(key, ""))
+    return time_rows
 
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
     """Return the times of rows from so many processes, and from more for rows whose interval contains the limit."""
-    found: Times = {row.key: [] for row in rows}
+    times_by_key: Times = {row.key: [] for row in rows}
     for _ in range(MOST_TURNS):
         for key, times in clock.measure(rows, processes).items():
-            found[key] += times
-        rows = [row for row in rows if ratio_of(found[row.key]).open]
-    return found
+            times_by_key[key] += times
+        rows = [row for row in rows if ratio_of(times_by_key[row.key]).open]
+    return times_by_key
 
 
 class Clock:
@@ -141,7 +141,7 @@ class Clock:
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
         """Return the times of rows from so many processes."""
-        found: Times = {row.key: [] for row in rows}
+        times_by_key: Times = {row.key: [] for row in rows}
         for turn in range(processes if rows else 0):
             for side in self._sides:
                 side.close()
@@ -149,10 +149,10 @@ class Clock:
                 if row.key in self.failures:
                     continue
                 try:
-                    found[row.key].append(self._shortest(row, turn))
+                    times_by_key[row.key].append(self._shortest(row, turn))
                 except IntegrationFailed as failure:
                     self.failures[row.key] = str(failure.outcome)
-        return found
+        return times_by_key
 
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
@@ -199,7 +199,7 @@ def ratio_of(times: Sequence[tuple[float, float]], seed: int = 0) -> Ratio:
     if len(times) < 2:
         return Ratio(math.nan, math.nan, math.nan, len(times))
     was, now = np.log(np.array(times)).T
-    found = bootstrap(
+    interval = bootstrap(
         (was, now),
         _difference,
         n_resamples=RESAMPLES,
@@ -210,7 +210,7 @@ def ratio_of(times: Sequence[tuple[float, float]], seed: int = 0) -> Ratio:
         rng=seed,
     ).confidence_interval
     value = float(_difference(was, now))
-    return Ratio(math.exp(value), math.exp(float(found.low)), math.exp(float(found.high)), len(times))
+    return Ratio(math.exp(value), math.exp(float(interval.low)), math.exp(float(interval.high)), len(times))
 
 
 def _difference(was: Array, now: Array, axis: int = -1) -> Array:

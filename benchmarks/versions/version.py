@@ -75,27 +75,27 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     if name and path.is_dir():
         wheel = keep_wheel("", build_project(path, source))
         return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
-    found = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
-    if not found:
+    commit_hash = git(project, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
+    if not commit_hash:
         raise BadInput("against", repr(name), _ALLOWED)
-    return Version(name, found, environment_of(_wheel_of_commit(found, project, source), requirements, source))
+    return Version(name, commit_hash, environment_of(_wheel_of_commit(commit_hash, project, source), requirements, source))
 
 
-def _wheel_of_commit(found: str, project: Path, source: Source) -> Path:
+def _wheel_of_commit(commit_hash: str, project: Path, source: Source) -> Path:
     """Return the wheel of a commit: a kept one, or a new one built from the files of the commit."""
     inside, top = git(project, "rev-parse", "--show-prefix"), git(project, "rev-parse", "--show-toplevel")
 
     def make_wheel(folder: Path) -> Path:
-        sources, archive = folder / "sources", ["git", "-C", top, "archive", "--format=tar", found]
+        sources, archive = folder / "sources", ["git", "-C", top, "archive", "--format=tar", commit_hash]
         try:
             done = subprocess.run(archive, capture_output=True, check=True, timeout=600)
         except (OSError, subprocess.SubprocessError) as error:
-            raise BadInput("against", f"{found}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
+            raise BadInput("against", f"{commit_hash}, which git cannot take out ({type(error).__name__})", _ALLOWED) from None
         with tarfile.open(fileobj=io.BytesIO(done.stdout)) as files:
             if hasattr(tarfile, "data_filter"):  # not before 3.11.4
                 files.extraction_filter = tarfile.data_filter
             files.extractall(sources)
         # setuptools-scm, and tools built on it, would look for a version in a repository
-        return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{found[:12]}")(folder)
+        return build_project(sources / inside, source, SETUPTOOLS_SCM_PRETEND_VERSION=f"0+g{commit_hash[:12]}")(folder)
 
-    return keep_wheel(f"{found}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
+    return keep_wheel(f"{commit_hash}{'-' + hashlib.sha256(inside.encode()).hexdigest()[:8] if inside else ''}", make_wheel)
