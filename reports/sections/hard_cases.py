@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.measures.measurement import outcome_of
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
 from ..document.model import Cell, Grade, Paragraph, Row, Section, Style, Table
-from ..rows.names import of_measure, of_study, outcomes, without_outcome
+from ..rows.names import of_study
 
 RIGHT, USABLE = 1e-3, 0.1
 """Largest attitude errors, rad, of a motion that is called right, and usable."""
+Record = dict[Any, Any]
 _NOT_RUN = Cell(f"{DASH} not run", Grade.NONE)
 _NOTHING = Cell(DASH, Grade.NONE)
 
@@ -40,7 +45,7 @@ def hard_cases(table: pd.DataFrame) -> Table | None:
     rows = _competitors(table, "hard_cases")
     if rows.empty:
         return None
-    judged = {(str(m), str(s)): judge(members) for (m, s), members in rows.groupby(["method", "scene"], sort=False)}
+    judged = {key: judge(members) for key, members in _by_method_and_scene(rows).items()}
     cases, missing = list(rows["scene"].unique()), _judgement(_NOT_RUN, _NOT_RUN)
     methods = sorted(rows["method"].unique(), key=lambda method: _rank([judged.get((method, case), missing) for case in cases]))
     names = dict(zip(rows["method"], rows["name"], strict=True))
@@ -54,19 +59,32 @@ def _rank(judgements: list[Cell]) -> tuple[int, ...]:
     return tuple(sum(each.parts[half].grade is not Grade.GOOD for each in judgements) for half in (0, 1))
 
 
-def judge(rows: pd.DataFrame) -> Cell:
+def _by_method_and_scene(rows: pd.DataFrame) -> dict[tuple[str, str], list[Record]]:
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in rows.to_dict("records"):  # plain dictionaries: a table for each of a thousand groups takes ten seconds
+        groups.setdefault((record["method"], record["scene"]), []).append(record)
+    return groups
+
+
+def _values(records: list[Record], measure: Measure) -> list[float]:
+    return [each["value"] for each in records if each["measure"] == measure.text and not math.isnan(each["value"])]
+
+
+def judge(records: list[Record]) -> Cell:
     """Return the judgement of a method on a case: its failure, else the grades of its attitude error and of its worst drift."""
-    ends = outcomes(without_outcome(rows, OutcomeKind.OK).head(1))
-    if ends:
-        return _judgement(outcome_cell(ends[0]), outcome_cell(ends[0]))
-    drifts = rows[rows["measure"] == Measure.DRIFT_MAX.text].dropna(subset=["value"])
-    invariants = _NOTHING
-    if len(drifts):
-        worst = drifts.sort_values("value").iloc[-1]
-        drift = grade_drift(float(worst["value"]))
+    for record in records:
+        if record["outcome"] != OutcomeKind.OK:
+            cell = outcome_cell(outcome_of(record))
+            return _judgement(cell, cell)
+    errors, motion, invariants = _values(records, Measure.ATTITUDE_MAX), _NOTHING, _NOTHING
+    drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
+    if errors:
+        motion = _motion(max(errors))
+    if drifts:
+        worst = max(drifts, key=lambda each: each["value"])
+        drift = grade_drift(worst["value"])
         invariants = Cell(f"{drift.text} {worst['quantity']}", drift.grade)
-    error = of_measure(rows, Measure.ATTITUDE_MAX)["value"]
-    return _judgement(_motion(float(error.max())) if len(error) else _NOTHING, invariants)
+    return _judgement(motion, invariants)
 
 
 def _judgement(motion: Cell, invariants: Cell) -> Cell:
@@ -84,10 +102,10 @@ def stability(table: pd.DataFrame) -> Table | None:
     rows = _competitors(table, "stability")
     if rows.empty:
         return None
-    cases = list(rows["scene"].unique())
-    body = [
-        [members["name"].iloc[0], *(_longest(members[members["scene"] == case]) for case in cases)]
-        for _, members in rows.groupby("method", sort=False)
+    cases, groups = list(rows["scene"].unique()), _by_method_and_scene(rows)
+    names = dict(zip(rows["method"], rows["name"], strict=True))
+    body: list[Row] = [
+        [str(name), *(_longest(groups.get((method, case), [])) for case in cases)] for method, name in names.items()
     ]
     caption = "The longest step that works, as an angle |ω| dt in rad, and how the next one fails"
     return Table(["method", *cases], body, caption, Style.FILTERED)
@@ -98,10 +116,9 @@ def _competitors(table: pd.DataFrame, study: str) -> pd.DataFrame:
     return rows[rows["role"] != Role.TRUTH.value]
 
 
-def _longest(rows: pd.DataFrame) -> Cell:
-    ends = [outcome for outcome in outcomes(rows) if not outcome.ok]
-    longest = of_measure(rows, Measure.LONGEST_STEP)["value"].max()
-    if pd.isna(longest):
-        return outcome_cell(Outcome(ends[0].kind)) if ends else _NOT_RUN
-    text = f"{number(float(longest))} rad"
-    return Cell(f"≈ {text}, then {ends[0].kind}", Grade.FAIR) if ends else Cell(f"✓ {text} and more", Grade.GOOD)
+def _longest(records: list[Record]) -> Cell:
+    ends = [each["outcome"] for each in records if each["outcome"] != OutcomeKind.OK]
+    if not (steps := _values(records, Measure.LONGEST_STEP)):
+        return outcome_cell(Outcome(OutcomeKind(ends[0]))) if ends else _NOT_RUN
+    text = f"{number(max(steps))} rad"
+    return Cell(f"≈ {text}, then {ends[0]}", Grade.FAIR) if ends else Cell(f"✓ {text} and more", Grade.GOOD)

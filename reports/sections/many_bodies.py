@@ -21,12 +21,12 @@ from ..rows.names import OF_ENGINES, MethodClass, class_of
 from .random_bodies import grade, ratio_text
 
 TERMS = (
-    "The bodies all differ: asymmetric, in turned frames, heavy tops with no point on an axis, or free, drawn from a seed. "
-    "Each runs for 12 s of its motion, of which the ends are kept; the time is that of a prepared run, preparation is apart. "
-    "The error of a setting on a body is its largest attitude error at twelve instants; of the bodies whose errors are read "
-    "the median counts, or the 95th percentile. Between two settings of a line the time is interpolated, and a lucky one does "
-    "not count. Solutions of integrable motions are a class apart: solutions take steps of 0.1 s, and would take any. Where "
-    "nothing else is said, bodies run at once on one thread; `one at a time` is a loop over them in Python."
+    "All bodies differ: asymmetric, in rotated frames, heavy tops with no point on an axis, or free, drawn from a seed. "
+    "Each runs for 12 s, final state only; the time is that of a prepared run, and preparation is separate. The error of "
+    "a setting on a body is its largest attitude error at twelve instants; the table uses the median of the bodies, or "
+    "the 95th percentile. Times between two settings of a line are interpolated, and isolated good results are ignored. "
+    "Closed forms are a separate class: they take steps of 0.1 s and could take any. Unless stated otherwise, bodies run "
+    "together on one thread; `one at a time` is a loop in Python."
 )
 """Explanation of the tables."""
 LINE = ["scene", "name", "line", "way", "family", "class"]

@@ -31,13 +31,13 @@ MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 MOST = 0.9
 """Share of the bodies on which an error must be reached for a mean to be shown, so that the others bias it little."""
 TERMS = (
-    "Each body is drawn from a seed: asymmetric, of condition 1.1 to 100, in a turned frame, no point and no rate on an axis, "
-    "in uniform gravity, on a spring, attracted to a point, or in gravity's gradient, with a field about as strong as the "
-    "motion. The ratio is the cheapest engine's time over that of our cheapest general integrator, each in the cheapest of all "
-    "forms and settings, for whole calls of which the end is kept; above 1 ours is faster. What a sample costs where many are "
-    "kept is measured on the scenes alone. The error is the largest of twelve instants, and that of a setting the largest of "
-    "it and all finer ones, so that no lucky one counts. A body on which a side does not reach the error is counted and has no "
-    "ratio."
+    "Each body is drawn from a seed: asymmetric, with a condition number of 1.1 to 100, in a rotated frame, with no "
+    "point and no rate on an axis, in uniform gravity, on a spring, attracted to a point, or in a gravity gradient, in a "
+    "field about as strong as the motion. The ratio is the fastest engine's time divided by that of our fastest general "
+    "integrator, each in its fastest form and setting, for whole calls, final state only; above 1 ours is faster. The "
+    "error is the largest of twelve instants. The error of a setting is the largest of its own and of all finer "
+    "settings, so isolated good results are ignored. A body on which a side does not reach the error is counted and has "
+    "no ratio."
 )
 """Explanation of the tables."""
 

@@ -97,7 +97,7 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert float(cells(found, MethodClass.SOLVER)["error at equal cost"]) == 1e-6
     assert cells(found, MethodClass.SOLUTION)["µs at 1e-9 rad"] == "0.10 (lame)"
     assert cells(found, MethodClass.ENGINE)["error at equal cost"] == "over 0.1"
-    assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not take it, or was not measured"
+    assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not support the scene, or was not measured"
 
 
 def test_the_cheapest_line_stands_for_its_class_whatever_the_order():

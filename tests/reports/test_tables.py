@@ -257,7 +257,7 @@ def test_hard_cases_are_a_matrix():
 
 def judged(*values):
     found = [made_up.row("hard_cases", "reduced", measure, value) for measure, value in values]
-    judgement = hard_cases.judge(frame(found))
+    judgement = hard_cases.judge(frame(found).to_dict("records"))
     return tuple(part.grade for part in judgement.parts)
 
 

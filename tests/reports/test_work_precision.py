@@ -140,9 +140,9 @@ def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
     told = summary.of_scene(points(TABLE), frame([]), frame([]), integrable=True, each=FOUND)
     position = told.classes.header.index("µs a sample, each step kept")
     assert [line[position] for line in told.classes.rows] == [
-        "0.30 gauss; the end alone: 0.10 reduced",
-        "0.10 lame; the end alone: 0.010",
-        "0.60 heyoka; the end alone: 0.050",
+        "0.30 gauss; final state only: 0.10 reduced",
+        "0.10 lame; final state only: 0.010",
+        "0.60 heyoka; final state only: 0.050",
         "–",  # its only error is too large
     ]
 
