@@ -84,7 +84,7 @@ def of_scene(
     rows: list[Row] = []
     for kind in MethodClass:
         members = of_classes(points, kind)
-        row: Row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not take it, or was not measured"]
+        row: Row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not support the scene, or was not measured"]
         if len(members):
             families = members["family"].unique()
             best = [cheapest(of_classes(reached[reached["error"] == error], kind)) for error in ERRORS]
@@ -109,7 +109,7 @@ def _sample(kind: MethodClass, each: EachStep) -> str:
         return DASH
     other = "" if alone.name == kept.name else f" {alone.name}"
     stored, final = (microseconds(found.time * each.interval) for found in (kept, alone))
-    return f"{stored} {kept.name}; the end alone: {final}{other}"
+    return f"{stored} {kept.name}; final state only: {final}{other}"
 
 
 def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
