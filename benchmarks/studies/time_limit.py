@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from weakref import WeakKeyDictionary
 
 from conservative.errors import BadInput
@@ -52,10 +52,9 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
         return known
     try:
         done = run_within(limit, partial(_attempt, case), (case.scene,))
-    except EngineTimeout as failure:
-        _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
-        return Failure(failure.outcome)
-    except EngineCrashed as failure:
+    except (EngineTimeout, EngineCrashed) as failure:
+        if isinstance(failure, EngineTimeout):
+            _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
         return Failure(failure.outcome)
     except NotTransferable:
         return attempt(case, skip_missing)
@@ -110,11 +109,5 @@ def _stay() -> Trajectory:
 
 def _prepare_later(case: Case) -> Callable[[], Trajectory]:
     """Return the run of a case, which is prepared when it is first called."""
-    prepared: list[Callable[[], Trajectory]] = []
-
-    def run() -> Trajectory:
-        if not prepared:
-            prepared.append(case.method.prepare(case.scene, case.grid))
-        return prepared[0]()
-
-    return run
+    prepare = cache(lambda: case.method.prepare(case.scene, case.grid))
+    return lambda: prepare()()

@@ -40,17 +40,12 @@ def children():
     return psutil.Process().children(recursive=True)
 
 
-def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running():
+@pytest.mark.parametrize("work", [hang, lambda: ctypes.PyDLL(None).sleep(600)])  # PyDLL does not release the interpreter
+def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running(work):
     before = threading.enumerate()
     with pytest.raises(EngineTimeout, match=r"did not answer within 0\.2 s"):
-        run_within(0.2, hang)
+        run_within(0.2, work)
     assert threading.enumerate() == before
-    assert children() == []
-
-
-def test_work_that_keeps_the_interpreter_to_itself_is_ended():
-    with pytest.raises(EngineTimeout):
-        run_within(0.2, lambda: ctypes.PyDLL(None).sleep(600))  # PyDLL does not release the interpreter
     assert children() == []
 
 

@@ -269,14 +269,11 @@ def test_a_build_has_a_version_of_its_own_and_integrates(wheels, tmp_path):
     assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=method).ok
 
 
-def test_another_build_of_the_same_version_is_another_environment(wheels, tmp_path):
+def test_builds_of_one_version_are_environments_of_their_own(wheels, tmp_path):
     first, second = build(wheels, tmp_path), build(wheels, tmp_path, code="VALUE = 3\n")
     assert second.new
     assert first.environment.version != second.environment.version
-
-
-def test_a_version_with_a_local_part_keeps_it(wheels, tmp_path):
-    assert build(wheels, tmp_path, "2.0+g12").environment.version.startswith("2.0+g12.build.")
+    assert build(wheels, tmp_path, "2.0+g12").environment.version.startswith("2.0+g12.build.")  # a local part stays
 
 
 def test_no_build_is_taken_for_the_newest_release(wheels, tmp_path):
