@@ -71,7 +71,8 @@ def test_ratios_on_random_bodies_are_geometric_means_and_a_side_alone_has_none()
     for index, (ours, heyoka) in enumerate([(1e-6, 2e-6), (1e-6, 8e-6), (None, 1e-6)]):
         scene = f"random_body:field=spring,seed=1,index={index}"
         for role, time in (("ours", ours), ("engine", heyoka)):
-            rows += [row | {"scene": scene, "role": role} for row in timed(role, 1e-13 if time else 1.0, time or 1.0)]
+            names = {"scene": scene, "field": "spring", "role": role}
+            rows += [row | names for row in timed(role, 1e-13 if time else 1.0, time or 1.0)]
     found = {(row["scene"], row["quantity"]): row["value"] for row in load("measure")._random(pd.DataFrame(rows))}
     assert found["spring 1e-06 rad", "heyoka's time over ours"] == pytest.approx(4)
     assert found["all fields", "cases"] == 12
