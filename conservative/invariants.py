@@ -190,6 +190,10 @@ def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
     return np.array(body.inertia), rows
 
 
+NEARLY_SPHERICAL = 0.005
+"""Relative gap of moments below which the axis of a symmetric body is not looked for beyond round-off."""
+
+
 def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: float = 1e-14) -> Array | None:
     """Return the unit vector (3,), body axes, about which body and field are symmetric, or None.
 
@@ -205,7 +209,8 @@ def axial_direction(body: RigidBody, potential: AnyPotential | None, tolerance: 
     if axis is None:
         return None
     # The axes of a tensor are known to round-off over the relative gap of its moments, 50 times round-off at a gap of 2 %.
+    # Bodies closer to a sphere keep the plain tolerance.
     gap = np.abs(np.delete(body.moments, axis) - body.moments[axis]).min() / body.moments.max()
-    if np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size / max(gap, 0.01):
+    if np.linalg.norm(np.delete(moment_P, axis)) > tolerance * size / (gap if gap >= NEARLY_SPHERICAL else 1.0):
         return None
     return np.asarray(body.R_BP[:, axis] * (-1.0 if moment_P[axis] < 0 else 1.0))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 import conservative as cv
@@ -44,6 +44,8 @@ def cases(draw, kind):
     if kind == "symmetric top":
         parts[1] = parts[0]
     moments = parts.sum() - parts
+    # The axis of a nearly spherical top is not known to round-off in other axes: it may not be taken for symmetric there.
+    assume(kind != "symmetric top" or abs(parts[2] - parts[0]) >= 0.01 * moments.max())
     signs = [draw(st.sampled_from((-1, 1))) for _ in range(3)]
     rates = [sign * draw(between(0.2, 1.5)) for sign in signs]
     com = {"asymmetric top": (0.3, -0.2, 0.4), "symmetric top": (0, 0, 0.4)}.get(kind)
