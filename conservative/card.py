@@ -19,7 +19,7 @@ from .version import VERSION
 
 T = TypeVar("T")
 Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates", "as_installed"]
-"""What a selection of settings is for; see `Card`."""
+"""Purpose of a selection of settings; see `Card`."""
 
 
 class Role(StrEnum):
@@ -59,7 +59,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Card:
-    """What reports, the benchmark suite and the automatic choice need to know about a family of methods.
+    """Declaration of a family of methods for reports, the benchmark suite and the automatic choice.
 
     Every field has a default. A selection of settings that is None is the same as `variants`.
 

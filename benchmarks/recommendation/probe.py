@@ -103,7 +103,7 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What a recommendation is for.
+    """The question that a recommendation answers.
 
     Attributes
     ----------

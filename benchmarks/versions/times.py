@@ -52,7 +52,7 @@ class Process(Protocol):
 
 @dataclass(frozen=True)
 class Timed:
-    """What is timed: scene and method by their registered names, and the step dt, s."""
+    """A timed setting: scene and method by their registered names, and the step dt, s."""
 
     scene: str
     method: str

@@ -37,7 +37,7 @@ ENGINE = {
 }
 
 PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
-"""What differs between the models of two bodies, other than gravity."""
+"""Parts of the model that depend on the body, apart from gravity."""
 
 
 def prepare(given):

@@ -37,7 +37,7 @@ PALETTE = {
     "black": "#000000",
     "grey": "#7F7F7F",
 }
-"""What `Card.colour` can name; families of one role stand in legends in this order."""
+"""Colours that `Card.colour` can name; legends list families of one role in this order."""
 _OTHERS = ("#661100", "#117733", "#AA4499", "#DDCC77", "#88CCEE")
 """For families that name no colour, in the order of their names (Tol's muted scheme)."""
 

@@ -35,7 +35,7 @@ PATHS = {
 
 Spec = dict[str, Any]
 Shown = tuple[str, str, str]
-"""What hovering shows: field, "Q" or "N", and title."""
+"""Fields shown on hovering: field, "Q" or "N", and title."""
 SHOWN: dict[str, Shown] = {
     field: (field, kind, title)
     for field, kind, title in (
@@ -53,7 +53,7 @@ SHOWN: dict[str, Shown] = {
         ("time", "Q", "µs a body and simulated second"),
     )
 }
-"""What hovering can show in most charts, by field."""
+"""Fields that most charts can show on hovering."""
 
 
 def legend(families: Families, marks: bool) -> tuple[LegendEntry, ...]:

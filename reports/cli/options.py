@@ -1,4 +1,4 @@
-"""What the commands share: options, output files, the end of every --help, and the reading of lists of names."""
+"""Parts shared by the commands: options, output files, the end of every --help, and the reading of lists of names."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What sections and charts read from rows: names, classes, points and lines."""
+"""Selections of rows for sections and charts: names, classes, points and lines."""

@@ -156,7 +156,7 @@ def _cost_text(found: pd.DataFrame) -> str:
 
 
 def absent(table: pd.DataFrame) -> Table:
-    """Return what did not run, and why; sizes left out for lack of time are not listed, as fewer bodies ran."""
+    """Return the methods that did not run, and why; sizes omitted for lack of time are not listed, as fewer bodies ran."""
     here = table["study"] == THROUGHPUT
     failed = table[
         here & ~table["outcome"].isin((OutcomeKind.OK, OutcomeKind.SKIPPED)) & (table["measure"] != Measure.BODY_STEPS.text)
