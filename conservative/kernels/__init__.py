@@ -3,9 +3,9 @@
 `protocol` says what a kernel that takes steps is given and what it returns.
 
 Numba compares cached code with the file of the outermost function only, so an edit to an inner kernel would run stale code.
-All kernels therefore live in this folder. A digest of its files lies beside the cached code, in `__pycache__` and under
-NUMBA_CACHE_DIR alike; where it is not that of the files as they are, the code is dropped on import. Fields of other packages
-(`fields`) are not part of the digest: after an edit to one, clear the cache.
+A digest of the files of this folder, of `conservative.potentials` and of `conservative.arithmetic` lies beside the cached code,
+in `__pycache__` and under NUMBA_CACHE_DIR alike; where it is not that of the files as they are, the code is dropped on import.
+Fields of other packages (`fields`) are not part of the digest: after an edit to one, clear the cache.
 
 With NUMBA_DISABLE_JIT=1 nothing is compiled and all kernels run as plain Python, a thousand times slower, for a debugger or a
 coverage report. Results then differ by round-off, as products are not fused with sums, and a division by zero raises.
@@ -55,10 +55,10 @@ small: Any = partial(kernel, **SMALL)
 """How those are compiled. Contraction is safe in compensated sums, which have no product to contract with."""
 
 
-def _digest(folder: Path) -> str:
-    """Return a digest of all source files of a folder."""
+def _digest(package: Path) -> str:
+    """Return a digest of all source files that kernels are compiled from."""
     found = hashlib.sha256()
-    for file in sorted(folder.glob("*.py")):
+    for file in (package / "arithmetic.py", *sorted(package.glob("kernels/*.py")), *sorted(package.glob("potentials/*.py"))):
         content = file.read_bytes()
         found.update(f"{file.name} {len(content)} ".encode() + content)
     return found.hexdigest()
@@ -75,4 +75,4 @@ def _drop_stale_code(cache: Path, sources: Path) -> None:
 
 
 if CACHED:
-    _drop_stale_code(Path(kernel(lambda: None).stats.cache_path), Path(__file__).parent)
+    _drop_stale_code(Path(kernel(lambda: None).stats.cache_path), Path(__file__).parents[1])

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from . import entry, kernel
+from .lanes import FOUR
 from .projected import near_unit, take_step
 from .signals import call_handlers
-from .simd import LANES
 
 AGREED = 2.0**-44
 """Largest difference of two crossings, relative: of the finer one a 256th is left."""
@@ -54,7 +54,7 @@ def move(J_inverse, field, weights, columns, starts, nodes, size, longest, t, ga
     First steps are at most `longest`, s; momenta are relative to `size`, kg m^2/s. Returns how many states were moved: all, or
     those before the first for which the crossings do not agree.
     """
-    table, room = (weights, columns, starts, nodes), (np.empty(len(weights)), np.empty(2 * LANES * (len(starts) - 2)))
+    table, room = (weights, columns, starts, nodes), (np.empty(len(weights)), np.empty(2 * FOUR * (len(starts) - 2)))
     for i in range(len(t)):
         if i % BLOCK == BLOCK - 1:
             call_handlers()

@@ -10,7 +10,8 @@ import math
 import numpy as np
 
 from . import kernel
-from .lanes import WIDTH, choose, fill_like, fuse, load, save, some
+from .lanes import WIDTH, load, save
+from .vector import choose, fill_like, fuse, some
 
 ROUND = 6755399441055744.0
 """1.5 2^52: added and taken away again, it rounds to the nearest integer."""

@@ -28,12 +28,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
+from .lanes import FOUR, lane_of, load, save, splat
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers
-from .simd import LANES, four, fuse, lane, put, splat, spread
 from .taylor import shortest_move
 from .traced import trace
-from .vector import accumulate, add, cross, dot, product, scale, subtract, times, vertical
+from .vector import accumulate, add, cross, dot, fuse, product, scale, subtract, times, vertical
 
 FAILURE = "the step is too long for the iteration"
 """Why a step fails."""
@@ -93,19 +93,19 @@ def rates(J_inverse, c, L, g):
 @small
 def load_six(Z, width, i):
     """L and gamma of the four stages from i on."""
-    L = (four(Z, i), four(Z, width + i), four(Z, 2 * width + i))
-    return L, (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
+    L = (load(Z, i, FOUR), load(Z, width + i, FOUR), load(Z, 2 * width + i, FOUR))
+    return L, (load(Z, 3 * width + i, FOUR), load(Z, 4 * width + i, FOUR), load(Z, 5 * width + i, FOUR))
 
 
 @small
 def put_six(Z, width, i, L, g):
     """Store what `load_six` loads."""
-    put(Z, i, L[0])
-    put(Z, width + i, L[1])
-    put(Z, 2 * width + i, L[2])
-    put(Z, 3 * width + i, g[0])
-    put(Z, 4 * width + i, g[1])
-    put(Z, 5 * width + i, g[2])
+    save(Z, i, L[0])
+    save(Z, width + i, L[1])
+    save(Z, 2 * width + i, L[2])
+    save(Z, 3 * width + i, g[0])
+    save(Z, 4 * width + i, g[1])
+    save(Z, 5 * width + i, g[2])
 
 
 @small
@@ -113,13 +113,13 @@ def combine(M, s, width, i, F, at):
     """F M' for the four stages from i on, of the rates from F[at] on. M is (stages, width), column j of the matrix in row j."""
     d0 = d1 = d2 = d3 = d4 = d5 = splat(0.0)
     for j in range(s):
-        a, k = four(M, j * width + i), at + j
-        d0 = fuse(a, spread(F, k), d0)
-        d1 = fuse(a, spread(F, k + width), d1)
-        d2 = fuse(a, spread(F, k + 2 * width), d2)
-        d3 = fuse(a, spread(F, k + 3 * width), d3)
-        d4 = fuse(a, spread(F, k + 4 * width), d4)
-        d5 = fuse(a, spread(F, k + 5 * width), d5)
+        a, k = load(M, j * width + i, FOUR), at + j
+        d0 = fuse(a, load(F, k, 1), d0)
+        d1 = fuse(a, load(F, k + width, 1), d1)
+        d2 = fuse(a, load(F, k + 2 * width, 1), d2)
+        d3 = fuse(a, load(F, k + 3 * width, 1), d3)
+        d4 = fuse(a, load(F, k + 4 * width, 1), d4)
+        d5 = fuse(a, load(F, k + 5 * width, 1), d5)
     return (d0, d1, d2), (d3, d4, d5)
 
 
@@ -143,7 +143,7 @@ def sweep(M, s, h, J_inverse, c, L0, g0, F, old, new, Z):
     Z holds six rows of stages, their number a multiple of four.
     """
     width, step, square = Z.shape[0] // 6, splat(h), splat(0.0)
-    for i in range(0, width, LANES):
+    for i in range(0, width, FOUR):
         dL, dg = combine(M, s, width, i, F, old)
         L, g = shift(L0, step, dL), shift(g0, step, dg)
         n, v = rates(J_inverse, c, L, g)
@@ -179,7 +179,7 @@ def solve_stages(A, s, h, J_inverse, c, L, g, F, old, Z):
 def hold_rates(J_inverse, c, L, g, F, width):
     """Write the rates of one state to F for all stages."""
     n, v = rates(J_inverse, c, (splat(L[0]), splat(L[1]), splat(L[2])), (splat(g[0]), splat(g[1]), splat(g[2])))
-    for i in range(0, width, LANES):
+    for i in range(0, width, FOUR):
         put_six(F, width, i, n, v)
 
 
@@ -229,18 +229,22 @@ def integrate_turn(h, b, a, size, J_inverse, Z):
     """Integral of phi' over the step; a is of length `size`."""
     width = Z.shape[0] // 6
     total = splat(0.0)
-    for i in range(0, width, LANES):
-        w = (J_inverse[0] * four(Z, i), J_inverse[1] * four(Z, width + i), J_inverse[2] * four(Z, 2 * width + i))
-        g = (four(Z, 3 * width + i), four(Z, 4 * width + i), four(Z, 5 * width + i))
+    for i in range(0, width, FOUR):
+        w = (
+            J_inverse[0] * load(Z, i, FOUR),
+            J_inverse[1] * load(Z, width + i, FOUR),
+            J_inverse[2] * load(Z, 2 * width + i, FOUR),
+        )
+        g = (load(Z, 3 * width + i, FOUR), load(Z, 4 * width + i, FOUR), load(Z, 5 * width + i, FOUR))
         above = w[0] * (size * g[0] + splat(a[0])) + w[1] * (size * g[1] + splat(a[1])) + w[2] * (size * g[2] + splat(a[2]))
-        total = total + four(b, i) * above / (splat(size) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
+        total = total + load(b, i, FOUR) * above / (splat(size) + (a[0] * g[0] + a[1] * g[1] + a[2] * g[2]))
     return h * sum_lanes(total)
 
 
 @small
 def sum_lanes(v):
     """Sum of four floats."""
-    return (lane(v, 0) + lane(v, 2)) + (lane(v, 1) + lane(v, 3))
+    return (lane_of(v, 0) + lane_of(v, 2)) + (lane_of(v, 1) + lane_of(v, 3))
 
 
 @small
@@ -249,12 +253,12 @@ def weigh(b, b_low, F, at):
     width = b.shape[0]
     zero = splat(0.0)
     n, v = (zero, zero, zero), (zero, zero, zero)
-    for i in range(0, width, LANES):
+    for i in range(0, width, FOUR):
         x, y = load_six(F, width, at + i)
-        n, v = add_weighted(four(b_low, i), x, n), add_weighted(four(b_low, i), y, v)
-    for i in range(0, width, LANES):
+        n, v = add_weighted(load(b_low, i, FOUR), x, n), add_weighted(load(b_low, i, FOUR), y, v)
+    for i in range(0, width, FOUR):
         x, y = load_six(F, width, at + i)
-        n, v = add_weighted(four(b, i), x, n), add_weighted(four(b, i), y, v)
+        n, v = add_weighted(load(b, i, FOUR), x, n), add_weighted(load(b, i, FOUR), y, v)
     return (sum_lanes(n[0]), sum_lanes(n[1]), sum_lanes(n[2])), (sum_lanes(v[0]), sum_lanes(v[1]), sum_lanes(v[2]))
 
 

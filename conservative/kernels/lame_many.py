@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from . import entry, small
 from .lame import Model, Part, advance, divide_step, unit_vertical
-from .lanes import WIDTH, choose, load, load_rows, save_columns, save_rows
+from .lanes import WIDTH, load, load_rows, save_columns, save_rows
+from .vector import choose
 
 PARTS, CONSTANTS, ROWS = 20, 22, 32
 """Numbers of a body: constants, of which those of `Part` are in front of the number of parts of a step and of the moment across

@@ -1,49 +1,268 @@
-"""Lanes are bodies: a number that kernels take for a float and that is one float for each of several bodies.
+"""Lanes: numbers with one float for each of several bodies, or for several components of one; and how they reach memory.
 
-Compiled they are LLVM's vectors (`lanes_llvm`, which says what they can do); in plain Python a float is the only lane
-(`lanes_plain`), and both widths are 1. `WIDTH` is two registers: the processor gets on with one while results of the other are
-not there yet. Where two do not fit, `REGISTER` is the width to take.
+Functions of `small` and traced functions that are written for floats and branch on nothing serve lanes as they are: + - * /
+between lanes, and between lanes and a float, unary minus, `math.sqrt`, `abs`, `min` and `max`. Comparisons give a truth value
+per lane, joined by & | ~; `choose`, `every` and `some` of `vector` read them.
+
+Memory is contiguous arrays of floats of one dimension; no bounds are checked. A width is a number in the source, or a number
+that has as many lanes. In plain Python a body's lane is the only one, so that both widths of bodies are 1; lanes of one body's
+components are arrays.
 """
 
 from __future__ import annotations
 
-from . import COMPILED
+import math
+import operator
+from typing import Any
 
-if COMPILED:
-    from .lanes_llvm import (  # type: ignore[attr-defined]
-        REGISTER,
-        choose,
-        every,
-        fill_like,
-        fuse,
-        lane_of,
-        load,
-        load_rows,
-        save,
-        save_columns,
-        save_rows,
-        some,
-        with_lane,
-    )
-else:
-    from .lanes_plain import (  # type: ignore[assignment]
-        REGISTER,
-        choose,
-        every,
-        fill_like,
-        fuse,
-        lane_of,
-        load,
-        load_rows,
-        save,
-        save_columns,
-        save_rows,
-        some,
-        with_lane,
-    )
+import numpy as np
+
+from .. import arithmetic
+from . import COMPILED, traced
+from .traced import REGISTER as REGISTER
+from .traced import trace
 
 WIDTH = 2 * REGISTER if COMPILED else 1
-"""Bodies that most kernels take at once."""
+"""Bodies that most kernels take at once: two registers, as the processor works on one while results of the other are awaited.
+Where two do not fit, `REGISTER` is the width to take."""
+FOUR = 4
+"""Floats of one register that belong to one body: stages or components."""
 
-__all__ = ["REGISTER", "WIDTH", "choose", "every", "fill_like", "fuse", "lane_of", "load", "load_rows", "save", "save_rows"]
-__all__ += ["save_columns", "some", "with_lane"]
+if COMPILED:
+    from llvmlite import ir
+    from numba.core import cgutils, types
+    from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+    from numba.extending import intrinsic, lower_builtin
+
+    from .traced import DOUBLE, INDEX, Lanes, Mask, Symbol, pack, unpack
+
+    VECTOR = ir.VectorType(DOUBLE, REGISTER)
+
+    def _register(symbol: Any, operation: Any, first: Any, result: Any) -> None:
+        """Let numba compile `symbol` for lanes as the operation on their symbols."""
+
+        class Operator(AbstractTemplate):  # type: ignore[misc]  # numba has no types
+            """What numba calls to find the type of the result."""
+
+            def generic(self, args: Any, kws: Any) -> Any:
+                """Return the signature, None for arguments of other kinds."""
+                widths = {kind.width for kind in args if isinstance(kind, first)}
+                others = [kind for kind in args if not isinstance(kind, first)]
+                fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
+                return signature(result(*widths), *args) if len(widths) == 1 and fits else None
+
+        def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            # No flags: the function that is compiled says whether products may be fused.
+            numbers = (unpack(builder, *each, ()) for each in zip(sig.args, args, strict=True))
+            return pack(context, builder, sig.return_type, operation(*numbers))
+
+        infer_global(symbol)(Operator)
+        pairs = ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes))
+        unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
+        for kinds in [(first,)] if unary else [(Mask, Mask)] if first is Mask else pairs:
+            lower_builtin(symbol, *kinds)(lower)
+
+    for _symbol in (operator.add, operator.sub, operator.mul, operator.truediv, operator.neg, abs):
+        _register(_symbol, _symbol, Lanes, Lanes)
+    _register(math.sqrt, arithmetic.root, Lanes, Lanes)
+    _register(min, lambda a, b: arithmetic.choose(b < a, b, a), Lanes, Lanes)
+    _register(max, lambda a, b: arithmetic.choose(b > a, b, a), Lanes, Lanes)
+    for _symbol in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq):
+        _register(_symbol, _symbol, Lanes, Mask)
+    for _symbol in (operator.and_, operator.or_, operator.invert):
+        _register(_symbol, _symbol, Mask, Mask)
+
+    def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any, register: Any = DOUBLE) -> Any:
+        """Return the address of an element, as that of a register of this type."""
+        pointer = builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+        return builder.bitcast(pointer, register.as_pointer())
+
+    def _move(builder: Any, index: Any, count: int) -> Any:
+        return builder.add(index, ir.Constant(index.type, count))
+
+    def _read(context: Any, builder: Any, array: Any, index: Any, kind: Any) -> Any:
+        """Return the LLVM value of a number of this type; `array` is its numba type and value."""
+        if kind == types.float64:
+            return builder.load(_place(context, builder, *array, index))
+        places = [_move(builder, index, i) for i in range(0, kind.width, REGISTER)]
+        registers = [builder.load(_place(context, builder, *array, each, VECTOR), align=8) for each in places]
+        return pack(context, builder, kind, Symbol(builder, registers))
+
+    def _of_width(width: Any) -> Any:
+        """Return the type of a number: of a width in the source, or of the type of another number."""
+        if not isinstance(width, types.Literal):
+            return width
+        return types.float64 if width.literal_value == 1 else Lanes(width.literal_value)
+
+    def _arrange(like: Any, kind: Any) -> Any:
+        """Return the type of a tuple of numbers of this type: of a count in the source, or arranged as another tuple."""
+        if isinstance(like, types.Literal):
+            return types.UniTuple(kind, like.literal_value)
+        if not isinstance(like, types.BaseTuple):
+            return kind
+        return types.BaseTuple.from_types([_arrange(each, kind) for each in like], getattr(like, "instance_class", None))
+
+    def _flatten(value: Any) -> list[Any]:
+        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
+
+    @intrinsic(prefer_literal=True)
+    def load(typing, array, index, width):
+        """Return array[index : index + width] as a number."""
+        kind = _of_width(width)
+
+        def build(context, builder, sig, args):
+            return _read(context, builder, (sig.args[0], args[0]), args[1], kind)
+
+        return kind(array, types.intp, width), build
+
+    @intrinsic(prefer_literal=True)
+    def load_rows(typing, array, index, stride, like, width):
+        """Return the numbers at index, index + stride and so on: `like` of them, or arranged as the tuple `like`."""
+        kind = _of_width(width)
+        rows = _arrange(like, kind)
+
+        def build(context, builder, sig, args):
+            at = args[1]
+
+            def fill(part):
+                nonlocal at
+                if isinstance(part, types.BaseTuple):
+                    return context.make_tuple(builder, part, [fill(each) for each in part])
+                number, at = _read(context, builder, (sig.args[0], args[0]), at, kind), builder.add(at, args[2])
+                return number
+
+            return fill(rows)
+
+        return rows(array, types.intp, types.intp, like, width), build
+
+    def _write(context: Any, builder: Any, array: Any, index: Any, number: Any) -> None:
+        """Store the registers of a symbol; `array` is its numba type and value."""
+        for i, register in enumerate(number.registers):
+            at = _move(builder, index, i * REGISTER)
+            builder.store(register, _place(context, builder, *array, at, register.type), align=8)
+
+    @intrinsic
+    def save(typing, array, index, value):
+        """Store a number at index."""
+
+        def build(context, builder, sig, args):
+            _write(context, builder, (sig.args[0], args[0]), args[1], unpack(builder, sig.args[2], args[2]))
+            return context.get_dummy_value()
+
+        return types.none(array, types.intp, value), build
+
+    @intrinsic
+    def save_rows(typing, array, index, stride, values):
+        """Store the numbers of a tuple of tuples at index, index + stride and so on."""
+
+        def build(context, builder, sig, args):
+            at = args[1]
+            for number in _flatten(unpack(builder, sig.args[3], args[3])):
+                _write(context, builder, (sig.args[0], args[0]), at, number)
+                at = builder.add(at, args[2])
+            return context.get_dummy_value()
+
+        return types.none(array, types.intp, types.intp, values), build
+
+    def _transpose(builder: Any, numbers: list[Any]) -> Any:
+        """Return, of up to four registers, one per number, four registers, one per lane."""
+        pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, REGISTER), at))  # noqa: E731
+        nothing = ir.Constant(VECTOR, ir.Undefined)
+        a, b, c, d = [*numbers] + [nothing] * (REGISTER - len(numbers))
+        ab, cd = (pick(a, b, (0, 4, 2, 6)), pick(a, b, (1, 5, 3, 7))), (pick(c, d, (0, 4, 2, 6)), pick(c, d, (1, 5, 3, 7)))
+        near, far = (0, 1, 4, 5), (2, 3, 6, 7)
+        return pick(ab[0], cd[0], near), pick(ab[1], cd[1], near), pick(ab[0], cd[0], far), pick(ab[1], cd[1], far)
+
+    @intrinsic
+    def save_columns(typing, array, index, stride, values):
+        """Store the numbers of each body one after the other: those of the first at index, of the next at index + stride."""
+
+        def build(context, builder, sig, args):
+            numbers = _flatten(unpack(builder, sig.args[3], args[3]))
+            for first in range(0, len(numbers), REGISTER):
+                four, at = numbers[first : first + REGISTER], _move(builder, args[1], first)
+                kept = ir.Constant(ir.VectorType(INDEX, len(four)), list(range(len(four))))
+                for registers in zip(*(number.registers for number in four), strict=True):
+                    for lane in _transpose(builder, registers):
+                        part = builder.shuffle_vector(lane, lane, kept)
+                        builder.store(part, _place(context, builder, sig.args[0], args[0], at, part.type), align=8)
+                        at = builder.add(at, args[2])
+            return context.get_dummy_value()
+
+        return types.none(array, types.intp, types.intp, values), build
+
+    def _copy(builder: Any, value: Any) -> tuple[Any, Any]:
+        """Return the address of a copy in memory, as that of the whole and of the first float."""
+        memory = cgutils.alloca_once_value(builder, value)
+        return memory, builder.bitcast(memory, DOUBLE.as_pointer())
+
+    @intrinsic
+    def lane_of(typing, a, index):
+        """Return one of the floats."""
+
+        def build(context, builder, sig, args):
+            if a.width == REGISTER:
+                return builder.extract_element(builder.extract_value(args[0], 0), args[1])
+            return builder.load(builder.gep(_copy(builder, args[0])[1], [args[1]]))
+
+        return types.float64(a, types.intp), build
+
+    @intrinsic
+    def with_lane(typing, a, index, x):
+        """Return the same number with x in one lane."""
+
+        def build(context, builder, sig, args):
+            memory, floats = _copy(builder, args[0])
+            builder.store(args[2], builder.gep(floats, [args[1]]))
+            return builder.load(memory)
+
+        return a(a, types.intp, types.float64), build
+
+else:
+
+    def load(array, index, width):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Return array[index : index + width] as a number."""
+        return array[index : index + width].copy() if isinstance(width, int) and width > 1 else float(array[index])
+
+    def _fill(like, numbers):
+        if not isinstance(like, tuple):
+            return float(next(numbers))
+        parts = [_fill(each, numbers) for each in like]
+        return like._make(parts) if hasattr(like, "_make") else tuple(parts)
+
+    def load_rows(array, index, stride, like, width):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Return the numbers at index, index + stride and so on: `like` of them, or arranged as the tuple `like`."""
+        return _fill((0.0,) * like if isinstance(like, int) else like, iter(array[index::stride]))
+
+    def _flatten(value):
+        return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
+
+    def save(array, index, value):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Store a number at index."""
+        array[index : index + np.size(value)] = value
+
+    def save_rows(array, index, stride, values):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Store the numbers of a tuple of tuples at index, index + stride and so on."""
+        for i, value in enumerate(_flatten(values)):
+            save(array, index + i * stride, value)
+
+    def save_columns(array, index, stride, values):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Store the numbers of the only body one after the other."""
+        save_rows(array, index, 1, values)
+
+    def lane_of(a, index):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Return one of the floats."""
+        return float(a[index]) if isinstance(a, np.ndarray) else a
+
+    def with_lane(a, index, x):  # type: ignore[misc]  # the same name twice: one of them is defined
+        """Return x, the only lane."""
+        return x
+
+
+join = trace(traced.join)
+
+
+@trace
+def splat(x):
+    """Return the float x as a number of one register."""
+    return traced.join(x, x, x, x)

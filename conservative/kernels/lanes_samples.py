@@ -28,8 +28,6 @@ def store_sample(q, w, axes, place, samples, R_WB, w_WB_B):
     """
     r0, r1, r2 = rotation(q)
     a, b, c = axes[0:3], axes[3:6], axes[6:9]
-    R, w_B = 9 * place, 3 * place
-    save_columns(R_WB, R, 9 * samples, (dot(r0, a), dot(r0, b), dot(r0, c), dot(r1, a)))
-    save_columns(R_WB, R + 4, 9 * samples, (dot(r1, b), dot(r1, c), dot(r2, a), dot(r2, b)))
-    save_columns(R_WB, R + 8, 9 * samples, (dot(r2, c),))
-    save_columns(w_WB_B, w_B, 3 * samples, (dot(w, a), dot(w, b), dot(w, c)))
+    rows = (dot(r0, a), dot(r0, b), dot(r0, c), dot(r1, a), dot(r1, b), dot(r1, c), dot(r2, a), dot(r2, b), dot(r2, c))
+    save_columns(R_WB, 9 * place, 9 * samples, rows)
+    save_columns(w_WB_B, 3 * place, 3 * samples, (dot(w, a), dot(w, b), dot(w, c)))

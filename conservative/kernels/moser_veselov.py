@@ -24,10 +24,9 @@ import numpy as np
 
 from . import entry, kernel, small
 from .elliptic import find_means, jacobi, sine_and_cosine
-from .lanes import choose, fill_like, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
-from .vector import product
+from .vector import choose, fill_like, fuse, product
 
 NODES = tuple((float(x), float(weight)) for x, weight in zip(*np.polynomial.legendre.leggauss(16), strict=True) if x > 0)
 """Nodes and weights of Gauss's quadrature with 16 nodes on [-1, 1], those above 0."""

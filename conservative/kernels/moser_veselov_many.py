@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from . import entry, kernel, small
-from .lanes import WIDTH, choose, fill_like, load_rows, save, save_rows
+from .lanes import WIDTH, load_rows, save, save_rows
 from .lanes_samples import store_sample
 from .moser_veselov import (
     Polhode,
@@ -27,7 +27,7 @@ from .moser_veselov import (
     take_steps,
     whole_shift,
 )
-from .vector import dot, product
+from .vector import choose, dot, fill_like, product
 
 GIVEN = 24
 """Numbers that a body is given by: `gather`."""

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .fields import at_time, body_torque, energy, in_body
+from .fields import at_time, body_torque, energy
+from .lanes import FOUR, join, lane_of, load, save, splat
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
-from .simd import LANES, four, fuse, join, lane, put, splat, spread
-from .vector import add, cross, dot, product, scale, subtract, times
+from .vector import add, cross, dot, fuse, in_body, product, scale, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -75,8 +75,8 @@ def rates(J_inverse, field, q, L, slopes, at):
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
     n = cross(L, w)
     T = body_torque(field, q)
-    put(slopes, at + LANES, join(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
-    put(
+    save(slopes, at + FOUR, join(n[0] + T[0], n[1] + T[1], n[2] + T[2], 0.0))
+    save(
         slopes,
         at,
         join(
@@ -92,9 +92,9 @@ def rates(J_inverse, field, q, L, slopes, at):
 def combine(q, L, weights, columns, first, last, slopes):
     """(q, L) + sum of weights[i] times the slopes of stage columns[i], first <= i < last; the newest slopes come last."""
     for i in range(first, last):
-        weight, at = spread(weights, i), 2 * LANES * columns[i]
-        q = fuse(weight, four(slopes, at), q)
-        L = fuse(weight, four(slopes, at + LANES), L)
+        weight, at = load(weights, i, 1), 2 * FOUR * columns[i]
+        q = fuse(weight, load(slopes, at, FOUR), q)
+        L = fuse(weight, load(slopes, at + FOUR, FOUR), L)
     return q, L
 
 
@@ -105,12 +105,15 @@ def take_step(h, t, J_inverse, field, weights, columns, starts, nodes, q, L, slo
     stages = len(starts) - 2
     for stage in range(stages):
         qs, Ls = combine(q0, L0, weights, columns, starts[stage], starts[stage + 1], slopes)
-        q, L = (lane(qs, 0), lane(qs, 1), lane(qs, 2), lane(qs, 3)), (lane(Ls, 0), lane(Ls, 1), lane(Ls, 2))
-        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * LANES * stage)
+        q, L = (
+            (lane_of(qs, 0), lane_of(qs, 1), lane_of(qs, 2), lane_of(qs, 3)),
+            (lane_of(Ls, 0), lane_of(Ls, 1), lane_of(Ls, 2)),
+        )
+        rates(J_inverse, at_time(field, t + nodes[stage] * h), q, L, slopes, 2 * FOUR * stage)
     # Weights rounded after multiplication by h would not sum to h, and the clock would be wrong.
     dq, dL = combine(splat(0.0), splat(0.0), weights, columns, starts[stages], starts[stages + 1], slopes)
     q1, L1 = fuse(splat(h), dq, q0), fuse(splat(h), dL, L0)
-    return (lane(q1, 0), lane(q1, 1), lane(q1, 2), lane(q1, 3)), (lane(L1, 0), lane(L1, 1), lane(L1, 2))
+    return (lane_of(q1, 0), lane_of(q1, 1), lane_of(q1, 2), lane_of(q1, 3)), (lane_of(L1, 0), lane_of(L1, 1), lane_of(L1, 2))
 
 
 @small
@@ -193,7 +196,7 @@ def march(model, coefficients, workspace):
     weights = weights.copy()
     weights[: starts[-2]] *= h
     stages = len(starts) - 2
-    slopes = np.empty(2 * LANES * stages)
+    slopes = np.empty(2 * FOUR * stages)
     q_out[0, :], L_out[0, :] = q, L
     kept = values(J_inverse, field, axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0

@@ -25,10 +25,9 @@ from typing import Any, NamedTuple
 
 from . import entry, kernel, small
 from .fields import body_torque, finite_torque
-from .lanes import choose, every, fuse
 from .protocol import Result, Workspace, find_ends, loosen
 from .signals import call_handlers, end_of_block
-from .vector import accumulate, add, apply, cross, dot, inverse, invert, scale, subtract, times, turn
+from .vector import accumulate, add, apply, choose, cross, dot, every, fuse, inverse, invert, scale, subtract, times, turn
 
 FAILURE = "no continuous solution"
 """Why a step fails."""

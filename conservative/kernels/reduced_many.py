@@ -6,11 +6,11 @@ the continuous branch is stopped, and left to whoever runs it again. Neither cha
 
 from __future__ import annotations
 
+from ..potentials.uniform_gravity import UniformField
 from . import entry, kernel, small
-from .fields import Uniform
-from .lanes import WIDTH, choose, every, fill_like, lane_of, load_rows, save_columns, save_rows, with_lane
+from .lanes import WIDTH, lane_of, load_rows, save_columns, save_rows, with_lane
 from .reduced import NEAR, SMOOTH, add_momentum, continue_branch, explicit_guess, guess_ahead, newton_solve, turn_attitude
-from .vector import dot, subtract
+from .vector import choose, dot, every, fill_like, subtract
 
 ROWS = 33
 """Numbers of a body's state: q (4), L (3), what their sums lost (4, 3), how many solutions fit on each other, and the last six
@@ -57,7 +57,7 @@ def solve_alone(h, J, J_inverse, field, q, L, carry, tolerance, a, gain, trusted
     rest = (0.0, 0.0, 0.0)
     for i in range(WIDTH):
         if lane_of(alone, i) == 1.0:
-            own_field = None if field is None else Uniform(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
+            own_field = None if field is None else UniformField(lane_of(field.x, i), lane_of(field.y, i), lane_of(field.z, i))
             own_q = (lane_of(q[0], i), lane_of(q[1], i), lane_of(q[2], i), lane_of(q[3], i))
             own = pick(J, i), pick(J_inverse, i), own_field, own_q, pick(L, i), pick(carry, i)
             found, own_gain, _, _, exists = continue_branch(h, own[0], own[1], own[2], own[3], own[4], own[5], tolerance)
@@ -87,7 +87,7 @@ def march(lengths, tolerance, moments, moment, states, room, done, last, n_steps
             field = None
         else:
             x, y, z = load_rows(moment.reshape(-1), i, n, 3, WIDTH)
-            field = Uniform(x, y, z)
+            field = UniformField(x, y, z)
         state = load_rows(all_states, i, n, 18, WIDTH)
         q, L, q_carry, L_carry, known, newest = state[:4], state[4:7], state[7:11], state[11:14], state[14], state[15:]
         older = load_rows(all_states, i + 18 * n, n, 15, WIDTH)

@@ -22,17 +22,16 @@ import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from . import COMPILED, entry, kernel, small, vector
-from .axial import axial_constants, axial_energy, start_series
+from ..arithmetic import add, choose, cross, dot, root, scale, subtract, times
+from ..potentials.turning import Turned
+from . import entry, kernel, small, vector
+from .lanes import REGISTER, load_rows, save_columns, save_rows
 from .protocol import Result, Workspace, find_ends, loosen
-from .series import FreeSeries, TurningSeries
-from .series_numpy import sum_to_order as sum_to_order_numpy
+from .series import Series, sum_to_order
 from .signals import call_handlers, end_of_block
-from .traced import Lanes, Value, add, cross, dot, join, root, scale, split, subtract, times, trace, where_above
-
-if COMPILED:
-    from .series_lanes import sum_to_order as sum_to_order_lanes
-    from .series_llvm import sum_to_order as sum_to_order_llvm
+from .traced import trace
+from .vector import choose as choose_lanes
+from .vector import some
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -81,103 +80,71 @@ class Coefficients(NamedTuple):
 
 
 class Free(NamedTuple):
-    """No field; the size of the momentum, kg m^2/s, of which g is the direction."""
+    """No field; the size of the momentum, kg m^2/s, whose direction is g. See `UniformField` for the functions."""
 
-    momentum: float
+    momentum: Any
 
+    def find_constants(self, J_inverse):
+        """Return nothing."""
+        return ()
 
-@axial_constants.register(Free)
-def _axial_constants_free(field, J_inverse):
-    return J_inverse
+    def slope(self, constants, g):
+        """Return V and dV/dg, 0."""
+        return 0.0, (0.0, 0.0, 0.0)
 
-
-@axial_energy.register(Free)
-def _axial_energy_free(field, constants, g):
-    return 0.0, (0.0, 0.0, 0.0)
-
-
-@start_series.register(Free)
-def _start_series_free(field, constants, g):
-    return FreeSeries, ()
-
-
-class Revolving(NamedTuple):
-    """A field that turns with axes D about their second one, and the rate, rad/s."""
-
-    field: Any
-    turn: float
-
-
-@axial_constants.register(Revolving)
-def _axial_constants_revolving(field, J_inverse):
-    return axial_constants(field.field, J_inverse)
-
-
-@axial_energy.register(Revolving)
-def _axial_energy_revolving(field, constants, g):
-    return axial_energy(field.field, constants, g)
-
-
-@start_series.register(Revolving)
-def _start_series_revolving(field, constants, g):
-    inner, numbers = start_series(field.field, constants, g)
-    return partial(TurningSeries, inner), (field.turn, *numbers)
+    def series(self, constants, g, series):
+        """Return a function that returns no torque."""
+        return lambda c, n: None
 
 
 def values(field, constants, L, n, g, w):
     """Return energy and momentum about the axis, with g longer by the factor n to first order, and dV/dg."""
-    V, slope = axial_energy(field, constants, g)
+    V, slope = field.slope(constants, g)
     return 0.5 * dot(L, w) + V + (n - 1.0) * dot(slope, g), n * dot(L, g), slope
 
 
 def turning_values(field, constants, L, n, g, upright, w):
     """Return the Jacobi integral, the momentum about the axis, dV/dg and the rates of D, with g longer by n and a upright."""
     energy, momentum, slope = values(field, constants, L, n, g, w)
-    o = scale(field.turn * n, cross(g, upright))
+    o = scale(field.rate * n, cross(g, upright))
     return energy - dot(L, o), momentum, slope, o
-
-
-def find_beginning(model):
-    """Return the field's constants, (J2 - J3)/J1 and its kin, rates, what is kept, and scales with their inverses."""
-    J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
-    constants, w = axial_constants(field, J_inverse), times(J_inverse, model.L)
-    K = join((J[1] - J[2]) * J_inverse[0], (J[2] - J[0]) * J_inverse[1], (J[0] - J[1]) * J_inverse[2], 0.0)
-    n, upright, _ = straighten(model.g, model.a)
-    if isinstance(field, Revolving):
-        jacobi, momentum, *_ = turning_values(field, constants, times(J, w), n, model.g, upright, w)
-        kept = jacobi, momentum
-    else:
-        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
-    return constants, K, w, kept, (scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1])
 
 
 @trace
 def begin(model):
-    """`find_beginning`"""
-    return find_beginning(model)
+    """Return what `correct` takes, ((J2 - J3)/J1 and its kin), and rates.
 
-
-def choose_series(order, x):
-    """What forms the series: for plain Python, for lanes or for one body."""
-    if not isinstance(order, Value):
-        return sum_to_order_numpy
-    return sum_to_order_lanes if isinstance(x, Lanes) else sum_to_order_llvm
+    The first is (constants of the field, (J, J_inverse, loose), what is kept, scales and their inverses).
+    """
+    J, J_inverse, field, scales = model.J, model.J_inverse, model.field, model.scales
+    constants, w = field.find_constants(J_inverse), times(J_inverse, model.L)
+    K = times((J[1] - J[2], J[2] - J[0], J[0] - J[1]), J_inverse)
+    n, upright, _ = straighten(model.g, model.a)
+    if isinstance(field, Turned):
+        kept = turning_values(field, constants, times(J, w), n, model.g, upright, w)[:2]
+    else:
+        kept = values(field, constants, times(J, w), n, model.g, w)[:2]
+    scales = scales[0], scales[1], 1.0 / scales[0], 1.0 / scales[1]
+    return (constants, (J, J_inverse, model.loose), kept, scales), K, w
 
 
 @trace
 def take_step(field, constants, order, h, K, g, a, w):
-    """The state after one step, not projected, and its last two terms as fours."""
-    first = tuple(join(*v, 0.0) for v in (g, a, w))
-    sum_to_order = choose_series(order, w[0])
-    added, last, before = sum_to_order(*start_series(field, constants, g), order, h, first, K)
-    return tuple(split(v + d) for v, d in zip(first, added, strict=True)), last, before
+    """The state after one step, not projected, and its last two terms."""
+    series = Series(w[0])
+    start = tuple(series.vector(*v) for v in (g, a, w))
+    turn = series.spread(field.rate) if isinstance(field, Turned) else None
+    accelerate = field.series(constants, g, series)
+    change, last, before = sum_to_order(series, order, h, start, series.vector(*K), accelerate, turn)
+    end = tuple(v + d for v, d in zip(start, change, strict=True))
+    return tuple(tuple(map(series.split, each)) for each in (end, last, before))
 
 
 @trace
 def sizes(scales, last, before):
     """The sizes of two terms: of rows of a rotation, and of rates in units of what all energy makes of the largest moment."""
     over = 0.5 * scales[1] * scales[2]
-    return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (map(split, last), map(split, before)))
+    return tuple(root(dot(g, g) + dot(a, a) + over * over * dot(w, w)) for g, a, w in (last, before))
 
 
 @small
@@ -190,7 +157,7 @@ def stretch(tolerance, order, large):
 def significant(x, scale):
     """x, less in size by what counts as round-off of that scale: a continuous function, which amplifies no noise."""
     least = ROUND_OFF * scale
-    return where_above(x - least, least, x) + where_above(x + least, least, -x)
+    return choose(x > least, x - least, choose(x < -least, x + least, 0.0))
 
 
 def straighten(g, a):
@@ -267,21 +234,38 @@ def find_correction(field, constants, body, kept, scales, g, a, w):
     """
     if isinstance(field, Free):
         return correct_free(field, constants, body, kept, scales, g, a)
-    if isinstance(field, Revolving):
+    if isinstance(field, Turned):
         return correct_revolving(field, constants, body, kept, scales, g, a, w)
     return correct_in_field(field, constants, body, kept, scales, g, a, w)
 
 
 @trace
-def correct(field, constants, body, kept, scales, g, a, w):
-    """Return (g, a, w) of `find_correction`, the relative defect before, and what is left of it afterwards."""
-    g, a, w, defect, rest = find_correction(field, constants, body, kept, scales, g, a, w)
-    return g, a, w, defect, find_left(defect, rest)
+def correct(field, body, g, a, w):
+    """Return (g, a, w) of `find_correction`, what is left of the relative defect, and whether to correct once more.
+
+    Left are the defect's square, and the share that regularisation leaves of what is no round-off.
+    """
+    g, a, w, defect, rest = find_correction(field, *body, g, a, w)
+    beyond_noise = choose(defect > NOISE, defect - NOISE, 0.0)
+    left = defect * defect + choose(rest < 1.0, rest, 1.0) * beyond_noise
+    return g, a, w, left, (left > ENOUGH) & (defect < FAR)
 
 
-def find_left(defect, rest):
-    """What a correction leaves of a relative defect: its square, and the share `rest` of what is no round-off."""
-    return defect * defect + where_above(rest, rest, 1.0, 1.0) * where_above(defect - NOISE, NOISE, defect)
+@partial(kernel, inline="always")
+def project(field, body, g, a, w, active):
+    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`.
+
+    Bodies that are not active, and those that need no further correction, wait for the others.
+    """
+    g, a, w, left, needed = correct(field, body, g, a, w)
+    needed = needed & active
+    corrections = 1
+    while corrections < MOST_CORRECTIONS and some(needed):
+        g1, a1, w1, left1, needed1 = correct(field, body, g, a, w)
+        g, a, w, left = choose_lanes(needed, (g1, a1, w1, left1), (g, a, w, left))
+        needed = needed & needed1
+        corrections += 1
+    return g, a, w, corrections, left
 
 
 @small
@@ -306,24 +290,13 @@ def record(q_out, L_out, row, q, L):
 
 
 @partial(kernel, inline="always")
-def project(field, constants, body, kept, scales, g, a, w):
-    """Return (g, a, w, corrections, relative defect left) of a state brought back to what is `kept`."""
-    corrections = 0
-    defect, left = 1.0, 1.0
-    while corrections == 0 or (corrections < MOST_CORRECTIONS and left > ENOUGH and defect < FAR):
-        g, a, w, defect, left = correct(field, constants, body, kept, scales, g, a, w)
-        corrections += 1
-    return g, a, w, corrections, left
-
-
-@partial(kernel, inline="always")
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
     field, left, g, a = model.field, model.left, model.g, model.a
     order, h, tolerance = coefficients
     n_steps, every, pause, q_out, L_out = workspace
-    constants, K, w, kept, scales = begin(model)
-    body = (model.J, model.J_inverse, model.loose)
+    body, K, w = begin(model)
+    constants, _, _, scales = body
     record(q_out, L_out, 0, model.q, model.L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done, parts, computed, part = 0, 0, 0, h
@@ -342,7 +315,7 @@ def march(model, coefficients, workspace):
                     longest = SAFETY * factor * part
                 left_over -= part
                 taken += 1
-                g, a, w, more, defect = project(field, constants, body, kept, scales, g1, a1, w1)
+                g, a, w, more, defect = project(field, body, g1, a1, w1, True)
                 corrections += more
                 if tolerance > 0.0:
                     rest = left_over if left_over > 0.0 else h
@@ -369,3 +342,76 @@ def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
     return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+
+
+class Bodies(NamedTuple):
+    """Bodies in lanes: as `Model`, and numbers that steps and samples need.
+
+    `h` is the length of a step in the units of the body. `axes` are the rows of the rotation from axes D to the world's,
+    `R_BP` those of the rotation from principal to body axes. Rates in the units of the body times `units` are those of samples:
+    the third contains the spin if the body is described in a frame that does not spin.
+    """
+
+    J: Any
+    J_inverse: Any
+    field: Any
+    loose: Any
+    scales: Any
+    g: Any
+    a: Any
+    L: Any
+    h: Any
+    axes: Any
+    R_BP: Any
+    units: Any
+
+
+class Motion(NamedTuple):
+    """Rows of the attitude's matrix and rates of bodies in lanes, and how many of their steps failed."""
+
+    g: Any
+    a: Any
+    w: Any
+    failed: Any
+
+
+@trace
+def find_sample(bodies, turn, g, a, w):
+    """Return the rows of R_WB, one after the other, and w_WB_B; `turn` is cosine and sine of the angle of a spin left out."""
+    b, (cos, sin), (x, y, z) = cross(g, a), turn, times(bodies.units, w)
+    w = cos * x + sin * y, cos * y - sin * x, z
+    R_WP = [add(add(scale(p, a), scale(q, b)), scale(r, g)) for p, q, r in bodies.axes]
+    R_WP = [(cos * x + sin * y, cos * y - sin * x, z) for x, y, z in R_WP]
+    return tuple(dot(row, axis) for row in (*R_WP, w) for axis in bodies.R_BP)
+
+
+@entry
+def enter_many(order, like, columns, motions, turns, done, until, n_steps, every, R_WB, w_WB_B):
+    """Take the steps after `done` up to number `until`, each body in a lane of its own.
+
+    `like` is a `Bodies` and a `Motion` of floats, whose numbers are in `columns` (., n) and `motions` (., n). Samples of every
+    `every`-th step, and of the last of n_steps, go to R_WB (n samples 9,) and w_WB_B (n samples 3,), rad/s. `turns` (samples or
+    1, 2, n) are cosines and sines of the angles of spins that are left out. A body whose step cannot be projected counts as
+    failed from then on.
+    """
+    n, samples = columns.shape[1], 1 + (n_steps + every - 1) // every
+    for at in range(0, n, REGISTER):
+        bodies = load_rows(columns.reshape(-1), at, n, like[0], REGISTER)
+        g, a, w, failed = load_rows(motions.reshape(-1), at, n, like[1], REGISTER)
+        body, K, _ = begin(bodies)
+        step, row = done, done // every
+        while step < until:
+            row += 1
+            sampled = min(n_steps, row * every)
+            end = min(until, sampled)
+            while step < end:
+                (g, a, w), _, _ = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
+                g, a, w, _, left = project(bodies.field, body, g, a, w, failed < 0.5)
+                failed = choose_lanes(left < LEFT, failed, failed + 1.0)
+                step += 1
+            if step == sampled:
+                turn = load_rows(turns.reshape(-1), 2 * n * min(row, len(turns) - 1) + at, n, 2, REGISTER)
+                sample = find_sample(bodies, turn, g, a, w)
+                save_columns(R_WB, 9 * (at * samples + row), 9 * samples, sample[:9])
+                save_columns(w_WB_B, 3 * (at * samples + row), 3 * samples, sample[9:])
+        save_rows(motions.reshape(-1), at, n, (g, a, w, failed))

@@ -1,228 +1,292 @@
-"""Functions without branches, written once: in plain Python they run as they are, for machine code they are traced.
+"""Compiled functions without branches, made from plain Python by tracing.
 
-`trace(function)` is the function as kernels call it. It is run once with stand-ins for its arguments, `Value`, whose arithmetic
-writes LLVM's instructions, so that the types of its inner functions need not be found out one by one: numba takes a tenth of a
-second for each, which adds up to more than all that LLVM does. A product that is added at once is rounded once (FMA), as in
-`SMALL`. Arguments and results are floats, integers, fours (`simd`) and tuples of these, named or not. Where an argument is
-lanes (`lanes`), each of another body, floats are lanes and fours are `Axes`, three of these.
+`trace(function)` runs a function once with `Symbol`s in place of its arguments; their arithmetic emits LLVM instructions. Numba
+then has no types of inner functions to infer, which takes a tenth of a second each. Arguments and results are floats, integers,
+truth values, `Lanes`, and tuples of these, named or not. One source so serves one body and several: the `Lanes` of a number
+hold one float per body. With plain Python kernels, `trace` returns the function itself.
+
+Products that are added at once are rounded once (the flag "contract"), as in `kernels.SMALL`.
 """
 
 from __future__ import annotations
 
 import inspect
-import math
-from functools import update_wrapper
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from functools import cache, update_wrapper
+from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Traced
 from . import COMPILED
-from . import vector as _vector
-from .simd_numpy import LANES
 
+REGISTER = 4 if COMPILED else 1
+"""Floats in a register. A shorter register of the processor takes several operations; a longer one stays half empty, because in
+wider vectors LLVM fuses other products with sums, and results would depend on the processor."""
 
-class Value:
-    """A float, an integer or a four of machine code."""
+if not COMPILED:
 
-    def __init__(self, builder, ir_value):
-        self.builder, self.ir = builder, ir_value
+    def trace(function: Callable[..., Any]) -> Any:
+        """Return the function itself."""
+        return function
 
-    def make(self, ir_value):
-        """Another value of the same code."""
-        return type(self)(self.builder, ir_value)
-
-    def constant(self, x):
-        """The machine code of the number x, as a value of this type."""
-        return self.ir.type(x)
-
-    def _read(self, x):
-        return x.ir if isinstance(x, Value) else self.constant(x)
-
-    def _operate(self, name, other, swapped=False):
-        second = self._read(other)
-        pair = (second, self.ir) if swapped else (self.ir, second)
-        return self.make(getattr(self.builder, name)(*pair, flags=("contract",)))
-
-    def __add__(self, other):
-        return self._operate("fadd", other)
-
-    def __radd__(self, other):
-        return self._operate("fadd", other, swapped=True)
-
-    def __sub__(self, other):
-        return self._operate("fsub", other)
-
-    def __rsub__(self, other):
-        return self._operate("fsub", other, swapped=True)
-
-    def __mul__(self, other):
-        return self._operate("fmul", other)
-
-    def __rmul__(self, other):
-        return self._operate("fmul", other, swapped=True)
-
-    def __truediv__(self, other):
-        return self._operate("fdiv", other)
-
-    def __rtruediv__(self, other):
-        return self._operate("fdiv", other, swapped=True)
-
-    def __neg__(self):
-        return self.make(self.builder.fneg(self.ir))
-
-    def __abs__(self):
-        return self._call("llvm.fabs")
-
-    def sqrt(self):
-        """The square root."""
-        return self._call("llvm.sqrt")
-
-    def where_above(self, limit, x, other=0.0):
-        """The value where x is above the limit, else the other; so also where x is not a number."""
-        above = self.builder.fcmp_ordered(">", self._read(x), self._read(limit))
-        return self.make(self.builder.select(above, self.ir, self._read(other)))
-
-    def _call(self, name):
-        return self.make(self.builder.call(self.builder.module.declare_intrinsic(name, [self.ir.type]), [self.ir]))
-
-
-class Lanes(Value):
-    """A float of each of several bodies, in one register."""
-
-    def constant(self, x):
-        """The machine code of the number x in every lane."""
-        return ir.Constant(self.ir.type, [x] * self.ir.type.count)
-
-    def _call(self, name):
-        kind, module = self.ir.type, self.builder.module  # llvmlite has no names of intrinsics for vectors
-        function = cgutils.get_or_insert_function(module, ir.FunctionType(kind, [kind]), f"{name}.v{kind.count}f64")
-        return self.make(self.builder.call(function, [self.ir]))
-
-
-class Axes(NamedTuple):
-    """Three floats, or lanes, in place of a four."""
-
-    x: Any
-    y: Any
-    z: Any
-
-    def __add__(self, other):
-        return Axes(*(a + b for a, b in zip(self, other, strict=True)))
-
-
-def root(x):
-    """The square root."""
-    return x.sqrt() if isinstance(x, Value) else math.sqrt(x)
-
-
-def over_root(x):
-    """One over the square root; inf at 0."""
-    return 1.0 / x.sqrt() if isinstance(x, Value) else 1.0 / math.sqrt(x) if x else math.inf
-
-
-def where_above(value, limit, x, other=0.0):
-    """The value where x is above the limit, else the other."""
-    if isinstance(value, Value):
-        return value.where_above(limit, x, other)
-    return value if x > limit else other
-
-
-def join(a, b, c, d):
-    """Four floats as one value, of which all or none are of machine code, but for constants."""
-    if isinstance(a, Lanes):
-        return Axes(a, b, c)
-    if not isinstance(a, Value):
-        return np.array((a, b, c, d))
-    value = ir.Constant(ir.VectorType(ir.DoubleType(), LANES), ir.Undefined)
-    for place, each in enumerate((a, b, c, d)):
-        part = each.ir if isinstance(each, Value) else ir.DoubleType()(each)
-        value = a.builder.insert_element(value, part, ir.IntType(32)(place))
-    return a.make(value)
-
-
-def split(v):
-    """The first three of four floats."""
-    if isinstance(v, Axes):
-        return tuple(v)
-    if not isinstance(v, Value):
-        return (float(v[0]), float(v[1]), float(v[2]))
-    return tuple(v.make(v.builder.extract_element(v.ir, ir.IntType(32)(place))) for place in range(3))
-
-
-add, cross, dot, scale, subtract, times = (
-    getattr(f, "py_func", f) for f in (_vector.add, _vector.cross, _vector.dot, _vector.scale, _vector.subtract, _vector.times)
-)
-"""Those of `vector`."""
-
-if COMPILED:
+else:
     from llvmlite import ir
     from numba.core import cgutils, types
-    from numba.extending import intrinsic
+    from numba.core.datamodel import register_default
+    from numba.core.registry import cpu_target
+    from numba.extending import intrinsic, models
 
-    from .lanes_llvm import REGISTER
-    from .lanes_llvm import Lanes as LanesType
-    from .simd_llvm import FOUR
+    DOUBLE, BIT, INTEGER, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
 
-    LANES_TYPE = LanesType(REGISTER)
-    _PLAIN = {FOUR: np.full(LANES, 0.7), types.float64: 0.7, types.int64: 5, LANES_TYPE: 0.7}
+    class Lanes(types.Type):  # type: ignore[misc]  # numba has no types
+        """The numba type of a number with `width` floats."""
 
-    def _stand_in(kind):
-        """A value of a type, with which a function can be run in Python."""
-        if not isinstance(kind, types.BaseTuple):
-            return _PLAIN[types.int64 if isinstance(kind, types.Integer) else kind]
-        return _PLAIN[FOUR] if _is_axes(kind) else _assemble(kind, [_stand_in(each) for each in kind])
+        def __init__(self, width: int) -> None:
+            self.width = width
+            super().__init__(name=f"Lanes({width})")
 
-    def _is_axes(kind):
-        return getattr(kind, "instance_class", None) is Axes
+    class Mask(types.Type):  # type: ignore[misc]  # numba has no types
+        """The numba type of `width` truth values."""
 
-    def _assemble(kind, values):
-        return kind.instance_class(*values) if isinstance(kind, types.BaseNamedTuple) else tuple(values)
+        def __init__(self, width: int) -> None:
+            self.width = width
+            super().__init__(name=f"Mask({width})")
 
-    def _has_lanes(kind):
-        return any(map(_has_lanes, kind)) if isinstance(kind, types.BaseTuple) else kind == LANES_TYPE
+    @register_default(Lanes)
+    @register_default(Mask)
+    class _RegistersModel(models.PrimitiveModel):  # type: ignore[misc]  # numba has no types
+        """Lanes and masks in memory: whole registers."""
 
-    def _type_of(value, lanes):
-        if isinstance(value, tuple):
-            return types.Tuple([_type_of(each, lanes) for each in value])
-        four, number = (types.NamedUniTuple(LANES_TYPE, 3, Axes), LANES_TYPE) if lanes else (FOUR, types.float64)
-        return four if isinstance(value, np.ndarray) else number
+        def __init__(self, manager: Any, kind: Any) -> None:
+            element = DOUBLE if isinstance(kind, Lanes) else BIT
+            count = kind.width // REGISTER
+            super().__init__(manager, kind, ir.LiteralStructType([ir.VectorType(element, REGISTER)] * count))
 
-    def _unpack(builder, kind, value):
-        if kind == LANES_TYPE:
-            return Lanes(builder, builder.extract_value(value, 0))
-        if not isinstance(kind, types.BaseTuple):
-            return Value(builder, value)
-        values = cgutils.unpack_tuple(builder, value, len(kind))
-        return _assemble(kind, [_unpack(builder, *each) for each in zip(kind, values, strict=True)])
+    class Symbol(Traced):
+        """A number of compiled code: a float, an integer, a truth value, or lanes of floats or truth values.
 
-    def _pack(context, builder, kind, value):
+        `registers` are its LLVM values: one, or for lanes one per `REGISTER` floats. Every operation is emitted once per
+        register, so that results do not depend on the number of lanes.
+        """
+
+        def __init__(self, builder: Any, registers: Any, flags: tuple[str, ...] = ("contract",)) -> None:
+            self.builder, self.registers, self.flags = builder, tuple(registers), flags
+
+        __hash__ = object.__hash__
+
+        @property
+        def width(self) -> int:
+            """Number of lanes; 0 for a single number."""
+            kind = self.registers[0].type
+            return kind.count * len(self.registers) if isinstance(kind, ir.VectorType) else 0
+
+        def spread(self, x: Any) -> Any:
+            """Return the registers of a number x brought to the lanes of this one."""
+            if not isinstance(x, Symbol):
+                kind = ir.VectorType(DOUBLE, REGISTER) if self.width else DOUBLE
+                return [ir.Constant(kind, [float(x)] * REGISTER if self.width else float(x))] * (len(self.registers))
+            value = x.registers[0]
+            if value.type == INTEGER:
+                value = self.builder.sitofp(value, DOUBLE)
+            if x.width or not self.width:
+                return x.registers if x.width else (value,)
+            vector = ir.VectorType(value.type, REGISTER)
+            first = self.builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(INDEX, 0))
+            everywhere = ir.Constant(ir.VectorType(INDEX, REGISTER), [0] * REGISTER)
+            return [self.builder.shuffle_vector(first, first, everywhere)] * len(self.registers)
+
+        def emit(self, operation: Callable[..., Any], *numbers: Any) -> Symbol:
+            """Return the result of an operation on registers, for numbers that may be lanes, single numbers or constants."""
+            widest = max((x for x in numbers if isinstance(x, Symbol)), key=lambda x: x.width)
+            registers = zip(*(widest.spread(x) for x in numbers), strict=True)
+            return Symbol(self.builder, [operation(*each) for each in registers], self.flags)
+
+        def call(self, name: str, *numbers: Any) -> Symbol:
+            """Return the result of an LLVM intrinsic such as "sqrt"."""
+
+            def operation(*registers: Any) -> Any:
+                kind = registers[0].type
+                suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+                function_type = ir.FunctionType(kind, [kind] * len(registers))
+                module = self.builder.module
+                return self.builder.call(
+                    cgutils.get_or_insert_function(module, function_type, f"llvm.{name}.{suffix}"), registers
+                )
+
+            return self.emit(operation, *numbers)
+
+        def _float(self, name: str, *numbers: Any) -> Symbol:
+            return self.emit(lambda *registers: getattr(self.builder, name)(*registers, flags=self.flags), *numbers)
+
+        def _compare(self, sign: str, other: Any) -> Symbol:
+            return self.emit(lambda a, b: self.builder.fcmp_ordered(sign, a, b), self, other)
+
+        def __add__(self, other: Any) -> Symbol:
+            return self._float("fadd", self, other)
+
+        def __radd__(self, other: Any) -> Symbol:
+            return self._float("fadd", other, self)
+
+        def __sub__(self, other: Any) -> Symbol:
+            return self._float("fsub", self, other)
+
+        def __rsub__(self, other: Any) -> Symbol:
+            return self._float("fsub", other, self)
+
+        def __mul__(self, other: Any) -> Symbol:
+            return self._float("fmul", self, other)
+
+        def __rmul__(self, other: Any) -> Symbol:
+            return self._float("fmul", other, self)
+
+        def __truediv__(self, other: Any) -> Symbol:
+            return self._float("fdiv", self, other)
+
+        def __rtruediv__(self, other: Any) -> Symbol:
+            return self._float("fdiv", other, self)
+
+        def __neg__(self) -> Symbol:
+            return self.emit(self.builder.fneg, self)
+
+        def __abs__(self) -> Symbol:
+            return self.call("fabs", self)
+
+        def __gt__(self, other: Any) -> Symbol:
+            return self._compare(">", other)
+
+        def __ge__(self, other: Any) -> Symbol:
+            return self._compare(">=", other)
+
+        def __lt__(self, other: Any) -> Symbol:
+            return self._compare("<", other)
+
+        def __le__(self, other: Any) -> Symbol:
+            return self._compare("<=", other)
+
+        def __eq__(self, other: Any) -> Symbol:  # type: ignore[override]
+            return self._compare("==", other)
+
+        def __and__(self, other: Any) -> Symbol:
+            return self.emit(self.builder.and_, self, other)
+
+        def __or__(self, other: Any) -> Symbol:
+            return self.emit(self.builder.or_, self, other)
+
+        def __invert__(self) -> Symbol:
+            return self.emit(self.builder.not_, self)
+
+        def __bool__(self) -> bool:
+            raise TypeError("a traced function cannot branch on a number")
+
+        def fuse(self, a: Any, b: Any, c: Any) -> Symbol:
+            """Return a b + c, rounded once."""
+            return self.call("fma", a, b, c)
+
+        def root(self) -> Symbol:
+            """Return the square root."""
+            return self.call("sqrt", self)
+
+        def choose(self, a: Any, b: Any) -> Symbol:
+            """Return a where this mask is true and b elsewhere."""
+            return self.emit(self.builder.select, self, a, b)
+
+        def split(self) -> tuple[Symbol, ...]:
+            """Return the floats of one register."""
+            (register,) = self.registers
+            places = (ir.Constant(INDEX, i) for i in range(REGISTER))
+            return tuple(Symbol(self.builder, [self.builder.extract_element(register, i)], self.flags) for i in places)
+
+        def shuffle(self, places: tuple[int, ...]) -> Symbol:
+            """Return the floats of a register at these places."""
+            at = ir.Constant(ir.VectorType(INDEX, REGISTER), places)
+            return self.emit(lambda register: self.builder.shuffle_vector(register, register, at), self)
+
+        def reduce(self, name: str) -> Symbol:
+            """Return whether every ("and") or some ("or") truth value is true."""
+            whole, *rest = self.registers
+            for part in rest:
+                whole = getattr(self.builder, f"{name}_")(whole, part)
+            if self.width:
+                function_type = ir.FunctionType(BIT, [whole.type])
+                name = f"llvm.vector.reduce.{name}.v{REGISTER}i1"
+                whole = self.builder.call(cgutils.get_or_insert_function(self.builder.module, function_type, name), [whole])
+            return Symbol(self.builder, [whole], self.flags)
+
+    def unpack(builder: Any, kind: Any, value: Any, flags: tuple[str, ...] = ("contract",)) -> Any:
+        """Return the symbols of an LLVM value of a numba type: one, or a tuple of them."""
         if isinstance(kind, types.BaseTuple):
-            return context.make_tuple(builder, kind, [_pack(context, builder, *each) for each in zip(kind, value, strict=True)])
-        if kind == LANES_TYPE:
-            whole = ir.Constant(context.get_value_type(kind), ir.Undefined)
-            part = value.ir if isinstance(value, Value) else ir.Constant(whole.type.elements[0], [value] * REGISTER)
-            return builder.insert_value(whole, part, 0)
-        return value.ir if isinstance(value, Value) else context.get_constant(kind, value)
+            parts = cgutils.unpack_tuple(builder, value, len(kind))
+            numbers = [unpack(builder, *each, flags) for each in zip(kind, parts, strict=True)]
+            return kind.instance_class(*numbers) if isinstance(kind, types.BaseNamedTuple) else tuple(numbers)
+        if isinstance(kind, Lanes | Mask):
+            return Symbol(builder, [builder.extract_value(value, i) for i in range(kind.width // REGISTER)], flags)
+        return Symbol(builder, [value], flags)
 
-    def trace(function):
-        """The function as an intrinsic of numba's."""
+    def pack(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        """Return the LLVM value of a numba type of a symbol, a constant or a tuple of them."""
+        if isinstance(kind, types.BaseTuple):
+            parts = [pack(context, builder, *each) for each in zip(kind, value, strict=True)]
+            return context.make_tuple(builder, kind, parts)
+        if not isinstance(value, Symbol):
+            return context.get_constant(kind, value)
+        if not value.width:
+            return value.registers[0]
+        whole = ir.Constant(ir.LiteralStructType([part.type for part in value.registers]), ir.Undefined)
+        for i, part in enumerate(value.registers):
+            whole = builder.insert_value(whole, part, i)
+        return whole
 
-        def traced(typing, *kinds):
-            found = _type_of(function(*map(_stand_in, kinds)), any(map(_has_lanes, kinds)))
+    def type_of(value: Any) -> Any:
+        """Return the numba type of a symbol, a constant or a tuple of them."""
+        if isinstance(value, tuple):
+            named = type(value) if hasattr(value, "_fields") else None
+            return types.BaseTuple.from_types([type_of(each) for each in value], named)
+        if not isinstance(value, Symbol):
+            return types.boolean if isinstance(value, bool) else types.int64 if isinstance(value, int) else types.float64
+        kind = value.registers[0].type
+        if value.width:
+            return (Lanes if kind.element == DOUBLE else Mask)(value.width)
+        return {DOUBLE: types.float64, BIT: types.boolean, INTEGER: types.int64}[kind]
 
-            def build(context, builder, sig, args):
-                pairs = zip(sig.args, args, strict=True)
-                return _pack(context, builder, found, function(*(_unpack(builder, *pair) for pair in pairs)))
+    @cache
+    def _find_type(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+        """Return the type of a function's result, found by tracing it into a module that is thrown away."""
+        context = cpu_target.target_context
+        arguments = [context.get_value_type(kind) for kind in kinds]
+        whole = ir.Function(ir.Module(), ir.FunctionType(INDEX, arguments), "trial")
+        builder = ir.IRBuilder(whole.append_basic_block())
+        return type_of(function(*(unpack(builder, *each) for each in zip(kinds, whole.args, strict=True))))
+
+    def trace(function: Callable[..., Any]) -> Any:
+        """Return the function as an intrinsic of numba."""
+
+        def traced(typing: Any, *kinds: Any) -> Any:
+            # A value that may be None by its type is not None here: numba's cast checks it.
+            kinds = tuple(kind.type if isinstance(kind, types.Optional) else kind for kind in kinds)
+            kinds = tuple(types.int64 if isinstance(kind, types.Integer) else kind for kind in kinds)
+            found = _find_type(function, kinds)
+
+            def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+                numbers = (unpack(builder, *each) for each in zip(sig.args, args, strict=True))
+                return pack(context, builder, found, function(*numbers))
 
             return found(*kinds), build
 
         parameters = inspect.signature(function).parameters.values()
         context = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        traced.__signature__ = inspect.Signature([context, *(each.replace(annotation=each.empty) for each in parameters)])
+        traced.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [context, *(each.replace(annotation=each.empty) for each in parameters)]
+        )
         return intrinsic(update_wrapper(traced, function, ("__module__", "__name__", "__qualname__", "__doc__"), ()))
 
-else:
 
-    def trace(function):
-        """The function itself."""
-        return function
+def join(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Return four floats as one number: lanes for components, in plain Python an array."""
+    symbol = next((x for x in (a, b, c, d) if isinstance(x, Traced)), None)
+    if symbol is None:
+        return np.array((a, b, c, d))
+    value = ir.Constant(ir.VectorType(DOUBLE, REGISTER), ir.Undefined)
+    for place, x in enumerate((a, b, c, d)):
+        value = symbol.builder.insert_element(value, *symbol.spread(x), ir.Constant(INDEX, place))
+    return Symbol(symbol.builder, [value], symbol.flags)

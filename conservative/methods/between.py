@@ -19,6 +19,7 @@ from ..deferred_imports import kernels
 from ..errors import BadInput, Diverged
 from ..grid import SAMPLE_BYTES, Grid, most_samples
 from ..method import Method
+from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from ..trajectory import Trajectory, accept_samples
 from .coefficients.explicit import DORMAND_PRINCE_8
@@ -163,4 +164,4 @@ def into_principal_axes(scene: Scene, start: PrincipalStart, R_WB: Array, w_WB_B
 
 def field_of(start: PrincipalStart) -> Any:
     """Return the field of a start; of a free body one of no weight, for which there is code anyway."""
-    return kernels("fields").Uniform(0.0, 0.0, 0.0) if start.field is None else start.field
+    return UniformField(0.0, 0.0, 0.0) if start.field is None else start.field

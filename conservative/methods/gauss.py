@@ -116,9 +116,9 @@ def find_coefficients(stages: int, dt: float) -> Any:
 
 @lru_cache(maxsize=MOST_STAGES)
 def pad_tableau(stages: int) -> tuple[Array, ...]:
-    """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `LANES`; all are factors."""
+    """Return A, E by columns and b, b_low, each (n,), stages filled up with zeros to a multiple of `FOUR`; all are factors."""
     table = tableau(stages)
-    extra = (0, -len(table.b) % kernels("simd").LANES)
+    extra = (0, -len(table.b) % kernels("lanes").FOUR)
     rows = [np.pad(matrix.T, ((0, 0), extra)).ravel() for matrix in (table.A, table.E)]
     return (*rows, np.pad(table.b, extra), np.pad(table.b_low, extra))
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..attitude import Array, axes_about, triple
+from ..attitude import Array, axes_about, from_quaternion, to_quaternion, triple
 from ..batch import Batch
 from ..card import Card, Cost
 from ..check import describe, positive_number, set_fields
@@ -17,20 +18,24 @@ from ..errors import BadInput
 from ..grid import Grid
 from ..invariants import JACOBI_INTEGRAL, momentum_W
 from ..method import Method, Role, Run
+from ..potentials.field import FieldPotential, into_axes
 from ..potentials.turning import Orbit, Turning, static_part
+from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from ..trajectory import Bounds, Trajectory
 from .bounds import bounds_of
-from .many import RunMany
-from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple
+from .columns import fill_columns, take_pieces
+from .many import Block, RunMany
+from .principal_axes import PrincipalStart, Triple, field_axis, invariant_scales, principal_start, quadruple, spin_rate
 from .run_kernel import prepare_run
-from .taylor_many import prepare_bodies
-from .units import in_own_units
+from .units import COARSE, SHORTEST, in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
 """Orders that the kernel has code for, and the one where nobody names one."""
 RIGHT_ANGLE = 1e-15
 """Cosine of an angle that is a right one."""
+NEARLY_EQUAL = 4e-12
+"""Relative difference of two moments below which a body may be symmetric: no less than `Scene.symmetry_axis_B` allows."""
 PARTS = 100
 """Parts of a step that bounds allow for where a tolerance divides it."""
 
@@ -154,7 +159,7 @@ def has_recurrence(scene: Scene) -> bool:
     potential = static_part(scene.potential)
     if potential is None:
         return True
-    return type(potential.kernel_field(scene.body.R_BP)) in kernels("axial").start_series.registry
+    return hasattr(potential.kernel_field(scene.body.R_BP), "series")
 
 
 def turning_rate(scene: Scene) -> float | None:
@@ -173,9 +178,7 @@ def convert(scene: Scene, method: Taylor) -> tuple[str, PrincipalStart, Any]:
     start, loose = start_about_symmetry(scene)
     kernel, R_WD = kernels("taylor"), axes_of(scene)
     R_DP = R_WD.T @ scene.R_WB0 @ (np.eye(3) if start.R_BP is None else start.R_BP)
-    field = start.field if field_axis(scene) else kernel.Free(math.hypot(*start.L))
-    if isinstance(scene.potential, Turning):
-        field = kernel.Revolving(start.field.field, scene.potential.orbit.rate)
+    field = start.field if field_axis(scene) or isinstance(scene.potential, Turning) else kernel.Free(math.hypot(*start.L))
     rows = triple(R_DP[2]), triple(R_DP[0])
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
     return method.label, start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L)
@@ -207,3 +210,129 @@ def third_axis(scene: Scene) -> Array:
     momentum = momentum_W(scene.body, scene.R_WB0, scene.w_WB_B0)
     size = float(np.linalg.norm(momentum))
     return np.array(axis) if axis else momentum / size if size > 0 else np.array((0.0, 0.0, 1.0))
+
+
+def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
+    """Return the run of bodies by series of an order; None if they have to run alone.
+
+    What `convert` makes of one scene is made of all bodies at once, in units in which each is of order one.
+    """
+    potential, n, s = bodies.scene.potential, len(bodies), grid.n_samples
+    if potential is not None and not isinstance(potential, FieldPotential):
+        return None
+    kernel = kernels("taylor")
+    moments, J, R_BP, symmetric = find_frames(bodies)
+    w = into_axes(bodies.w_WB_B0, R_BP)
+    field = None if potential is None else potential.fields(bodies.parameters, R_BP)
+    axis_W = np.zeros((n, 3)) if field is None else np.asarray(field.axis_W())
+    energy = np.sum(moments * w * w, axis=1) / 2 + (0.0 if field is None else field.scale())
+    mass, time = find_units(moments, energy, grid.dt)
+    energy_unit = mass / time / time
+    L = w * time[:, None] * (moments / mass[:, None])
+    if field is None or not axis_W.any():
+        axis_W = (bodies.R_WB0 @ (R_BP @ (w * moments)[..., None]))[..., 0]
+        field = kernel.Free(np.linalg.norm(L, axis=1))
+    else:
+        field = field._replace(**{name: (getattr(field, name).T / energy_unit).T for name in field.ENERGIES})
+        if isinstance(field, UniformField):  # of symmetric bodies the moment is along the axis but for round-off
+            field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
+    R_WD = directions(axis_W)
+    R_DP = R_WD.swapaxes(1, 2) @ bodies.R_WB0 @ R_BP
+    energy, one = np.where(energy > 0, energy, 1.0) / energy_unit, np.ones(n)
+    J_in_units = J / mass[:, None]
+    start = kernel.Bodies(
+        J=J_in_units,
+        J_inverse=1 / J_in_units,
+        field=field,
+        loose=np.column_stack([one, one, ~symmetric]),
+        scales=np.column_stack([energy, np.sqrt(2 * energy * (moments / mass[:, None]).max(axis=1))]),
+        g=R_DP[:, 2],
+        a=R_DP[:, 0],
+        L=L,
+        h=grid.dt / time,
+        axes=R_WD,
+        R_BP=R_BP,
+        units=np.column_stack([one, one, np.where(symmetric, J[:, 2] / moments[:, 2], 1.0)]) / time[:, None],
+    )
+    motion = kernel.Motion(start.g, start.a, L / J_in_units, np.zeros(n))
+    width, like = kernels("lanes").REGISTER, (zeros_like(start), zeros_like(motion))
+    columns, motions = (fill_columns(np.column_stack(list(flatten(each, n))), width) for each in (start, motion))
+    m = columns.shape[1]
+    spin = np.where(symmetric, spin_rate(moments[:, 0], moments[:, 2], w[:, 2] * moments[:, 2]), 0.0)
+    angles = np.outer(grid.t, np.pad(spin, (0, m - n))) if symmetric.any() else np.zeros((1, m))
+    turns = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    R_WB0, cost = from_quaternion(to_quaternion(bodies.R_WB0)), m * (20e-9 + 0.7e-9 * order**2)
+
+    def run() -> Block:
+        ends, R_WB, w_WB_B = motions.copy(), np.empty((m, s, 3, 3)), np.empty((m, s, 3))
+        given, samples = (order, like, columns, ends, turns), (R_WB.reshape(-1), w_WB_B.reshape(-1))
+        take_pieces(
+            grid.n_steps, cost, lambda done, last: kernel.enter_many(*given, done, last, grid.n_steps, grid.every, *samples)
+        )
+        R_WB[:n, 0], w_WB_B[:n, 0] = R_WB0, bodies.w_WB_B0
+        return Block(R_WB[:n], w_WB_B[:n], ends[-1, :n] == 0)
+
+    return run
+
+
+def find_frames(bodies: Batch) -> tuple[Array, Array, Array, Any]:
+    """Return the axes in which bodies are integrated: (moments, J, R_BP, symmetric).
+
+    Moments (n, 3), kg m^2, are along these axes, and rotations R_BP (n, 3, 3) take them to the body's. A body that is symmetric
+    together with its field (n,) is described in the frame that does not spin, so that its motion has the moments J (n, 3), J1
+    three times. Bodies that may be symmetric are examined one by one, unless all are the same.
+    """
+    moments, R_BP = (np.array(each) for each in bodies.principal)
+    J, symmetric = moments.copy(), np.zeros(len(bodies), bool)
+    gaps = np.abs(moments - np.roll(moments, 1, axis=1)).min(axis=1)
+    near = np.flatnonzero(gaps <= NEARLY_EQUAL * moments.max(axis=1))
+    alike = bodies.inertia is None and not bodies.parameters
+    for part in [near] if alike and len(near) else near[:, None]:
+        i = int(part[0])
+        axis_B = bodies.take(i).symmetry_axis_B
+        if axis_B is not None:
+            x, y, J3 = np.roll(moments[i], 2 - int(np.argmax(np.abs(axis_B @ R_BP[i]))))
+            J1 = (x + y) / 2
+            symmetric[part], J[part], moments[part], R_BP[part] = True, J1, (J1, J1, J3), axes_about(axis_B)
+    return moments, J, R_BP, symmetric
+
+
+def find_units(moments: Array, energy: Array, dt: float) -> list[Array]:
+    """Return units (n,) of moments, kg m^2, and of time, s, for a step dt, s: powers of two (`units.find_units`).
+
+    Bodies have moments (n, 3), kg m^2, and energies (n,), J.
+    """
+    moment, step = np.frexp(moments.max(axis=1))[1], int(np.frexp(dt)[1])
+    rate = (np.frexp(energy)[1] - moment) // 2
+    time = np.where(energy > 0, np.minimum(-rate, step - SHORTEST), step)
+    return [np.ldexp(1.0, COARSE * np.trunc(each / COARSE).astype(int)) for each in (moment, time)]
+
+
+def directions(axes: Array) -> Array:
+    """Return rotations (n, 3, 3) whose third columns point along vectors (n, 3): those of `axes_about`; along e_z for 0."""
+    sizes = np.linalg.norm(axes, axis=1)[:, None]
+    third = np.where(sizes > 0, axes, (0.0, 0.0, 1.0)) / np.where(sizes > 0, sizes, 1.0)
+    first = np.cross(np.eye(3)[(np.argmax(np.abs(third), axis=1) + 2) % 3], third)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(third, first), third], axis=2)
+
+
+def flatten(value: Any, n: int) -> Iterator[Array]:
+    """Yield the numbers (n, .) of arrays (n, ...) in a tuple of tuples."""
+    if not isinstance(value, tuple):
+        yield np.reshape(value, (n, -1))
+        return
+    for part in value:
+        yield from flatten(part, n)
+
+
+def zeros_like(value: Any) -> Any:
+    """Return the tuple of tuples that arrays (n, ...) in a tuple of tuples are for one body, of zeros."""
+    if isinstance(value, tuple):
+        return type(value)(*map(zeros_like, value))
+    return nest_zeros(np.shape(value)[1:])
+
+
+def nest_zeros(shape: tuple[int, ...]) -> Any:
+    """Return zeros of a shape in tuples."""
+    return tuple(nest_zeros(shape[1:]) for _ in range(shape[0])) if shape else 0.0

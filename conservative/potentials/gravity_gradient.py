@@ -2,22 +2,105 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import Array, triple
+from ..arithmetic import add, apply, cross, dot, fuse, halfway, in_body, scale, times
+from ..attitude import Array
 from ..body import RigidBody
 from ..check import build_unchecked, positive_number, set_fields
 from .direction import unit_vector
-from .varied import VariedGradient, fill
+from .field import FieldPotential
+
+
+class GradientField(NamedTuple):
+    """Rows of G = 3 rate^2 J, J, and the direction e of the centre, world axes (`conservative.potentials.field`).
+
+    V = u' G u / 2 with u = R' e is quadratic in the base vectors. V* is therefore the gradient at their mean, e (G ubar)'.
+    """
+
+    rows: Any
+    e: Any
+
+    ENERGIES = ("rows",)
+
+    def energy(self, q):
+        """Return V in J."""
+        return self.slope((), in_body(q, self.e))[0]
+
+    def body_torque(self, q):
+        """Return the torque in N m."""
+        u = in_body(q, self.e)
+        return cross(u, apply(self.rows, u))
+
+    def finite_torque(self, q, a):
+        """Return T = e x (M G ubar) and its derivative; M changes the product by dm, u changes by -du as it is taken at -a."""
+        e = in_body(q, self.e)
+        u, du = halfway(scale(-1.0, a), e)
+        m, dm = halfway(a, apply(self.rows, u))
+        changes = (halfway(a, apply(self.rows, scale(-1.0, column)))[0] for column in du)
+        return cross(e, m), tuple(cross(e, add(*each)) for each in zip(dm, changes, strict=True))
+
+    def finite_derivative(self, q0, q1):
+        """Return e and G ubar."""
+        u = tuple(0.5 * (dot(a, self.e) + dot(b, self.e)) for a, b in zip(q0, q1, strict=True))
+        return self.e, apply(self.rows, u)
+
+    def finite_slope(self, q0, q1):
+        """Return G and e e' / 2."""
+        return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
+
+    def find_constants(self, J_inverse):
+        """Return the rows of two matrices: u = G g, turned as r and as s and over J, is one of them times r, s and g."""
+        x, y, z = self.rows
+        rows = (
+            (y[1], z[2], x[0]),
+            (y[2], z[0], x[1]),
+            (y[0], z[1], x[2]),
+            (z[1], x[2], y[0]),
+            (z[2], x[0], y[1]),
+            (z[0], x[1], y[2]),
+        )
+        return tuple(times(J_inverse, row) for row in rows)
+
+    def slope(self, constants, g):
+        """Return V and dV/dg in J."""
+        u = apply(self.rows, g)
+        return 0.5 * dot(g, u), u
+
+    def series(self, constants, g, series):
+        """Return the recurrence of J^-1 (g x u)."""
+        rows = [series.vector(*row) for row in constants]
+        by_r, by_s, by_g = zip(rows[:3], rows[3:], strict=True)
+        turned = series.history(), series.history()
+
+        def accelerate(c, n):
+            for k, u in enumerate(turned):
+                u.push(fuse(by_s[k], c[n, 1], fuse(by_r[k], c[n, 0], by_g[k] * c.newest[0])))
+            (r, s), (g_r, g_s) = turned, c.turned(0)
+            return series.convolve(n, 0, n, ((s, g_r), (r, g_s)))[0]
+
+        return accelerate
+
+    def energies(self, R_WB):
+        """Return V, (...), in J."""
+        u = np.sum(R_WB * self.e[..., :, None], axis=-2)
+        return np.sum(np.sum(self.rows * u[..., None, :], axis=-1) * u, axis=-1) / 2
+
+    def scale(self):
+        """Return the largest V, J."""
+        return np.linalg.eigvalsh(self.rows)[..., -1] / 2
+
+    def axis_W(self):
+        """Return the direction of the centre."""
+        return self.e
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class GravityGradient:
+class GravityGradient(FieldPotential):
     """Gravity gradient of a distant centre on a body that rotates about its centre of mass: V = 3/2 rate^2 u'J u, u = R' e.
 
     This is the second-order term in size over distance (Hughes, Spacecraft Attitude Dynamics, 9.3). The torque in body axes is
@@ -55,45 +138,16 @@ class GravityGradient:
         """Return 3 rate^2, 1/s^2: what u x J u is multiplied by."""
         return 3 * self.rate**2
 
-    def _towards(self, R_WB: Array) -> Array:
-        """Return u = R' e, (..., 3)."""
-        return np.swapaxes(R_WB, -1, -2) @ self.direction_W
+    NUMBERS: ClassVar[tuple[str, ...]] = ("rate", "inertia", "direction_W")
 
-    def energy(self, R_WB: Array) -> Array:
-        """Return V, (...), in J."""
-        u = self._towards(R_WB)
-        return self.factor / 2 * np.sum(u @ self.inertia * u, axis=-1)
-
-    def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR = 3 rate^2 e (J u)', (..., 3, 3), in J."""
-        return self.factor * self.direction_W[:, None] * (self._towards(R_WB) @ self.inertia)[..., None, :]
-
-    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (..., 3, 3), in J: the gradient at the mean, exact for a quadratic V."""
-        return self.gradient((R_0 + R_1) / 2)
-
-    def scale(self) -> float:
-        """Return the largest V, J."""
-        return self.factor / 2 * float(np.linalg.eigvalsh(self.inertia)[-1])
+    @staticmethod
+    def build_field(R_BP: Array | None, rate: Any, inertia: Any, direction_W: Any) -> GradientField:
+        """Return the field in axes R_BP."""
+        axes = np.eye(3) if R_BP is None else R_BP
+        rows = 3 * np.asarray(rate)[..., None, None] ** 2 * (np.swapaxes(axes, -1, -2) @ inertia @ axes)
+        return GradientField(rows, direction_W)
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
         inertia = self.inertia / energy
         return build_unchecked(GravityGradient, rate=self.rate, inertia=inertia, direction_W=self.direction_W)
-
-    @property
-    def axis_W(self) -> Array:
-        """Return the direction of the centre, (3,)."""
-        return self.direction_W
-
-    def vary(self, parameters: Mapping[str, Array]) -> VariedGradient:
-        """Return the fields of n bodies with these numbers (n, ...), rad/s, kg m^2 and of no unit, in place of its own."""
-        rates, inertia, directions_W = fill(self, parameters, "rate", "inertia", "direction_W")
-        return VariedGradient(3 * rates**2, inertia, directions_W)
-
-    def kernel_field(self, R_BP: Array) -> Any:
-        """Return 3 rate^2 J in principal axes, row by row, and the direction as the kernels want them."""
-        from ..kernels.gradient_field import Gradient
-
-        first, second, third = self.factor * (R_BP.T @ self.inertia @ R_BP)
-        return Gradient(triple(first), triple(second), triple(third), triple(self.direction_W))

@@ -4,32 +4,213 @@ V = F(s) with s = |R b - A|^2, b in body and A in world axes. s is quadratic in 
 
     V* = (F(s1) - F(s0)) / (s1 - s0) 2 (Rbar b - A) b'        Rbar the mean of both attitudes
 
-is an exact finite derivative once the divided difference is written without cancellation. Source: our own, in the sense of the
-paper's (21).
+is an exact finite derivative once the divided difference is written without cancellation, in the sense of the paper's (21). The
+torque is that of uniform gravity, with A for the vertical and 2 F' b for the moment.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import Array, Triple, triple
+from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, root, scale, subtract
+from ..attitude import Array
 from ..check import build_unchecked, finite_array, finite_number, positive_number, set_fields
 from ..errors import BadInput
-from .varied import VariedPoints, fill, lengths
+from .field import FieldPotential, into_axes, lengths
+from .uniform_gravity import turned_moment
 
 _POINT = "three finite numbers (3,), m"
 _LENGTH = "a finite length of 0 or more, m"
 _STRENGTH = "a finite number other than 0, J m"
 
 
-class PointPotential(ABC):
-    """What both kinds share: everything that follows from their points, `energy_of` and `slope`.
+def _energy(field, q):
+    """Return V in J."""
+    x = subtract(field.b, in_body(q, field.A))
+    return field.value(dot(x, x))
+
+
+def _body_torque(field, q):
+    """Return the torque in N m."""
+    A = in_body(q, field.A)
+    x = subtract(field.b, A)
+    return scale(2.0 * field.derivative(dot(x, x)), cross(field.b, A))
+
+
+def _finite_torque(field, q, a):
+    """Return T = -2 slope A x m, m = M b, and its derivative: the slope changes with s1, and ds1 = 4 x1.dm."""
+    A = in_body(q, field.A)
+    m, dm = halfway(a, field.b)
+    x0, x1 = subtract(field.b, A), subtract(subtract(scale(2.0, m), field.b), A)
+    slope, change = field.divided(dot(x0, x0), dot(x1, x1))
+    Am, f = cross(A, m), -2.0 * slope
+
+    def change_along(column):
+        d, e = cross(A, column), -8.0 * change * dot(x1, column)
+        return tuple(fuse(f, x, e * y) for x, y in zip(d, Am, strict=True))
+
+    return scale(f, Am), tuple(map(change_along, dm))
+
+
+def _find_ends(field, q0, q1):
+    """Return R b - A at both attitudes, in world axes."""
+    return tuple(tuple(dot(field.b, (q[0][i], q[1][i], q[2][i])) - field.A[i] for i in range(3)) for q in (q0, q1))
+
+
+def _finite_derivative(field, q0, q1):
+    """Return 2 slope (Rbar b - A) and b."""
+    x0, x1 = _find_ends(field, q0, q1)
+    slope = field.divided(dot(x0, x0), dot(x1, x1))[0]
+    return tuple(slope * (x + y) for x, y in zip(x0, x1, strict=True)), field.b
+
+
+def _finite_slope(field, q0, q1):
+    """Return b b' and the derivative of 2 slope (Rbar b - A) by R1 b."""
+    x0, x1 = _find_ends(field, q0, q1)
+    slope, change = field.divided(dot(x0, x0), dot(x1, x1))
+    rows = [[2.0 * change * (x0[i] + x1[i]) * x1[k] + (slope if i == k else 0.0) for k in range(3)] for i in range(3)]
+    return tuple(scale(x, field.b) for x in field.b), tuple(map(tuple, rows))
+
+
+def _find_constants(field, J_inverse):
+    """Return the distance |A|, and its product with b and a factor of the torque, turned as for `turned_moment`."""
+    A = root(dot(field.A, field.A))
+    return A, *turned_moment(J_inverse, scale(-field[2] * A, field.b))
+
+
+def _slope(field, constants, g):
+    """Return V and dV/dg in J."""
+    x = subtract(scale(constants[0], g), field.b)
+    s = dot(x, x)
+    return field.value(s), scale(2.0 * field.derivative(s) * constants[0], x)
+
+
+def _series(field, constants, g, series):
+    """Return the recurrence of J^-1 T of T = (base + y) g x m, where y is a multiple of s^alpha.
+
+    The squared distance s is linear in g. S holds S2, S3, S1 of s/s[0] = 1 + S.(g - g[0]). From s y' = alpha s' y follows, with
+    s[k] in units of s[0],
+
+        y[n] = (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n
+    """
+    A, *moments = constants
+    x = subtract(scale(A, g), field.b)
+    over, y0, alpha, base = field.start_power(dot(x, x))
+    S = scale(-2.0 * A * over * over, field.b)
+    S = series.vector(S[1], S[2], S[0])
+    M1, M2 = (series.vector(*moment) for moment in moments)
+    s, weighted_s, y, torque = (series.history() for _ in range(4))
+    y0 = series.spread(y0)
+
+    def accelerate(c, n):
+        torque.push(fuse(-M1, c[n, 1], M2 * c[n, 0]))
+        distance = series.add_up(S * c[n, 0])
+        s.push(distance)
+        weighted_s.push(distance * float(n))
+        if n:
+            plain, weighted = series.convolve(n, 1, n, ((s, y),), ((weighted_s, y),))
+            y.push(weighted * ((alpha + 1) / n) - plain)
+        else:
+            y.push(y0)
+        return series.convolve(n, 0, n, ((y, torque),), start=torque[n] if base else None)[0]
+
+    return accelerate
+
+
+def _energies(field, R_WB):
+    """Return V, (...), in J."""
+    b, A = field.b, field.A
+    x = R_WB[..., 0] * b[..., :1] + R_WB[..., 1] * b[..., 1:2] + R_WB[..., 2] * b[..., 2:] - A
+    return field.value(np.sum(x * x, axis=-1))
+
+
+def _axis_W(field):
+    """Return the direction of the world point; 0 if it is the pivot, and the field does nothing."""
+    return field.A
+
+
+class SpringField(NamedTuple):
+    """F = stiffness/2 (sqrt(s) - rest)^2 with b in body and A in world axes, m (`conservative.potentials.field`)."""
+
+    b: Any
+    A: Any
+    stiffness: Any
+    rest: Any
+
+    ENERGIES = ("stiffness",)
+    energy, body_torque, finite_torque, energies, axis_W = _energy, _body_torque, _finite_torque, _energies, _axis_W
+    finite_derivative, finite_slope = _finite_derivative, _finite_slope
+    find_constants, slope, series = _find_constants, _slope, _series
+
+    def value(self, s):
+        """Return F in J."""
+        stretch = root(s) - self.rest
+        return 0.5 * self.stiffness * stretch * stretch
+
+    def derivative(self, s):
+        """Return dF/ds in N/m; without a rest length it does not depend on the distance, which may be 0."""
+        return 0.5 * self.stiffness * (1.0 - divide(self.rest, root(s)))
+
+    def divided(self, s0, s1):
+        """Return (F(s1) - F(s0)) / (s1 - s0), N/m, and its derivative by s1, N/m^3."""
+        half, r1 = 0.5 * self.stiffness, root(s1)
+        both = root(s0) + r1
+        return half * (1.0 - divide(2.0 * self.rest, both)), divide(half * self.rest, r1 * both * both)
+
+    def start_power(self, s):
+        """Return one over the distance, y at the start, alpha and base of `series`: 0 twice without a rest length."""
+        over = divide(choose(self.rest > 0.0, 1.0, 0.0), root(s))
+        return over, -self.rest * over, -0.5, 1
+
+    def scale(self):
+        """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
+        return self.stiffness / 2 * np.maximum(lengths(self.b) + lengths(self.A), self.rest) ** 2
+
+
+class AttractionField(NamedTuple):
+    """F = -strength / sqrt(s) with b in body and A in world axes, m (`conservative.potentials.field`)."""
+
+    b: Any
+    A: Any
+    strength: Any
+
+    ENERGIES = ("strength",)
+    energy, body_torque, finite_torque, energies, axis_W = _energy, _body_torque, _finite_torque, _energies, _axis_W
+    finite_derivative, finite_slope = _finite_derivative, _finite_slope
+    find_constants, slope, series = _find_constants, _slope, _series
+
+    def value(self, s):
+        """Return F in J."""
+        return -self.strength * (1.0 / root(s))  # the quotient of `derivative`, which compiled code computes once
+
+    def derivative(self, s):
+        """Return dF/ds in N/m."""
+        over = 1.0 / root(s)
+        return 0.5 * self.strength * over * over * over
+
+    def divided(self, s0, s1):
+        """Return (F(s1) - F(s0)) / (s1 - s0), N/m, and its derivative by s1, N/m^3."""
+        r0, r1 = root(s0), root(s1)
+        value = self.strength / ((r0 + r1) * r0 * r1)
+        return value, -0.5 * value * (r0 + 2.0 * r1) / (s1 * (r0 + r1))
+
+    def start_power(self, s):
+        """Return one over the distance, y at the start, alpha and base of `series`."""
+        over = 1.0 / root(s)
+        return over, over * over * over, -1.5, 0
+
+    def scale(self):
+        """Return the size of V where the points' directions from the pivot are at right angles, J."""
+        return abs(self.strength) / np.hypot(lengths(self.b), lengths(self.A))
+
+
+class PointPotential(FieldPotential):
+    """Base of the potentials between two points.
 
     Attributes
     ----------
@@ -42,44 +223,9 @@ class PointPotential(ABC):
     point_B: Array
     anchor_W: Array
 
-    @abstractmethod
     def energy_of(self, distance: Array) -> Array:
         """Return V, (...), in J at distances (...) in m."""
-
-    @abstractmethod
-    def slope(self, distance_0: Array, distance_1: Array) -> Array:
-        """Return the divided difference of V by the squared distance, (...), N/m, between distances (...), m."""
-
-    def _from_anchor(self, R_WB: Array) -> Array:
-        # One product of a tall matrix: NumPy takes ten times as long over a stack of small ones.
-        return (R_WB.reshape(-1, 3) @ self.point_B).reshape(R_WB.shape[:-1]) - self.anchor_W
-
-    def distance(self, R_WB: Array) -> Array:
-        """Return how far apart the points are, (...), m, at attitudes (..., 3, 3)."""
-        return np.linalg.norm(self._from_anchor(R_WB), axis=-1)
-
-    def energy(self, R_WB: Array) -> Array:
-        """Return V, (...), in J, at attitudes (..., 3, 3)."""
-        return self.energy_of(self.distance(R_WB))
-
-    def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J, at matrices (..., 3, 3)."""
-        return self.finite_derivative(R_WB, R_WB)
-
-    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (..., 3, 3), in J: exact for attitudes (..., 3, 3) at any distance."""
-        slope = self.slope(self.distance(R_0), self.distance(R_1))
-        mean = self._from_anchor((R_0 + R_1) / 2)
-        return 2 * slope[..., None, None] * mean[..., :, None] * self.point_B
-
-    @property
-    def axis_W(self) -> Array | None:
-        """Return the direction (3,) of the world point; None where it is the pivot, and the field does nothing."""
-        size = np.linalg.norm(self.anchor_W)
-        return self.anchor_W / size if size > 0 else None
-
-    def _points(self, R_BP: Array) -> tuple[Triple, Triple]:
-        return triple(self.point_B @ R_BP), triple(self.anchor_W)
+        return np.asarray(self._field().value(np.asarray(distance) ** 2))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -119,30 +265,12 @@ class LinearSpring(PointPotential):
         if self.rest_length < 0:
             raise BadInput("rest_length", rest_length, _LENGTH)
 
-    def energy_of(self, distance: Array) -> Array:
-        """Return V, (...), in J at distances (...) in m."""
-        return self.stiffness / 2 * (distance - self.rest_length) ** 2
+    NUMBERS: ClassVar[tuple[str, ...]] = ("point_B", "anchor_W", "stiffness", "rest_length")
 
-    def slope(self, distance_0: Array, distance_1: Array) -> Array:
-        """Return the divided difference of V by the squared distance, (...), N/m."""
-        if self.rest_length == 0:
-            return np.full(np.shape(distance_0), self.stiffness / 2)
-        return self.stiffness / 2 * (1 - 2 * self.rest_length / (distance_0 + distance_1))
-
-    def scale(self) -> float:
-        """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
-        farthest = float(np.linalg.norm(self.point_B) + np.linalg.norm(self.anchor_W))
-        return self.stiffness / 2 * max(farthest, self.rest_length) ** 2
-
-    def vary(self, parameters: Mapping[str, Array]) -> VariedPoints:
-        """Return the fields of n bodies with these numbers (n, ...), N/m and m, in place of its own."""
-        stiffness, point_B, anchor_W, rest = fill(self, parameters, "stiffness", "point_B", "anchor_W", "rest_length")
-        farthest = np.maximum(lengths(point_B) + lengths(anchor_W), rest)
-
-        def energy_of(distances: Array) -> Array:
-            return stiffness[:, None] / 2 * (distances - rest[:, None]) ** 2
-
-        return VariedPoints(point_B, anchor_W, energy_of, stiffness / 2 * farthest**2)
+    @staticmethod
+    def build_field(R_BP: Array | None, point_B: Any, anchor_W: Any, stiffness: Any, rest_length: Any) -> SpringField:
+        """Return the field in axes R_BP."""
+        return SpringField(into_axes(point_B, R_BP), anchor_W, stiffness, rest_length)
 
     @staticmethod
     def suspects(parameters: Mapping[str, Array]) -> Any:
@@ -153,12 +281,6 @@ class LinearSpring(PointPotential):
         """Return the field with energies in units of `energy`, a power of two, J."""
         points = {"point_B": self.point_B, "anchor_W": self.anchor_W}
         return build_unchecked(LinearSpring, stiffness=self.stiffness / energy, rest_length=self.rest_length, **points)
-
-    def kernel_field(self, R_BP: Array) -> Any:
-        """Return points, stiffness and rest length as the kernels want them."""
-        from ..kernels.point_fields import Spring
-
-        return Spring(*self._points(R_BP), self.stiffness, self.rest_length)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -196,23 +318,12 @@ class PointAttraction(PointPotential):
         if not np.any(self.point_B) and not np.any(self.anchor_W):
             raise BadInput("anchor_W", "the fixed point, as point_B is", "a point that the body's does not always lie on")
 
-    def energy_of(self, distance: Array) -> Array:
-        """Return V, (...), in J at distances (...) in m."""
-        return -self.strength / distance
+    NUMBERS: ClassVar[tuple[str, ...]] = ("point_B", "anchor_W", "strength")
 
-    def slope(self, distance_0: Array, distance_1: Array) -> Array:
-        """Return the divided difference of V by the squared distance, (...), N/m."""
-        return self.strength / ((distance_0 + distance_1) * distance_0 * distance_1)
-
-    def scale(self) -> float:
-        """Return the size of V where the points' directions from the pivot are at right angles, J."""
-        return abs(self.strength) / float(np.hypot(np.linalg.norm(self.point_B), np.linalg.norm(self.anchor_W)))
-
-    def vary(self, parameters: Mapping[str, Array]) -> VariedPoints:
-        """Return the fields of n bodies with these numbers (n, ...), J m and m, in place of its own."""
-        strengths, point_B, anchor_W = fill(self, parameters, "strength", "point_B", "anchor_W")
-        sizes = np.abs(strengths) / np.hypot(lengths(point_B), lengths(anchor_W))
-        return VariedPoints(point_B, anchor_W, lambda distances: -strengths[:, None] / distances, sizes)
+    @staticmethod
+    def build_field(R_BP: Array | None, point_B: Any, anchor_W: Any, strength: Any) -> AttractionField:
+        """Return the field in axes R_BP."""
+        return AttractionField(into_axes(point_B, R_BP), anchor_W, strength)
 
     @staticmethod
     def suspects(parameters: Mapping[str, Array]) -> Any:
@@ -224,9 +335,3 @@ class PointAttraction(PointPotential):
         """Return the field with energies in units of `energy`, a power of two, J."""
         strength = self.strength / energy
         return build_unchecked(PointAttraction, strength=strength, point_B=self.point_B, anchor_W=self.anchor_W)
-
-    def kernel_field(self, R_BP: Array) -> Any:
-        """Return points and strength as the kernels want them."""
-        from ..kernels.point_fields import Attraction
-
-        return Attraction(*self._points(R_BP), self.strength)

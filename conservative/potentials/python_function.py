@@ -123,13 +123,11 @@ class FunctionPotential:
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
-        from ..kernels.field_in_time import FunctionInTime
-        from ..kernels.function_field import Function
+        from ..kernels.function_field import Function, FunctionInTime
 
         # Atomic: of threads that come here at once, each gets the one that stays.
-        callback = self.__dict__.setdefault("_callback", Callback(self))
-        found = Function(id(callback), *(triple(row) for row in R_BP))
-        return FunctionInTime(*found, 0.0) if self.time_dependent else found
+        address, rows = id(self.__dict__.setdefault("_callback", Callback(self))), tuple(triple(row) for row in R_BP)
+        return FunctionInTime(address, rows, 0.0) if self.time_dependent else Function(address, rows)
 
 
 def _check_gradient(energy: Energy, gradient: Gradient, t: tuple[float, ...]) -> None:

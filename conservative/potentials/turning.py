@@ -6,11 +6,12 @@ Source: P. C. Hughes, Spacecraft Attitude Dynamics (1986), 9.3; the integral is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arithmetic import cosine, product, scale, sine
 from ..attitude import Array, from_quaternion, triple
 from ..check import build_unchecked, describe, positive_number, set_fields
 from ..errors import BadInput
@@ -77,6 +78,40 @@ class Orbit:
         return Turning(GravityGradient(self.rate, inertia, nearest), self)
 
 
+class Turned(NamedTuple):
+    """A field that is fixed in axes O: that field; rate, rad/s, and normal of O; the quaternion of W in O at the time."""
+
+    field: Any
+    rate: Any
+    normal: Any
+    back: Any
+
+    def at_time(self, t):
+        """Return the field at a time t, s."""
+        half = 0.5 * self.rate * t
+        return self._replace(back=(cosine(half), *scale(-sine(half), self.normal)))
+
+    def energy(self, q):
+        """Return V in J: that of the fixed field at the attitude in axes O."""
+        return self.field.energy(product(self.back, q))
+
+    def body_torque(self, q):
+        """Return the torque in N m."""
+        return self.field.body_torque(product(self.back, q))
+
+    def find_constants(self, J_inverse):
+        """Return those of the fixed field."""
+        return self.field.find_constants(J_inverse)
+
+    def slope(self, constants, g):
+        """Return V and dV/dg of the fixed field."""
+        return self.field.slope(constants, g)
+
+    def series(self, constants, g, series):
+        """Return the recurrence of the fixed field."""
+        return self.field.series(constants, g, series)
+
+
 @dataclass(frozen=True, eq=False, init=False)
 class Turning:
     """A field that is fixed in turning axes O: V(R_WB, t) = V_0(R_OB), R_OB = R_WO(t)' R_WB.
@@ -135,9 +170,8 @@ class Turning:
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the field as the kernels want it, in axes that the rotation R_BP (3, 3) takes to the body's, and O."""
-        from ..kernels.field_in_time import start_turning
-
-        return start_turning(self.potential.kernel_field(R_BP), self.orbit.rate, triple(self.orbit.normal_W))
+        field = self.potential.kernel_field(R_BP)
+        return Turned(field, self.orbit.rate, triple(self.orbit.normal_W), (1.0, 0.0, 0.0, 0.0))
 
 
 def static_part(potential: Any) -> Any:

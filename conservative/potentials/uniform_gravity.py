@@ -4,18 +4,83 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arithmetic import cross, dot, fuse, halfway, times, vertical
 from ..attitude import Array
 from ..check import build_unchecked, finite_array, finite_number, set_fields
-from .varied import VariedGravity, fill
+from .field import FieldPotential, into_axes, lengths
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class UniformField(NamedTuple):
+    """Weight times centre of mass, N m: V is its component along the vertical (`conservative.potentials.field`)."""
+
+    x: Any
+    y: Any
+    z: Any
+
+    ENERGIES = ("x", "y", "z")
+
+    def energy(self, q):
+        """Return V in J."""
+        return dot(vertical(q), self)
+
+    def body_torque(self, q):
+        """Return the torque in N m."""
+        return cross(vertical(q), self)
+
+    def finite_torque(self, q, a):
+        """Return T = (M c) x (-gamma) and its derivative: c on average over the step."""
+        g = vertical(q)
+        m, dm = halfway(a, self)
+        return cross(g, m), tuple(cross(g, column) for column in dm)
+
+    def finite_derivative(self, q0, q1):
+        """Return the gradient as (c, d): V is linear in the base vectors."""
+        return (0.0, 0.0, 1.0), tuple(self)
+
+    def finite_slope(self, q0, q1):
+        """Return no change."""
+        return (ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO)
+
+    def find_constants(self, J_inverse):
+        """Return two vectors with which J^-1 (g x m) is a difference of two products."""
+        return turned_moment(J_inverse, self)
+
+    def slope(self, constants, g):
+        """Return V and dV/dg in J."""
+        return dot(g, self), tuple(self)
+
+    def series(self, constants, g, series):
+        """Return the recurrence of J^-1 (g x m)."""
+        M1, M2 = (series.vector(*moment) for moment in constants)
+        return lambda c, n: fuse(-M1, c[n, 1], M2 * c[n, 0])
+
+    def energies(self, R_WB):
+        """Return V, (...), in J."""
+        return dot((R_WB[..., 2, 0], R_WB[..., 2, 1], R_WB[..., 2, 2]), self)
+
+    def scale(self):
+        """Return weight times lever arm, J."""
+        return lengths(np.stack(self, axis=-1))
+
+    def axis_W(self):
+        """Return the vertical."""
+        return np.broadcast_to((0.0, 0.0, 1.0), (*np.shape(self.x), 3))
+
+
+def turned_moment(J_inverse, m):
+    """Return J^-1 (m2, m3, m1) and J^-1 (m3, m1, m2)."""
+    return times(J_inverse, (m[1], m[2], m[0])), times(J_inverse, (m[2], m[0], m[1]))
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class UniformGravity:
+class UniformGravity(FieldPotential):
     """A uniform field along the world's -z axis: V = weight (R_WB com_B).e_z.
 
     Parameters
@@ -46,45 +111,18 @@ class UniformGravity:
         """Weight times centre of mass (3,), N m, body axes. The motion depends on nothing else."""
         return self.weight * self.com_B
 
-    def energy(self, R_WB: Array) -> Array:
-        """Return V, (...), in J."""
-        return R_WB[..., 2, :] @ self.moment_B
+    NUMBERS: ClassVar[tuple[str, ...]] = ("weight", "com_B")
 
-    def gradient(self, R_WB: Array) -> Array:
-        """Return dV/dR, (..., 3, 3), in J: constant, with `moment_B` in its last row."""
-        out = np.zeros(np.shape(R_WB))
-        out[..., 2, :] = self.moment_B
-        return out
-
-    def finite_derivative(self, R_0: Array, R_1: Array) -> Array:
-        """Return V*, (3, 3), in J: the gradient, which is exact because V is linear in the base vectors."""
-        return self.gradient(R_0)
-
-    @property
-    def axis_W(self) -> Array:
-        """Return the vertical, (3,)."""
-        return np.array([0.0, 0.0, 1.0])
-
-    def scale(self) -> float:
-        """Return weight times lever arm, J."""
-        return float(np.linalg.norm(self.moment_B))
+    @staticmethod
+    def build_field(R_BP: Array | None, weight: Any, com_B: Any) -> UniformField:
+        """Return the field in axes R_BP."""
+        return UniformField(*np.moveaxis(into_axes(np.asarray(weight)[..., None] * com_B, R_BP), -1, 0))
 
     def in_units(self, energy: float) -> UniformGravity:
         """Return the field with energies in units of `energy`, a power of two, J."""
         return build_unchecked(UniformGravity, weight=self.weight / energy, com_B=self.com_B)
 
-    def vary(self, parameters: Mapping[str, Array]) -> VariedGravity:
-        """Return the fields of n bodies with these numbers (n, ...), N and m, in place of its own."""
-        weights, coms_B = fill(self, parameters, "weight", "com_B")
-        return VariedGravity(weights[:, None] * coms_B)
-
     @staticmethod
     def suspects(parameters: Mapping[str, Array]) -> bool:
         """Return which of n bodies' numbers (n, ...), N and m, might not be taken as they are: none."""
         return False
-
-    def kernel_field(self, R_BP: Array) -> Any:
-        """Return the moment in principal axes as the kernels want it."""
-        from ..kernels.fields import Uniform
-
-        return Uniform(*(self.moment_B @ R_BP))

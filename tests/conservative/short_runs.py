@@ -27,12 +27,8 @@ from conservative.methods.many import Block
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-MACHINE_CODE = ("signals", "simd", "simd_llvm", "series_llvm", "series_lanes", "lanes_llvm")
-OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in MACHINE_CODE))
-"""Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
-BASES = ("at_time", "axial_constants", "axial_energy", "start_series", "finite_torque", "energy", "body_torque")
-BASES += ("finite_derivative", "slope", "implements")
-"""Functions that fields implement, and what registers them."""
+OTHER = ("conservative.kernels", "conservative.kernels.signals")
+"""Modules that short runs in plain Python do not call: how kernels are compiled, and what long runs reach."""
 
 
 def in_field(name: str, potential: cv.Potential | cv.Turning) -> cv.Scene:
@@ -129,7 +125,7 @@ def functions() -> dict[str, str]:
         if module.name in OTHER:
             continue
         for name, value in vars(importlib.import_module(module.name)).items():
-            if inspect.isfunction(value) and value.__module__ == module.name and name not in BASES:
+            if inspect.isfunction(value) and value.__module__ == module.name:
                 found[f"{value.__code__.co_filename}:{value.__code__.co_name}"] = f"{module.name}.{name}"
     return found
 

@@ -5,9 +5,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from conservative import LinearSpring
-from conservative.kernels import fields
+from conservative.kernels import fields as kernel_fields
+from conservative.kernels import kernel
 
 from .one_body import FIELDS, TURN, in_field, torque
+
+
+class fields:  # noqa: N801
+    """The functions of fields in machine code, as kernels call them."""
+
+    energy = staticmethod(kernel(lambda field, q: kernel_fields.energy(field, q)))
+    body_torque = staticmethod(kernel(lambda field, q: kernel_fields.body_torque(field, q)))
+    finite_torque = staticmethod(kernel(lambda field, q, a: kernel_fields.finite_torque(field, q, a)))
+    finite_derivative = staticmethod(kernel_fields.finite_derivative)
+
 
 FIELDS_WITH_REST = {**FIELDS, "spring at 0": LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0.2, 0.3))}
 SCENES = {name: in_field("gravity").rename(name, potential=field) for name, field in FIELDS_WITH_REST.items()}

@@ -48,15 +48,43 @@ def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> 
             np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=bound, err_msg=name)
 
 
-TURN = """
-from conservative.kernels.fields import in_body
-print(in_body((1.0, 0.5, 0.0, 0.0), (0.0, 1.0, 0.0))[2], sum(in_body.stats.cache_hits.values()))
+CROSS = """
+from conservative.kernels.taylor import quaternion as kernel
+print(kernel((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))[0], sum(kernel.stats.cache_hits.values()))
 """
+LAW = """
+import numpy as np
+from conservative.kernels.fields import finite_derivative as kernel
+from conservative.potentials.uniform_gravity import UniformField
+print(kernel(UniformField(0.0, 0.0, 2.0), np.zeros(9), np.zeros(9))[0][8], sum(kernel.stats.cache_hits.values()))
+"""
+EDITS = (
+    (
+        "__pycache__",
+        CROSS,
+        "arithmetic.py",
+        "fuse(a[2], b[0], -(a[0] * b[2]))",
+        "fuse(a[0], b[2], -(a[2] * b[0]))",
+        "4.0",
+        "2.0",
+    ),
+    (
+        "NUMBA_CACHE_DIR",
+        LAW,
+        "potentials/uniform_gravity.py",
+        "(0.0, 0.0, 1.0), tuple(self)",
+        "(0.0, 0.0, -1.0), tuple(self)",
+        "2.0",
+        "-2.0",
+    ),
+)
 
 
-@pytest.mark.parametrize("setting", ["__pycache__", "NUMBA_CACHE_DIR"])
-def test_an_edit_of_an_inner_kernel_runs_new_code(tmp_path: Path, setting: str) -> None:
-    """The file of the outer kernel stays as it is, and so does the time of the file that is edited."""
+@pytest.mark.parametrize(("setting", "code", "file", "old", "new", "before", "after"), EDITS)
+def test_an_edit_of_an_inner_function_runs_new_code(
+    tmp_path: Path, setting: str, code: str, file: str, old: str, new: str, before: str, after: str
+) -> None:
+    """The file of the compiled kernel stays as it is, and so does the time of the file that is edited."""
     rooms = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")
     shutil.copytree(PACKAGE, tmp_path / "conservative", ignore=rooms)
     cache = str(tmp_path / "cache") if setting == "NUMBA_CACHE_DIR" else ""
@@ -66,18 +94,15 @@ def test_an_edit_of_an_inner_kernel_runs_new_code(tmp_path: Path, setting: str) 
         "NUMBA_DISABLE_JIT": "",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    assert python(["-c", TURN], **environment) == "-0.8 0"
-    assert python(["-c", TURN], **environment) == "-0.8 1"
-    vector = tmp_path / "conservative" / "kernels" / "vector.py"
-    before, text = vector.stat(), vector.read_text()
-    edited = text.replace("return (a[1] * b[2] - a[2] * b[1],", "return (a[2] * b[1] - a[1] * b[2],").replace(
-        "a[0] * b[1] - a[1] * b[0])", "a[1] * b[0] - a[0] * b[1])"
-    )
-    assert edited != text
-    vector.write_text(edited)
-    os.utime(vector, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert python(["-c", TURN], **environment) == "0.8 0"
-    assert python(["-c", TURN], **environment) == "0.8 1"
+    assert python(["-c", code], **environment) == f"{before} 0"
+    assert python(["-c", code], **environment) == f"{before} 1"
+    source = tmp_path / "conservative" / file
+    status, text = source.stat(), source.read_text()
+    assert old in text
+    source.write_text(text.replace(old, new))
+    os.utime(source, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert python(["-c", code], **environment) == f"{after} 0"
+    assert python(["-c", code], **environment) == f"{after} 1"
 
 
 NAMES = sorted({family.card.kernel for family in list_families().values() if family.card.kernel})
