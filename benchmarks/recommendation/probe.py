@@ -30,7 +30,7 @@ from conservative.scene import Scene
 
 from ..measures.timing import wall_time
 from ..studies import step_ladder
-from ..studies.case import Case, Success
+from ..studies.case import Case
 from ..studies.selection import tolerance_setting
 from ..studies.time_limit import attempt_within
 from .growth import Amplification, ErrorLaw, ExpectedDrift, amplification_of, extrapolate_drifts, fit_law
@@ -214,9 +214,9 @@ class Conditions(Question):
         each = 1 if adaptive else round(samples.dt / dt)
         grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
         run = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
-        if not isinstance(run, Success):
+        if isinstance(run, Outcome):
             length = samples.dt * samples.n_steps
-            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, run.outcome)
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, run)
         trajectory = run.trajectory
         length, error = float(trajectory.t[-1]), angle_between(self.truth(samples), trajectory.R_WB)
         drifts = extrapolate_drifts(trajectory, self.duration)

@@ -30,7 +30,7 @@ from conservative.scene import Scene
 from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Success, fail_unsupported, names_of
+from ..studies.case import Case, Success, names_of
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_here
@@ -245,7 +245,7 @@ def _refine_from_start(conditions: Conditions, method: Method, step: float) -> R
     The result is an outcome if the method does not support the scene.
     """
     if reason := method.unsupported(conditions.scene):
-        return fail_unsupported(reason).outcome
+        return Outcome(OutcomeKind.UNSUPPORTED, reason)
     setting = tolerance_setting(method)
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))

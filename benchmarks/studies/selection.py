@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, NoReturn
 
 from conservative import registry
@@ -27,14 +27,13 @@ def all_variants(method: Method) -> tuple[Method, ...]:
 
 @dataclass(frozen=True)
 class Missing(Method):
-    """Placeholder for a method whose engine is not installed: every run raises `MissingEngine`.
+    """Placeholder for a method whose engine is not installed: every run raises `error`.
 
-    Attributes: `wanted` (the name as the user wrote it), and `engine` and `package` of the error.
+    `wanted` is the name as the user wrote it.
     """
 
     wanted: str
-    engine: str
-    package: str
+    error: MissingEngine = field(compare=False)
 
     family: ClassVar[str] = "missing"
     role: ClassVar[Role] = Role.ENGINE
@@ -52,7 +51,7 @@ class Missing(Method):
         return None
 
     def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
-        raise MissingEngine(self.engine, self.package)
+        raise self.error
 
 
 def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
@@ -89,11 +88,11 @@ def methods(
         except MissingEngine as error:
             if not skip_missing:
                 raise
-            selected[Missing(name, error.engine, error.package)] = None
+            selected[Missing(name, error)] = None
         except NotLoadable as error:  # a broken entry point of another package
             if not skip_missing:
                 raise
-            selected[Missing(name, name, error.place)] = None
+            selected[Missing(name, MissingEngine(name, error.place))] = None
     return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 
@@ -111,7 +110,7 @@ def tolerance_setting(method: Method) -> str | None:
     """Return the name of the setting that determines the accuracy of an adaptive method, or None."""
     if method.order is not None:
         return None
-    return next((field.name for field in fields(method) if field.name in TOLERANCES), None)
+    return next((each.name for each in fields(method) if each.name in TOLERANCES), None)
 
 
 def takes_exact_steps(method: Method) -> bool:
@@ -129,21 +128,5 @@ def series(method: Method) -> str:
     setting = tolerance_setting(method)
     if setting is None:
         return method.name
-    default = next(field.default for field in fields(method) if field.name == setting)
+    default = next(each.default for each in fields(method) if each.name == setting)
     return at_tolerance(method, setting, default).name if isinstance(default, float) else method.name
-
-
-def identifier(scene: Scene, method: Method, dt: float) -> str:
-    """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
-
-    It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's integrator.
-    """
-    shown = []
-    for position, field in enumerate(fields(method)):
-        value = getattr(method, field.name)
-        if isinstance(value, str):
-            if position == 0 or value != field.default:
-                shown.append(value.lower())
-        elif value != field.default:
-            shown.append({"order": "o", "stages": "s"}.get(field.name, field.name) + str(value))
-    return f"{scene.name}-{'_'.join([method.family, *shown])}-dt{dt:g}"

@@ -34,7 +34,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Failure, drop_step
+from .case import Case, drop_step
 from .selection import Missing
 from .study import Progress, Study
 from .time_limit import attempt_apart
@@ -121,8 +121,8 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
 def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
     """Return how a method does at a size of its steps, with `limit` s of time."""
     done = attempt_apart(limit, case, study.skip_missing)
-    if isinstance(done, Failure):
-        return done.outcome
+    if isinstance(done, Outcome):
+        return done
     return detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
 
 

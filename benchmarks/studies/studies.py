@@ -7,7 +7,6 @@ for study in studies.cross_studies(studies.MAIN, selection.scenes(), selection.m
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 from conservative.check import choice
 from conservative.method import Method
@@ -31,7 +30,7 @@ from . import (
     throughput,
     work_precision,
 )
-from .study import Finding, Maker, Progress, Study, Truths
+from .study import Finding, Maker, Progress, Study, remember_truths
 
 MAKERS: Mapping[str, Maker] = {
     "paper": paper.findings,
@@ -73,7 +72,7 @@ def cross_studies(
     time_limit: float | None = None,
 ) -> tuple[Study, ...]:
     """Return the named studies of the same scenes and methods; they share their reference solutions."""
-    truths = Truths()
+    truths = remember_truths()
     return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in names)
 
 
@@ -81,10 +80,10 @@ def list_hard_studies(
     methods: tuple[Method, ...], skip_missing: bool = False, time_limit: float | None = None
 ) -> tuple[Study, ...]:
     """Return the studies of the hard cases: stability, and every registered scene with one or two settings of each family."""
-    options: dict[str, Any] = {"skip_missing": skip_missing, "time_limit": time_limit}
+    scenes, settings = selection.scenes(stability.SCENES), hard_cases.settings(methods)
     return (
-        Study("stability", selection.scenes(stability.SCENES), methods, **options),
-        Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), **options),
+        Study("stability", scenes, methods, skip_missing=skip_missing, time_limit=time_limit),
+        Study("hard_cases", hard_cases.scenes(), settings, skip_missing=skip_missing, time_limit=time_limit),
     )
 
 

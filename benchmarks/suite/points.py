@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,7 @@ from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, attempt
-from ..studies.study import Truths
+from ..studies.study import FindTruth, remember_truths
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
@@ -52,7 +52,7 @@ class Point:
 
     scene: Scene
     method: Method
-    truths: Truths = field(default_factory=Truths, repr=False, compare=False)
+    truths: FindTruth = field(default_factory=remember_truths, repr=False, compare=False)
 
     @cached_property
     def grid(self) -> Grid:
@@ -61,8 +61,20 @@ class Point:
 
     @property
     def id(self) -> str:
-        """Such as `brick_flip-reduced_o4-dt0.01`."""
-        return selection.identifier(self.scene, self.method, self.scene.dt)
+        """Such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
+
+        It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's
+        integrator.
+        """
+        shown = []
+        for position, each in enumerate(fields(self.method)):
+            value = getattr(self.method, each.name)
+            if isinstance(value, str):
+                if position == 0 or value != each.default:
+                    shown.append(value.lower())
+            elif value != each.default:
+                shown.append({"order": "o", "stages": "s"}.get(each.name, each.name) + str(value))
+        return f"{self.scene.name}-{'_'.join([self.method.family, *shown])}-dt{self.scene.dt:g}"
 
     @property
     def labels(self) -> dict[str, str]:
@@ -114,7 +126,7 @@ def points() -> Iterator[Point]:
     """Yield the points: the settings of `Card.suite` of every registered method on every scene of the suite."""
     every = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
     methods = [method for method in every if method.role != Role.TRUTH]
-    truths = Truths()
+    truths = remember_truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 

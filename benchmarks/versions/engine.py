@@ -24,11 +24,11 @@ from ..measures.convergence_order import MIN_POINTS, observed_order
 from ..measures.errors import measure_errors
 from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
-from ..studies import convergence, selection, step_ladder
-from ..studies.case import Case, Failure, Success
-from ..studies.speed import TimedRun, keep_end, lengthen, shorten
+from ..studies import selection, step_ladder
+from ..studies.case import Case, Success
+from ..studies.line import measure_line
+from ..studies.speed import TimedRun, keep_end, make_timed, shorten
 from ..studies.study import Study
-from ..studies.time_limit import attempt_here, attempt_within
 from .comparison import Comparison, Line, Tell, compare
 from .version import Version
 
@@ -139,10 +139,10 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
     setting, dt = method.setting(), cases[0].grid.dt
     observation = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
-    first = attempt_within(study.hang_limit, cases[0], study.skip_missing)
-    if isinstance(first, Failure):
-        return replace(observation, outcome=first.outcome)
-    done = [first, *(attempt_within(study.hang_limit, case, study.skip_missing) for case in cases[1:])]
+    first = study.attempt(cases[0])
+    if isinstance(first, Outcome):
+        return replace(observation, outcome=first)
+    done = [first, *map(study.attempt, cases[1:])]
     runs = [each.trajectory for each in done if isinstance(each, Success)]
     return replace(
         observation,
@@ -170,12 +170,9 @@ def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
         return
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
-    for case, done in convergence.attempt_each(study, cases):
-        if isinstance(done, Success):
-            by_measure = {each.measure: each.value for each in measure_errors(done.trajectory, truth)}
-            yield StepError(case.grid.dt, by_measure[Measure.ATTITUDE_MAX], by_measure[Measure.RATES_MAX])
-        else:
-            yield StepError(case.grid.dt, math.nan, math.nan, reached=done.outcome.kind not in NO_TIME)
+    for point in measure_line(study, cases, truth, (Measure.ATTITUDE_MAX, Measure.RATES_MAX)):
+        attitude, rates = point.errors[Measure.ATTITUDE_MAX], point.errors[Measure.RATES_MAX]
+        yield StepError(point.case.grid.dt, attitude, rates, reached=point.outcome.kind not in NO_TIME)
 
 
 def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
@@ -312,12 +309,10 @@ def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> 
     again: a real difference appears again.
     """
     grid = keep_end(grid_for(scene, scene.dt))
-    ready = {}
-    for version, method in methods.items():
-        case = shorten(study, Case(study.name, scene, method, grid))
-        done = attempt_here(study.hang_limit, case, study.skip_missing)
-        if isinstance(done, Success):
-            ready[version] = TimedRun(*lengthen(case, done, study.hang_limit), done)
+    timed = {
+        version: make_timed(study, shorten(study, Case(study.name, scene, method, grid))) for version, method in methods.items()
+    }
+    ready = {version: run for version, run in timed.items() if isinstance(run, TimedRun)}
     times = _repeat(study, ready, range(REPEATS))
     if any(differ(was, now) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))

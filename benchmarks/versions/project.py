@@ -30,7 +30,7 @@ from ..gate import compare as gate
 from ..gate.baseline import update_baseline
 from ..gate.compare import Verdict, Violation
 from ..gate.results import Results, Row, Status, find_runaway
-from ..studies.study import Truths
+from ..studies.study import FindTruth, remember_truths
 from ..suite import points
 from . import inside
 from .comparison import Comparison, Line, Tell, compare
@@ -56,8 +56,8 @@ class FailedThere(IntegrationFailed):
 class ProjectSide:
     """A version and its process, with its own folder of compiled kernels. `names` are methods; empty for all under test."""
 
-    def __init__(self, version: Version, names: Sequence[str] = (), truths: Truths | None = None) -> None:
-        self.version, self._names, self._truths = version, list(names), truths or Truths()
+    def __init__(self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None) -> None:
+        self.version, self._names, self._truths = version, list(names), truths or remember_truths()
         kernels = version.environment.folder / "home" / "kernels"
         self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
 
@@ -233,7 +233,7 @@ def compare_projects(
     for name in scenes:
         define_scene(name)  # before any work
     with ExitStack() as stack:
-        truths = Truths()
+        truths = remember_truths()
         sides = ProjectSide(base, methods, truths), ProjectSide(head, methods, truths)
         for side in sides:
             stack.callback(side.close)

@@ -12,9 +12,7 @@ from conservative.benchmarks.measures.convergence_order import grows_with_shorte
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import engines_over_steps, studies
 from conservative.benchmarks.studies.engine_selection import select_engines
-from conservative.benchmarks.studies.engines_at_one_step import keep_few
 from conservative.benchmarks.studies.study import Study
-from conservative.grid import Grid
 from conservative.outcome import OutcomeKind
 
 from .generic_study import Broken, truth
@@ -94,8 +92,9 @@ def test_an_error_that_grows_is_told_from_one_that_has_reached_its_floor():
 
 
 def test_a_slow_run_is_timed_over_its_first_steps_only():
-    grid = Grid(0.01, 600)
-    assert [keep_few(grid, share) for share in (5.0, 0.1, 1e-9)] == [Grid(0.01, 600, 50), Grid(0.01, 60, 5), Grid(0.01, 1, 1)]
+    for limit, steps in ((60.0, 600), (1e-9, 1)):
+        found = studied("engines_at_one_step", (registry.method("pinocchio"),), time_limit=limit)
+        assert value(found, "pinocchio", Measure.TIME).detail.endswith(f" s, {steps} steps")
 
 
 def test_runs_that_are_longer_than_planned_for_are_not_run_again_for_their_time():

@@ -8,7 +8,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.errors import blanks, measure_drifts, measure_errors, secular_slope
-from conservative.benchmarks.studies.engines_at_one_step import count_turns_over, momentum_along_spin
+from conservative.benchmarks.studies.engines_at_one_step import count_turns_over
 from conservative.errors import BadInput
 from conservative.references.exact.method import Exact
 from conservative.trajectory import Trajectory
@@ -213,8 +213,3 @@ def test_exact_motions_turn_over_as_often_as_is_known(rates, t_end, count):
 )
 def test_a_side_counts_from_half_of_the_start_on(along, count):
     assert count_turns_over(with_component(along)) == count
-
-
-def test_the_axis_is_that_of_most_momentum_at_the_start_in_a_turned_frame():
-    found = exact_motion((0.1, 0.2, 3.0), 0.05)
-    assert abs(momentum_along_spin(found.scene, found.w_WB_B)[0]) == pytest.approx(30)

@@ -38,7 +38,7 @@ def made_up(name, error, spent):
 
 def line_of(value, quick=False):
     """The settings of a method on one body."""
-    return random.cases(quick, Case("random", BODY, value, Grid(BODY.t_end / SAMPLES, SAMPLES)))
+    return random.list_cases(Case("random", BODY, value, Grid(BODY.t_end / SAMPLES, SAMPLES)), quick)
 
 
 def test_bodies_are_the_first_ones_whatever_their_number():
@@ -122,8 +122,8 @@ def test_a_lucky_point_is_timed_only_with_what_it_is_credited_with():
 
 def test_the_run_that_is_timed_is_longer_in_the_same_steps():
     quick, slow = made_up("projected", 1e-3, 1e-9), made_up("projected", 1e-3, 1.0)
-    assert random.longer(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
-    assert random.longer(slow).grid == Grid(0.1, 12, 12)
+    assert random.lengthen(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
+    assert random.lengthen(slow).grid == Grid(0.1, 12, 12)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ from conservative import BadInput, MissingEngine, Reduced, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
-from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
+from conservative.benchmarks.studies.selection import Missing, at_tolerance, methods, series, tolerance_setting
+from conservative.benchmarks.suite.points import Point
 from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
@@ -57,7 +58,7 @@ def test_a_missing_engine_is_an_error_unless_skipped():
         methods(["reduced", "mujoco"])
     ours, missing = methods(["reduced:order=2", "mujoco"], skip_missing=True)
     assert ours == Reduced()
-    assert missing == Missing("mujoco", "MuJoCo", "mujoco")
+    assert missing == Missing("mujoco", MissingEngine("MuJoCo", "mujoco"))
     assert (missing.name, missing.label, missing.role, missing.order) == ("mujoco", "mujoco", "engine", None)
     with pytest.raises(MissingEngine, match="pip install mujoco"):
         missing.prepare(BRICK, Grid(0.01, 1))
@@ -87,11 +88,11 @@ def test_a_line_of_a_picture_is_a_method_whatever_its_tolerance():
     ],
 )
 def test_ids_of_benchmarks(name, expected):
-    assert identifier(BRICK, registry.method(name), 0.01) == expected
+    assert Point(BRICK, registry.method(name)).id == expected
 
 
 def test_ids_are_different_and_have_no_odd_characters():
-    found = [identifier(scene, method, 0.01) for scene in selection.scenes() for method in methods()]
+    found = [Point(scene, method).id for scene in selection.scenes() for method in methods()]
     assert len(set(found)) == len(found)
     assert all(re.fullmatch(r"[\w.+-]+", text) for text in found)
 
@@ -135,7 +136,7 @@ def test_a_missing_engine_is_a_row_where_it_is_asked_for():
     assert isinstance(found, Missing)
     assert found.label == "exudyn==1.2.3"
     case = Case("engines_at_one_step", SCENE, found, grid_for(SCENE, 0.02))
-    outcome = attempt(case, skip_missing=True).outcome
+    outcome = attempt(case, skip_missing=True)
     assert outcome.kind is OutcomeKind.MISSING
     assert outcome.reason.endswith("conservative engines install exudyn==1.2.3")
     with pytest.raises(MissingEnvironment):
@@ -150,7 +151,7 @@ def test_a_name_that_is_no_engine_is_bad_input(name):
 
 def test_no_setting_is_as_installed_where_the_engine_does_not_say_so():
     assert not any(is_as_installed(method) for method in select_engines(["scipy"]))
-    assert not is_as_installed(Missing("mujoco", "MuJoCo", "mujoco"))
+    assert not is_as_installed(Missing("mujoco", MissingEngine("MuJoCo", "mujoco")))
 
 
 @dataclass(frozen=True)
@@ -203,6 +204,6 @@ def test_a_method_of_another_package_has_its_version_and_its_name_once():
 
 
 def test_a_method_whose_engine_is_missing_is_called_as_it_was_asked_for():
-    found = names_of(Missing("mujoco:RK4", "MuJoCo", "mujoco"))
+    found = names_of(Missing("mujoco:RK4", MissingEngine("MuJoCo", "mujoco")))
     assert (found["family"], found["version"], found["setting"]) == ("mujoco", "", "RK4")
     assert found["label"] == "mujoco:RK4"

@@ -9,7 +9,7 @@ import pytest
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.studies import step_ladder, studies
-from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
+from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, remember_truths
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.references.exact.method import Exact
@@ -25,11 +25,11 @@ def test_a_motion_is_found_once_by_the_studies_that_share_it():
         asked.append((scene, grid))
         return truth(scene, grid)
 
-    truths = Truths(find)
+    truths = remember_truths(find)
     for name in ("convergence", "work_precision"):
         assert list(studies.rows(Study(name, (SCENE,), (cv.Reduced(), method("mujoco:Euler")), quick=True, truth=truths)))
     assert asked == [(SCENE, step_ladder.samples(SCENE, cv.Reduced()))]
-    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=Truths(find))))
+    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=remember_truths(find))))
     assert len(asked) == 2
 
 
@@ -42,7 +42,7 @@ def test_the_studies_of_a_report_share_their_truths():
 
 def test_truths_keep_a_bounded_number_of_motions():
     asked = []
-    truths = Truths(lambda scene, grid: asked.append(grid))
+    truths = remember_truths(lambda scene, grid: asked.append(grid))
     grids = [Grid(0.01, n) for n in range(1, MOST_TRUTHS + 2)]
     for grid in [*grids, grids[-1], grids[0]]:
         truths(SCENE, grid)

@@ -8,7 +8,7 @@ import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, key
 from conservative.benchmarks.studies import step_ladder, studies
-from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
+from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study
@@ -20,7 +20,7 @@ from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
 
-ABSENT = Missing("mujoco", "MuJoCo", "mujoco")
+ABSENT = Missing("mujoco", cv.MissingEngine("MuJoCo", "mujoco"))
 KINDS = {
     "unsupported": OutcomeKind.UNSUPPORTED,
     "refuses": OutcomeKind.UNSUPPORTED,
@@ -67,7 +67,7 @@ def test_paper_says_how_well_the_truths_agree():
     row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
     assert row.detail == ""
-    rough = agreement(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
+    rough = agreement_row(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
     assert rough.detail == APPROXIMATE
 
 

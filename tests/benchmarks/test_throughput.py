@@ -88,7 +88,7 @@ def test_an_engine_that_raises_has_a_row(rows):
 
 
 def test_an_engine_that_is_missing_is_told_or_skipped():
-    absent, bodies, grid = Missing("mjx", "MJX", "mjx"), draw("free_bodies", 2), Grid(0.1, 2)
+    absent, bodies, grid = Missing("mjx", MissingEngine("MJX", "mjx")), draw("free_bodies", 2), Grid(0.1, 2)
     assert many_runs.attempt_many(Way(absent), bodies, grid, 10.0, skip_missing=True).kind is OutcomeKind.MISSING
     with pytest.raises(MissingEngine):
         many_runs.attempt_many(Way(absent), bodies, grid, 10.0)
@@ -121,10 +121,10 @@ def test_ways_give_the_same_numbers():
 
 def test_a_setting_that_would_take_too_long_says_so():
     point = throughput.BatchSetting(Way(Ours()), None, {}, spent=0.01, prepare=0.02)
-    assert throughput.too_long(point, 10, 0.2) is None
-    assert throughput.too_long(point, 30, 0.2).reason.startswith("a call would take 0.3 s")
-    assert "preparing" in throughput.too_long(throughput.BatchSetting(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
-    assert throughput.too_long(point, 1, 1e-9) is None  # one body is always tried
+    assert throughput.refuse_long(point, 10, 0.2) is None
+    assert throughput.refuse_long(point, 30, 0.2).reason.startswith("a call would take 0.3 s")
+    assert "preparing" in throughput.refuse_long(throughput.BatchSetting(Way(Ours()), None, {}, 1e-6, 1.0), 10, 0.2).reason
+    assert throughput.refuse_long(point, 1, 1e-9) is None  # one body is always tried
 
 
 def test_an_exact_setting_stands_for_its_family_in_the_coarse_study():
@@ -136,7 +136,7 @@ def test_an_exact_setting_stands_for_its_family_in_the_coarse_study():
 def test_a_lucky_setting_decides_nothing():
     errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
     line = [throughput.BatchSetting(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
-    assert throughput.decide(line) == line[1:]
+    assert throughput.select_deciding(line) == line[1:]
 
 
 def fake(method):

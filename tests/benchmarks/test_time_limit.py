@@ -11,14 +11,14 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import convergence, studies, study
-from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
-from conservative.benchmarks.studies.convergence import FEWEST_POINTS, fits
+from conservative.benchmarks.studies import line, studies, study
+from conservative.benchmarks.studies.case import Case, Success, attempt
+from conservative.benchmarks.studies.line import FEWEST_POINTS, LINE_LIMIT, attempt_each
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
-from conservative.benchmarks.studies.work_precision import points
+from conservative.benchmarks.studies.work_precision import list_cases
 from conservative.grid import Grid, grid_for
-from conservative.outcome import OutcomeKind
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
 from conservative.references.engines.scipy import SciPy
 from conservative.references.worker.client import close_workers
@@ -47,7 +47,7 @@ def copy_of(scene):
 def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
     case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
     here, there = attempt(case), attempt_apart(60.0, case)
-    if isinstance(here, Failure):
+    if isinstance(here, Outcome):
         assert here == there
         return
     again = there.run()
@@ -71,23 +71,23 @@ def test_what_an_engine_does_to_its_process_is_an_outcome(how, limit, kind, reas
     close_workers()
     before = threading.enumerate()
     done = attempt_so(limit, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
-    assert (done.outcome.kind, done.outcome.reason) == (kind, reason)
+    assert (done.kind, done.reason) == (kind, reason)
     assert threading.enumerate() == before
     assert psutil.Process().children(recursive=True) == []
 
 
 def test_nobody_waits_for_the_same_twice():
     case = Case("any", copy_of(SCENE), Harmful("hang"), grid_for(SCENE, 0.05))
-    assert attempt_within(0.2, case).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.1, case).outcome.reason == "a run of 40 steps was ended after 0.2 s"
-    assert attempt_within(0.3, case).outcome.reason == "after 0.3 s"
+    assert attempt_within(0.2, case).reason == "after 0.2 s"
+    assert attempt_within(0.1, case).reason == "a run of 40 steps was ended after 0.2 s"
+    assert attempt_within(0.3, case).reason == "after 0.3 s"
 
 
 def test_a_shorter_motion_is_tried_though_a_longer_one_of_fewer_samples_was_ended():
     scene = copy_of(SCENE)
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(2.0, 1))).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.1, 10))).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.05, 20))).outcome.reason.startswith("a run of 10")
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(2.0, 1))).reason == "after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.1, 10))).reason == "after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.05, 20))).reason.startswith("a run of 10")
 
 
 def test_the_limit_is_an_option_of_all_studies():
@@ -123,7 +123,7 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
 @pytest.fixture
 def on_an_idle_machine(monkeypatch):
     """Runs of `Slow` that are taken to last as long as they sleep, however busy the machine is."""
-    monkeypatch.setattr(convergence, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
+    monkeypatch.setattr(line, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
 
 
 def test_a_slow_engine_has_a_line_of_fewer_points(on_an_idle_machine):
@@ -178,15 +178,17 @@ def test_a_run_ends_early_where_it_would_take_ten_times_the_limit_alone():
     assert "out of reach" in limit_reason(PACE_STEPS, PACE_STEPS / (11 * STEP_LIMIT))
 
 
-@pytest.mark.parametrize("made", range(2 * FEWEST_POINTS))
-def test_a_slow_method_gets_the_fewest_points_and_no_more(made):
+@pytest.mark.parametrize(("spent", "points"), [(0.9, 9), (1.1, FEWEST_POINTS), (0.4 * LINE_LIMIT, 2)])
+def test_a_slow_method_gets_the_fewest_points_within_the_limit_of_a_line(spent, points, monkeypatch):
+    """Runs that take `spent` time budgets each."""
     study = Study("any", (SCENE,), (cv.Reduced(),), truth=truth)
-    slow = 1.1 * study.longest_run
-    assert fits(study, [1e-3] * made, slow) == (made < FEWEST_POINTS)
+    monkeypatch.setattr(line, "cost_of_run", lambda *_, **__: spent * study.longest_run)
+    cases = [Case("any", SCENE, cv.Reduced(), Grid(0.01, 10))] * 9
+    assert sum(isinstance(done, Success) for _, done in attempt_each(study, cases)) == points
 
 
 def test_a_line_of_tolerances_goes_from_cheap_to_dear():
     study = Study("any", (SCENE,), (SciPy(),), truth=truth)
-    tolerances = [case.method.rtol for case in points(study, SCENE, SciPy())]
+    tolerances = [case.method.rtol for case in list_cases(study, SCENE, SciPy())]
     assert tolerances == sorted(tolerances, reverse=True)
     assert len(set(tolerances)) == len(tolerances) > 3
