@@ -13,9 +13,9 @@ from click.testing import CliRunner
 import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
+from conservative.references.engines.catalogue import MuJoCo
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.model_files import body_from_mjcf
-from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.scipy import SciPy
 from conservative.references.exact import method
 from conservative.references.precise import Precise

@@ -23,9 +23,8 @@ from conservative.grid import Grid
 from conservative.invariants import kept_sizes, sizes
 from conservative.methods.bounds import LOOSEST, condition
 from conservative.methods.units import bound_rate
+from conservative.references.engines.catalogue import MuJoCo, Pinocchio
 from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.exact.method import Exact
 from conservative.references.precise import Precise

@@ -97,7 +97,7 @@ def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
 
 
 def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
-    from conservative.references.engines.mujoco import MuJoCo
+    from conservative.references.engines.catalogue import MuJoCo
 
     def missing(self):
         raise cv.MissingEngine("MuJoCo", "mujoco")

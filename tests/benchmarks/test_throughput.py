@@ -15,7 +15,7 @@ from conservative.benchmarks.studies.selection import Missing
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
-from conservative.references.engines.mujoco import MuJoCo
+from conservative.references.engines.catalogue import MuJoCo
 
 
 @dataclass(frozen=True)

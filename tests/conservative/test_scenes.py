@@ -14,7 +14,7 @@ import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.invariants import JACOBI_INTEGRAL
-from conservative.references.environments.engine_method import rate_limit_reason
+from conservative.references.environments.adapter import rate_limit_reason
 from conservative.scenes import slow_motion
 from conservative.scenes.transforms import in_body_frame
 
