@@ -121,7 +121,7 @@ class Contest:
 
     @property
     def lost(self) -> bool:
-        """Whether theirs is faster, or alone in reaching the error."""
+        """True if theirs is faster, or is the only side that reaches the error."""
         return self.theirs is not None and (self.ours is None or self.ratio < 1)
 
 

@@ -70,8 +70,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
        `ABOVE_FLOOR` of it are not used. If the slope of the last pair is less than half that of the rest, its finer point is
        not used either.
     3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
-    the
-       scatter decreases by more than `CALMER`, and at least four points remain.
+       the scatter decreases by more than `CALMER`, and at least four points remain.
 
     Failed runs, whose error is not finite, are skipped. Errors of zero are at the floor.
 

@@ -23,7 +23,7 @@ CONSERVED, SMALL = 1e-10, 1e-4
 
 
 class DriftClass(IntEnum):
-    """How well a quantity is conserved: the larger, the worse."""
+    """Class of a drift; a larger number is worse."""
 
     CONSERVED = 0
     SMALL = 1

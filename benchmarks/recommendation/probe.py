@@ -53,7 +53,7 @@ AFFORDABLE = 0.3
 """Wall time, s, of each of the two disturbed runs if there is no closed form."""
 DENSE = 256
 MOST_GRIDS = 16
-"""Number of grids whose exact attitudes are kept, because methods that are probed alike share them."""
+"""Number of grids whose exact attitudes are stored. Methods with the same samples share them."""
 
 _ROUND = sorted({2**a * 5**b for a in range(44) for b in range(19) if 2**a * 5**b <= 10**13})
 
@@ -265,7 +265,7 @@ class Conditions(Question):
         return replace(carried, linear=carried.linear + rounding)
 
     def shows_growth(self, probe: Probe) -> bool:
-        """Whether a probe shows the growth of its error: it covered a whole short window and its attitude was not lost."""
+        """Return whether a probe covered a whole short window without losing the attitude, so that it shows how errors grow."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
 
@@ -301,7 +301,7 @@ def prepare_conditions(asked: Question) -> Conditions:
         return Exact().solve(scene, grid).R_WB
 
     def sampled(grid: Grid) -> Array:
-        """Return the attitudes at multiples of the spacing, all of which the reference solution has."""
+        """Return the attitudes of the reference solution at multiples of the spacing."""
         return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
 
     conditions = Conditions(

@@ -91,9 +91,9 @@ class Case:
 def names_of(method: Method) -> dict[str, str]:
     """Return the columns with names of a method; see `Measurement`."""
     if isinstance(method, Missing):  # version and settings of a missing engine are unknown
-        family, _, setting = method.wanted.partition(":")
-        texts = {"label": method.wanted, "family": family, "engine": family, "version": "", "setting": setting}
-        return {"method": method.wanted, **texts, "series": series(method), "series_setting": setting}
+        family, _, setting = method.name.partition(":")
+        texts = {"label": method.label, "family": family, "engine": family, "version": "", "setting": setting}
+        return {"method": method.name, **texts, "series": series(method), "series_setting": setting}
     try:
         label, maker = method.label, method.maker
     except MissingEngine:

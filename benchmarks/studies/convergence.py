@@ -62,7 +62,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
 
 
 def order_rows(case: Case, names: tuple[Measure, Measure], order: Order, reason: str) -> list[Measurement]:
-    """Return the rows of an observed order and its standard error, or of the reason why there is none."""
+    """Return the rows of an observed order and its standard error; without values if there is a reason."""
     outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
     rows = case.rows(map(Value, names, (order.slope, order.stderr)), outcome, "" if reason else str(order))
     return list(map(drop_step, rows))

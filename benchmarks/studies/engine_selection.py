@@ -69,7 +69,7 @@ def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return (Missing(name, error),)
+        return (Missing(name, error=error),)
 
 
 def _family(engine: str, version: str) -> type[Method]:

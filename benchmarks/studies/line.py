@@ -55,7 +55,7 @@ class LinePoint:
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended."""
+        """Outcome of the run."""
         return self.done if isinstance(self.done, Outcome) else OK
 
     def rows(self) -> list[Measurement]:

@@ -67,10 +67,10 @@ LONG = 0.002
 CALL = 1e-4
 """Smallest duration of a timed sample, s: mostly one call, because short samples are rarely interrupted."""
 MARGIN = 3.0
-"""Largest ratio of an estimated time to that of the fastest setting of its side for a setting that is timed."""
+"""A setting is timed if its estimated time is at most this multiple of the fastest setting's on its side."""
 BITS = 96
 SLOW, EVERY = 0.01, 3
-"""Time, s, of a run above which a line gets one setting of so many."""
+"""Time, s, of a run above which only every third setting of a line is measured."""
 ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
 """Rounds of timing, rounds of a quick study, and the time budget, s, for all rounds of one setting."""
 TIME = Value(Measure.TIME, math.nan)
@@ -194,8 +194,8 @@ def estimate_time(done: Success) -> float:
 def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
 
-    Of each line whose estimated time is at most `MARGIN` times that of the fastest of its side, these are the coarsest point
-    credited with the decade (see `contest`), and the one before it.
+    They belong to lines with an estimated time of at most `MARGIN` times the fastest of the side. Each line contributes the
+    coarsest point that is credited with the decade (see `contest`), and the one before it.
     """
     sides: dict[str, list[Line]] = {}
     for line in filter(None, lines):

@@ -26,29 +26,34 @@ def all_variants(method: Method) -> tuple[Method, ...]:
 
 
 @dataclass(frozen=True)
-class Missing(Method):
-    """Placeholder for a method whose engine is not installed: every run raises `error`.
+class StandIn(Method):
+    """A method that is not in this process, under the name, label and order that it has elsewhere."""
 
-    `wanted` is the name as the user wrote it.
-    """
-
-    wanted: str
-    error: MissingEngine = field(compare=False)
-
-    family: ClassVar[str] = "missing"
-    role: ClassVar[Role] = Role.ENGINE
+    given_name: str
+    given_label: str = ""
+    given_order: int | None = None
 
     @property
     def name(self) -> str:
-        return self.wanted
+        return self.given_name
 
     @property
     def label(self) -> str:
-        return self.wanted
+        return self.given_label or self.given_name
 
     @property
-    def order(self) -> None:
-        return None
+    def order(self) -> int | None:
+        return self.given_order
+
+
+@dataclass(frozen=True)
+class Missing(StandIn):
+    """A method whose engine is not installed, under the name that the user wrote. Every run raises `error`."""
+
+    error: MissingEngine = field(compare=False, kw_only=True)
+
+    family: ClassVar[str] = "missing"
+    role: ClassVar[Role] = Role.ENGINE
 
     def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
         raise self.error
@@ -88,11 +93,11 @@ def methods(
         except MissingEngine as error:
             if not skip_missing:
                 raise
-            selected[Missing(name, error)] = None
+            selected[Missing(name, error=error)] = None
         except NotLoadable as error:  # a broken entry point of another package
             if not skip_missing:
                 raise
-            selected[Missing(name, MissingEngine(name, error.place))] = None
+            selected[Missing(name, error=MissingEngine(name, error.place))] = None
     return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 
@@ -124,7 +129,7 @@ def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
 
 
 def series(method: Method) -> str:
-    """Return the name of a line in a chart: that of the method without its tolerance."""
+    """Return the name of a line in a chart: the name of the method without its tolerance."""
     setting = tolerance_setting(method)
     if setting is None:
         return method.name

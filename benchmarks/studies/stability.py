@@ -119,7 +119,7 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
 
 
 def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
-    """Return how a method does at a size of its steps, with `limit` s of time."""
+    """Return the outcome of a method at a step size, with a time limit, s."""
     done = attempt_apart(limit, case, study.skip_missing)
     if isinstance(done, Outcome):
         return done
@@ -127,7 +127,7 @@ def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: f
 
 
 def detect_divergence(trajectory: Trajectory) -> Outcome | None:
-    """Return the outcome of a run whose energy, or Jacobi integral, leaves its own scale; None where it stays."""
+    """Return the outcome of a run whose energy or Jacobi integral drifts by more than its reference scale, otherwise None."""
     energy = find_energy(trajectory.scene.invariants)
     if energy is None:
         return None
@@ -137,7 +137,7 @@ def detect_divergence(trajectory: Trajectory) -> Outcome | None:
 
 
 def detect_wrong_branch(trajectory: Trajectory, motion: TrueMotion, size: int) -> Outcome | None:
-    """Return the outcome of a run whose first step ends further from the truth than where it began; None of any other."""
+    """Return the outcome of a run whose first step ends further from the truth than it began, otherwise None."""
     if size >= len(motion.R_WB):
         return None
     true = motion.R_WB[size]

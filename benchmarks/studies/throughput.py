@@ -61,7 +61,7 @@ SIZES, QUICK_SIZES = tuple(10**k for k in range(7)), (1, 100)
 BODIES, QUICK_BODIES = 64, 8
 """Number of bodies whose errors are measured."""
 PREPARATION = 8.0
-"""Largest ratio of the time of a preparation to that of a call."""
+"""Largest time of a preparation, in units of the time limit of a call."""
 ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
 """Statistics of the errors of the bodies."""
@@ -71,7 +71,7 @@ EXACT = "closed form"
 
 @dataclass(frozen=True)
 class ThroughputStudy(Study):
-    """The study, of so many bodies.
+    """The study of many bodies.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         except MissingEngine as error:
             if not study.skip_missing:
                 raise
-            case = _case(study, scene, Missing("heyoka", error), SAMPLES)
+            case = _case(study, scene, Missing("heyoka", error=error), SAMPLES)
             yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
             continue
         points: list[BatchSetting] = []

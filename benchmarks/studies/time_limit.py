@@ -90,7 +90,7 @@ def _is_ours(method: Method) -> bool:
 
 
 def _find_timeout(limit: float, case: Case) -> Outcome | None:
-    """Return the outcome of a case with as many steps, and as long a motion, as one that was stopped after as much time."""
+    """Return the outcome of a case that is at least as long, in steps and in time, as one that was stopped at this limit."""
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
     longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
     if limit > before or not longer:

@@ -27,7 +27,7 @@ from ..studies.study import FindTruth, remember_truths
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
 PAPER = SCENES[:2]
-"""Where orders are fitted."""
+"""Scenes on which orders are fitted."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
@@ -61,7 +61,7 @@ class Point:
 
     @property
     def id(self) -> str:
-        """Such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
+        """The id in pytest, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
 
         It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's
         integrator.
@@ -153,7 +153,7 @@ def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
 
 
 def fit_order(point: Point) -> dict[str, GatedValue]:
-    """Return the observed order of the attitude; nothing where a method has or shows none."""
+    """Return the observed order of the attitude; empty if the method has no order or the errors show none."""
     scene, method = point.scene, point.method
     if method.order is None:
         return {}

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from conservative import registry
+from conservative.attitude import angle_between
 from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
@@ -21,7 +22,6 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.convergence_order import MIN_POINTS, observed_order
-from ..measures.errors import measure_errors
 from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
@@ -59,7 +59,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Iterable[float]) -> Spread:
-        """Return the spread of values, of which the first is the one that counts; NaN are ignored."""
+        """Return the spread of values; the first is the measured value, and NaN are ignored."""
         first, *rest = values
         known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
         return cls(first, min(known), max(known))
@@ -147,14 +147,12 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     return replace(
         observation,
         points=tuple(_points(study, scene, method)),
-        error=Spread.of(_largest_error(study, run, case.grid) for run, case in zip(runs, cases, strict=False)),
+        error=Spread.of(
+            float(angle_between(study.truth(scene, case.grid).trajectory.R_WB, run.R_WB).max())
+            for run, case in zip(runs, cases, strict=False)
+        ),
         drifts={invariant.name: Spread.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
     )
-
-
-def _largest_error(study: Study, run: Trajectory, grid: Grid) -> float:
-    truth = study.truth(run.scene, grid).trajectory
-    return next(each.value for each in measure_errors(run, truth) if each.measure is Measure.ATTITUDE_MAX)
 
 
 def _largest_change(run: Trajectory, invariant: Invariant) -> float:
@@ -178,7 +176,8 @@ def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
 def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
     """Return the observations of all versions with their orders, over the steps that every version had time for.
 
-    An order depends a little on the steps that it is fitted to. A version with too few steps for a fit takes none from others.
+    An order depends a little on the steps that it is fitted to. A version with too few steps for a fit does not limit the steps
+    of the others.
     """
     reached = [{point.dt for point in each.points if point.reached} for each in observations]
     enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
@@ -246,7 +245,7 @@ def plan_versions(
     scene_names
         By default those of a report that a setting supports.
     time_limit
-        Longest single run to plan for, s; see `Study`.
+        Time budget of a run, s; see `Study`.
 
     Raises
     ------
@@ -305,8 +304,8 @@ def compare_engine(sides: Sequence[EngineSide], tell: Tell) -> EngineComparison:
 def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> dict[str, StepTimes]:
     """Return the times of a step by version, from rounds that go through all versions: one version computes at a time.
 
-    Versions whose run does not reach its end are left out. If a time differs from that of the version before, all are measured
-    again: a real difference appears again.
+    Versions whose run fails are left out. If a time differs from the time of the previous version, all are measured again: a
+    real difference appears again.
     """
     grid = keep_end(grid_for(scene, scene.dt))
     timed = {

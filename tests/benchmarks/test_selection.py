@@ -58,7 +58,7 @@ def test_a_missing_engine_is_an_error_unless_skipped():
         methods(["reduced", "mujoco"])
     ours, missing = methods(["reduced:order=2", "mujoco"], skip_missing=True)
     assert ours == Reduced()
-    assert missing == Missing("mujoco", MissingEngine("MuJoCo", "mujoco"))
+    assert missing == Missing("mujoco", error=MissingEngine("MuJoCo", "mujoco"))
     assert (missing.name, missing.label, missing.role, missing.order) == ("mujoco", "mujoco", "engine", None)
     with pytest.raises(MissingEngine, match="pip install mujoco"):
         missing.prepare(BRICK, Grid(0.01, 1))
@@ -151,7 +151,7 @@ def test_a_name_that_is_no_engine_is_bad_input(name):
 
 def test_no_setting_is_as_installed_where_the_engine_does_not_say_so():
     assert not any(is_as_installed(method) for method in select_engines(["scipy"]))
-    assert not is_as_installed(Missing("mujoco", MissingEngine("MuJoCo", "mujoco")))
+    assert not is_as_installed(Missing("mujoco", error=MissingEngine("MuJoCo", "mujoco")))
 
 
 @dataclass(frozen=True)
@@ -204,6 +204,6 @@ def test_a_method_of_another_package_has_its_version_and_its_name_once():
 
 
 def test_a_method_whose_engine_is_missing_is_called_as_it_was_asked_for():
-    found = names_of(Missing("mujoco:RK4", MissingEngine("MuJoCo", "mujoco")))
+    found = names_of(Missing("mujoco:RK4", error=MissingEngine("MuJoCo", "mujoco")))
     assert (found["family"], found["version"], found["setting"]) == ("mujoco", "", "RK4")
     assert found["label"] == "mujoco:RK4"

@@ -20,7 +20,7 @@ from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
 
-ABSENT = Missing("mujoco", cv.MissingEngine("MuJoCo", "mujoco"))
+ABSENT = Missing("mujoco", error=cv.MissingEngine("MuJoCo", "mujoco"))
 KINDS = {
     "unsupported": OutcomeKind.UNSUPPORTED,
     "refuses": OutcomeKind.UNSUPPORTED,

@@ -88,7 +88,7 @@ def test_an_engine_that_raises_has_a_row(rows):
 
 
 def test_an_engine_that_is_missing_is_told_or_skipped():
-    absent, bodies, grid = Missing("mjx", MissingEngine("MJX", "mjx")), draw("free_bodies", 2), Grid(0.1, 2)
+    absent, bodies, grid = Missing("mjx", error=MissingEngine("MJX", "mjx")), draw("free_bodies", 2), Grid(0.1, 2)
     assert many_runs.attempt_many(Way(absent), bodies, grid, 10.0, skip_missing=True).kind is OutcomeKind.MISSING
     with pytest.raises(MissingEngine):
         many_runs.attempt_many(Way(absent), bodies, grid, 10.0)
