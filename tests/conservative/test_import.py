@@ -1,3 +1,5 @@
+"""Importing the package is cheap, and its public names exist."""
+
 import ast
 import pickle
 import subprocess
@@ -32,8 +34,8 @@ def test_a_public_name_is_there(name):
     assert getattr(conservative, name) is found
 
 
-def test_type_checkers_see_what_the_interpreter_sees():
-    """To type checkers a name in a stub is public only as `import X as X`."""
+def test_type_checkers_see_the_public_names():
+    # A name in a stub is public to type checkers only as `import X as X`.
     stub = Path(conservative.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     typed = {alias.asname for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom) for alias in node.names}
     assert typed == set(conservative.__all__)
