@@ -1,3 +1,5 @@
+"""Bodies from tensors, moments and shapes, and their axes of symmetry."""
+
 import math
 
 import numpy as np
@@ -8,6 +10,7 @@ import conservative as cv
 from conservative import shapes
 from conservative.attitude import rotation_about
 from conservative.invariants import axial_direction
+from conservative.references.exact.method import free_body
 
 from .one_body import body_in_axes
 
@@ -126,7 +129,12 @@ def test_a_cone_on_its_tip_is_the_papers_top():
     np.testing.assert_allclose(cone.gravity(9.81).moment_B, top.potential.moment_B, rtol=1e-14)  # measured 2e-16
 
 
-def test_a_scipy_rotation_turns_a_shape():
+def test_scipy_rotations_are_accepted_as_attitudes():
     rotation = Rotation.from_matrix(R_BS)
     shape = shapes.box((1, 2, 3), mass=1.7)
     np.testing.assert_allclose(shape.rotate(rotation).inertia, shape.rotate(R_BS).inertia, atol=1e-14)  # measured 2e-16
+    scene = cv.Scene("x", shape.body, rotation, (0.5, -1.5, 2.5), 3.0)
+    for R_WB0 in (scene.R_WB0, cv.scenes.brick_flip().rename("y", R_WB0=rotation).R_WB0):
+        np.testing.assert_allclose(R_WB0, R_BS, atol=1e-15)  # measured 1e-16
+    given, same = (free_body(scene.body, R, (0.5, -1.5, 2.5), [2.0])[0] for R in (rotation, R_BS))
+    np.testing.assert_allclose(given, same, atol=1e-14)  # measured 0
