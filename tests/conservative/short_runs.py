@@ -19,8 +19,8 @@ import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
 from conservative.batch import Batch
+from conservative.drifts import find_reference
 from conservative.grid import Grid
-from conservative.integration.drifts import find_drifts
 from conservative.method import Method
 from conservative.methods.many import Block
 
@@ -105,8 +105,7 @@ def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
         run = method.prepare_many(bodies, grid)
         block = run and run()
         if block:
-            find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B)
-            kernels.drifts_of_many.are_rotations(bodies.R_WB0, 1e-9)
+            find_reference(bodies).measure(grid, grid.t, block.R_WB, block.w_WB_B)
     return block
 
 
