@@ -32,22 +32,11 @@ from . import (
 )
 from .study import Finding, Maker, Progress, Study, remember_truths
 
-MAKERS: Mapping[str, Maker] = {
-    "paper": paper.findings,
-    "convergence": convergence.findings,
-    "speed": speed.findings,
-    "work_precision": work_precision.findings,
-    "each_step": each_step.findings,
-    "long_runs": long_runs.findings,
-    "sphere_curves": sphere_curves.findings,
-    "paper_figures": paper_figures.findings,
-    "engines_at_one_step": engines_at_one_step.findings,
-    "engines_over_steps": engines_over_steps.findings,
-    "stability": stability.findings,
-    "hard_cases": hard_cases.findings,
-    "random": random.findings,
-    "throughput": throughput.findings,
-}
+_IN_ORDER = (
+    *(paper, convergence, speed, work_precision, each_step, long_runs, sphere_curves, paper_figures),
+    *(engines_at_one_step, engines_over_steps, stability, hard_cases, random, throughput),
+)
+MAKERS: Mapping[str, Maker] = {study.__name__.rpartition(".")[2]: study.findings for study in _IN_ORDER}
 """Function of each study, by the name of its file."""
 HARD = ("stability", "hard_cases")
 """Studies of the hard cases: of selected scenes, and of every registered scene."""

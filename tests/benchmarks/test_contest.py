@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within
+from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within, list_deciding
 
 ERRORS, TIMES = [1e-1, 1e-3, 1e-5], [1.0, 2.0, 4.0]
 
@@ -56,6 +56,11 @@ def test_a_method_of_an_order_is_interpolated_exactly():
 def test_a_line_without_settings_has_no_cost():
     assert math.isnan(cost([], [], 1e-3))
     assert first_within([], 1e-3) is None
+
+
+@pytest.mark.parametrize(("error", "deciding"), [(1.0, [0]), (1e-3, [1, 2]), (1e-6, [3, 4]), (1e-9, [])])
+def test_the_settings_that_decide_are_the_first_that_is_credited_and_the_one_before(error, deciding):
+    assert list_deciding([1e-1, 1e-2, 1e-7, 1e-4, 1e-8], error) == deciding
 
 
 def ratios(*values):

@@ -137,19 +137,9 @@ def test_what_is_not_supported_is_a_row_that_says_so():
     assert "symmetric" in row.outcome.reason
 
 
-def test_values_are_those_of_the_run():
-    scene = cv.scenes.brick_flip()
-    grid = hard_cases.grid(scene)
-    assert grid.dt == scene.dt
-    assert grid.t[-1] == 6.0
-    direct = {
-        value.key: value.value
-        for value in errors.measure_errors(cv.Reduced().run(scene, grid.dt), truth(scene, grid).trajectory)
-    }
-    assert table()["brick_flip", "reduced", "rate error max"].value == direct["rate error max"]
-
-
 def test_a_long_motion_is_cut_by_its_turn():
+    brick = hard_cases.grid(cv.scenes.brick_flip())
+    assert (brick.dt, brick.t[-1]) == (0.01, 6.0)
     scene = cv.scenes.lie_group_top()
     assert np.isclose(hard_cases.grid(scene).t[-1] * np.linalg.norm(scene.w_WB_B0), 60, rtol=0.01)
     rest = cv.scenes.hanging_rest()

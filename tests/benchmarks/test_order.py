@@ -24,19 +24,13 @@ def test_exact_powers_give_their_order_from_all_points(p):
     assert math.isnan(order.floor)
 
 
-@pytest.mark.parametrize("p", [1, 2, 4])
+@pytest.mark.parametrize("p", [1, 2, 3.8, 4])
 @pytest.mark.parametrize("seed", range(20))
 def test_noise_is_averaged_over_the_points_and_shows_in_the_standard_error(p, seed):
     order = observed_order(STEPS, noisy(STEPS**p, 0.1, seed))
     assert abs(order.slope - p) < 0.08  # measured up to 0.060 over 200 draws with 10 % noise
     assert 0.003 < order.stderr < 0.05  # measured 0.004 to 0.032 over 200 draws
     assert len(order.used) >= 6  # measured 7 to 9
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_false_order_is_seen(seed):
-    order = observed_order(STEPS, noisy(STEPS**3.8, 0.02, seed))
-    assert abs(order.slope - 3.8) < 0.03  # measured up to 0.011 over 200 draws: 4 is out of reach
 
 
 @pytest.mark.parametrize("p", [2, 4, 8])

@@ -1,18 +1,17 @@
 import math
 from functools import cache
 
-import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, key
-from conservative.benchmarks.studies import step_ladder, studies
+from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study
-from conservative.grid import Grid, grid_for
+from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.truth import Truth
@@ -170,13 +169,3 @@ def test_bad_studies(change, argument):
     with pytest.raises(cv.BadInput) as caught:
         studies.findings(Study(**{**good, **change}))
     assert caught.value.argument == argument
-
-
-@pytest.mark.parametrize("name", ["reduced", "mujoco:Euler", "gauss:stages=4"])
-def test_steps_of_all_sizes_have_the_same_samples(name):
-    chosen = method(name)
-    grids = step_ladder.steps(SCENE, chosen)
-    expected = step_ladder.samples(SCENE, chosen).t
-    assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
-    assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
-    assert isinstance(grids[0], Grid)

@@ -133,16 +133,6 @@ def test_an_exact_setting_stands_for_its_family_in_the_coarse_study():
     assert len(list(many_runs.families(methods))) > 2
 
 
-def test_a_lucky_setting_decides_nothing():
-    errors = [1e-1, 1e-2, 1e-7, 1e-4, 1e-8]
-    line = [throughput.BatchSetting(Way(Ours()), fake(Ours()), {"median": each, "95 %": each}, 1.0, 0.0) for each in errors]
-    assert throughput.select_deciding(line) == line[1:]
-
-
-def fake(method):
-    return type("case", (), {"method": method})
-
-
 @pytest.mark.parametrize("extent", [{"sizes": (0,)}, {"sizes": ()}, {"bodies": 0}, {"time_limit": -1.0}])
 def test_numbers_that_make_no_study(extent):
     with pytest.raises(BadInput):

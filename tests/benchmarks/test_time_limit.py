@@ -20,7 +20,6 @@ from conservative.benchmarks.studies.work_precision import list_cases
 from conservative.grid import Grid, grid_for
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
-from conservative.references.engines.scipy import SciPy
 from conservative.references.worker.client import close_workers
 
 from .foreign_engines import Fast, Harmful, Slow
@@ -187,8 +186,10 @@ def test_a_slow_method_gets_the_fewest_points_within_the_limit_of_a_line(spent, 
     assert sum(isinstance(done, Success) for _, done in attempt_each(study, cases)) == points
 
 
-def test_a_line_of_tolerances_goes_from_cheap_to_dear():
-    study = Study("any", (SCENE,), (SciPy(),), truth=truth)
-    tolerances = [case.method.rtol for case in list_cases(study, SCENE, SciPy())]
-    assert tolerances == sorted(tolerances, reverse=True)
-    assert len(set(tolerances)) == len(tolerances) > 3
+@pytest.mark.parametrize("name", ["scipy", "reduced", "mujoco:Euler", "gauss:stages=4"])
+def test_a_line_goes_from_coarse_to_fine(name):
+    method = registry.method(name)
+    cases = list_cases(Study("any", (SCENE,), (method,), truth=truth), SCENE, method)
+    settings = [getattr(case.method, "rtol", case.grid.dt) for case in cases]
+    assert settings == sorted(settings, reverse=True)
+    assert len(set(settings)) == len(settings) > 3
