@@ -11,7 +11,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -142,8 +142,6 @@ class Conditions(Question):
         End of the truth, s.
     rate
         Largest angular speed, rad/s.
-    amplification
-        Growth of a disturbance.
     """
 
     spacing: float
@@ -152,7 +150,6 @@ class Conditions(Question):
     truth: Callable[[Grid], Array]
     truth_until: float
     rate: float
-    amplification: Amplification
 
     @property
     def short(self) -> float:
@@ -163,6 +160,32 @@ class Conditions(Question):
     def target(self) -> float:
         """Error that settings are chosen for, rad."""
         return SAFETY * self.error
+
+    @cached_property
+    def amplification(self) -> Amplification:
+        """Growth of a small change of the initial rates, from two closed forms, otherwise from two runs of our own method."""
+        scene = self.scene
+        size = float(np.linalg.norm(scene.w_WB_B0)) or self.rate
+        disturbed = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
+        exact = Exact().unsupported(scene) is None and Exact().unsupported(disturbed) is None
+        until = self.duration
+        method, dt = (Exact(), until) if exact else self.choose_ours(error=DISTURBANCE / 100)
+        if not exact:  # as far as the method gets within the wall time
+            n = max(1, math.ceil(self.short / dt))
+            run = method.prepare(scene, Grid(dt, n, n))
+            run()
+            until = min(until, AFFORDABLE * n * dt / wall_time(run))
+        times, factors = [], []
+        for end in sorted({min(until, self.short), until}):
+            n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
+            grid = Grid(end / n, n, max(1, n // DENSE))
+            pair = [method.solve(each, grid) for each in (scene, disturbed)]
+            shared = min(map(len, pair))
+            times.append(pair[0].t[:shared])
+            factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
+        t, factor = np.concatenate(times), np.concatenate(factors)
+        order = np.argsort(t, kind="stable")
+        return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)
 
     def step_at_most(self, dt: float) -> float:
         """Return the longest round step, s, of at most dt."""
@@ -304,7 +327,7 @@ def prepare_conditions(asked: Question) -> Conditions:
         """Return the attitudes of the reference solution at multiples of the spacing."""
         return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
 
-    conditions = Conditions(
+    return Conditions(
         **vars(asked),
         spacing=spacing,
         samples=samples,
@@ -312,32 +335,4 @@ def prepare_conditions(asked: Question) -> Conditions:
         truth=closed_form if closed else sampled,
         truth_until=float(max(duration, truth.trajectory.t[-1]) if closed else samples * spacing),
         rate=rate,
-        amplification=Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, ""),
     )
-    return replace(conditions, amplification=_measure_amplification(conditions))
-
-
-def _measure_amplification(conditions: Conditions) -> Amplification:
-    """Return the effect of a small change of the initial rates: by closed forms, otherwise by our own method."""
-    scene = conditions.scene
-    size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
-    disturbed = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
-    exact = Exact().unsupported(scene) is None and Exact().unsupported(disturbed) is None
-    until = conditions.duration
-    method, dt = (Exact(), until) if exact else conditions.choose_ours(error=DISTURBANCE / 100)
-    if not exact:  # as far as the method gets within the wall time
-        n = max(1, math.ceil(conditions.short / dt))
-        run = method.prepare(scene, Grid(dt, n, n))
-        run()
-        until = min(until, AFFORDABLE * n * dt / wall_time(run))
-    times, factors = [], []
-    for end in sorted({min(until, conditions.short), until}):
-        n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
-        grid = Grid(end / n, n, max(1, n // DENSE))
-        pair = [method.solve(each, grid) for each in (scene, disturbed)]
-        shared = min(map(len, pair))
-        times.append(pair[0].t[:shared])
-        factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
-    t, factor = np.concatenate(times), np.concatenate(factors)
-    order = np.argsort(t, kind="stable")
-    return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)

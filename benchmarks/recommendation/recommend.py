@@ -2,7 +2,7 @@
 
 1. A trial run gives the angular velocity of the body, which determines the sampling interval and the length of probes.
 2. The reference solution is confirmed by a second one. A closed form covers the whole duration, others cover the probes.
-3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `prepare_conditions`).
+3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `Conditions`).
 4. Our methods are those of the automatic choice: its first choice, and if that has no truncation error, the best general
    integrator as well. Each method is probed from coarse to fine (`refine`). A stated law extrapolates errors to the duration.
 5. The resulting settings are timed against each other in interleaved rounds.

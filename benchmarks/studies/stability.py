@@ -102,11 +102,14 @@ class TrueMotion:
 
 def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measurement]:
     """Return the rows of one method on one scene."""
-    works, limit, outcome = math.nan, max(FIRST_LIMIT, study.longest_run), OK
+    works, fails, limit, outcome = math.nan, math.nan, max(FIRST_LIMIT, study.longest_run), OK
     case = Case(study.name, motion.scene, method, motion.grid(STEP_SIZES[0]))
-    fails = math.nan
     for size in STEP_SIZES:
-        outcome = outcome_at(study, replace(case, grid=motion.grid(size)), motion, size, limit)
+        done = attempt_apart(limit, replace(case, grid=motion.grid(size)), study.skip_missing)
+        if isinstance(done, Outcome):
+            outcome = done
+        else:
+            outcome = detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
             break
@@ -116,14 +119,6 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
         case.row(Value(Measure.FAILING_STEP, fails), outcome, "every step works" if outcome.ok else ""),
     ]
     return [drop_step(row) for row in rows]
-
-
-def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
-    """Return the outcome of a method at a step size, with a time limit, s."""
-    done = attempt_apart(limit, case, study.skip_missing)
-    if isinstance(done, Outcome):
-        return done
-    return detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
 
 
 def detect_divergence(trajectory: Trajectory) -> Outcome | None:

@@ -13,8 +13,9 @@ from enum import Enum
 
 from conservative.outcome import Outcome
 
+from ..measures.convergence_order import Order
 from ..measures.errors import DriftClass, classify
-from .engine import EngineComparison, Fit, Observation, Spread, StepTimes, differ, ratio
+from .engine import EngineComparison, Observation, Spread, StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
 """Orders differ if their difference exceeds the first, and this number of standard errors."""
@@ -52,8 +53,8 @@ class Change:
     """
 
     aspect: Aspect
-    was: Outcome | Fit | Spread
-    now: Outcome | Fit | Spread
+    was: Outcome | Order | Spread
+    now: Outcome | Order | Spread
     quantity: str = ""
     lost: bool = False
 

@@ -21,7 +21,7 @@ from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.convergence_order import MIN_POINTS, observed_order
+from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
@@ -44,6 +44,7 @@ TIME_FACTOR = 1.25
 """Smallest ratio of times that differ."""
 NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
 NO_STEP = "its accuracy does not depend on dt"
+NO_ORDER = Order()
 
 
 @dataclass(frozen=True)
@@ -73,15 +74,6 @@ class Spread:
 
 NOTHING = Spread(math.nan, math.nan, math.nan)
 """The spread of a value that could not be measured."""
-
-
-@dataclass(frozen=True)
-class Fit:
-    """An order of convergence: slope and standard error, or NaN and the reason."""
-
-    slope: float = math.nan
-    stderr: float = math.nan
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,8 +118,8 @@ class Observation:
     dt: float
     outcome: Outcome = OK
     points: tuple[StepError, ...] = ()
-    attitude_order: Fit = Fit()
-    rates_order: Fit = Fit()
+    attitude_order: Order = NO_ORDER
+    rates_order: Order = NO_ORDER
     error: Spread = NOTHING
     drifts: Mapping[str, Spread] = field(default_factory=dict)
 
@@ -189,13 +181,11 @@ def _with_orders(seen: Observation, steps: set[float]) -> Observation:
     if not seen.outcome.ok:
         return seen
     if not seen.points:
-        return replace(seen, attitude_order=Fit(reason=NO_STEP), rates_order=Fit(reason=NO_STEP))
+        return replace(seen, attitude_order=Order(reason=NO_STEP), rates_order=Order(reason=NO_STEP))
     points = [point for point in seen.points if point.dt in steps]
-    fits = []
-    for errors in ([point.attitude for point in points], [point.rates for point in points]):
-        order = observed_order([point.dt for point in points], errors)
-        fits.append(Fit(reason=order.reason) if order.reason else Fit(order.slope, order.stderr))
-    return replace(seen, attitude_order=fits[0], rates_order=fits[1])
+    times = [point.dt for point in points]
+    attitude, rates = [point.attitude for point in points], [point.rates for point in points]
+    return replace(seen, attitude_order=observed_order(times, attitude), rates_order=observed_order(times, rates))
 
 
 StepTimes = tuple[float, ...]

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -85,7 +85,7 @@ class ProjectSide:
             row_id = f"{scene} / {each['name']}"
             rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
         try:
-            there = _define(scene, self.ask("describe_scene", **_question(scene)))
+            there = define_scene(scene, partial(self.ask, "describe_scene"))
         except IntegrationFailed as failure:
             yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
             return
@@ -170,16 +170,9 @@ class Remote(StandIn):
         return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)
 
 
-def _question(scene: str) -> dict[str, Any]:
-    return {"scene": scene, "probes": np.array(points.PROBES)}
-
-
-def define_scene(name: str) -> str:
-    """Return the hash of a scene as this process has it. Raise `BadInput` if it does not."""
-    return _define(name, inside.describe_scene(**_question(name)))
-
-
-def _define(name: str, answer: Mapping[str, Any]) -> str:
+def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:
+    """Return the hash of a scene, by default as this process has it. Raise `BadInput` if it does not have the scene."""
+    answer = describe(scene=name, probes=np.array(points.PROBES))
     numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")]
     return points.define([name, *answer["invariants"]], numbers)
 

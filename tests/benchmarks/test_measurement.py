@@ -95,10 +95,8 @@ def test_the_table_of_samples_has_a_row_for_each():
     assert full.index.tolist() == list(range(2 * len(LINE.t)))
 
 
-def test_a_value_without_its_value_is_still_one_of_its_measure():
-    blank = Value(Measure.DRIFT_MAX, 1.0, "energy").blank
-    assert (blank.measure, blank.quantity, blank.key) == (Measure.DRIFT_MAX, "energy", "energy drift max")
-    assert blank.value != blank.value
+def test_the_name_of_a_value_has_the_quantity_of_a_drift():
+    assert Value(Measure.DRIFT_MAX, 1.0, "energy").key == "energy drift max"
     assert [(each.key, each.value == each.value) for each in blanks(Measure.ORDER, Measure.TIME)] == [
         ("observed order", False),
         ("time per simulated second", False),

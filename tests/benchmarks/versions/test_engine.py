@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.changes import Aspect, find_changes, list_transitions
 from conservative.benchmarks.versions.engine import (
     NO_STEP,
-    Fit,
     Spread,
     StepError,
     differ,
@@ -70,13 +70,13 @@ def test_a_small_drift_instead_of_a_large_one_is_a_change():
 
 ALIKE = {
     "the same": GOOD,
-    "orders within half": replace(GOOD, attitude_order=Fit(1.6, 0.01), rates_order=Fit(2.4, 0.01)),
-    "an order that is badly known": replace(GOOD, attitude_order=Fit(1.2, 0.4)),
+    "orders within half": replace(GOOD, attitude_order=Order(1.6, 0.01), rates_order=Order(2.4, 0.01)),
+    "an order that is badly known": replace(GOOD, attitude_order=Order(1.2, 0.4)),
     "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
     "drifts beside the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
     "errors within a factor": replace(GOOD, error=near(6e-3)),
     "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
-    "no order where the error is the same": replace(GOOD, rates_order=Fit(reason="no descent")),
+    "no order where the error is the same": replace(GOOD, rates_order=Order(reason="no descent")),
     "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-4)}),
 }
 
