@@ -27,7 +27,7 @@ from conservative.methods.many import Block
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-MACHINE_CODE = ("signals", "simd", "simd_llvm", "series_llvm", "series_lanes", "lanes_llvm")
+MACHINE_CODE = ("parts", "signals", "simd", "simd_llvm", "series_llvm", "series_lanes", "lanes_llvm")
 OTHER = ("conservative.kernels", *(f"conservative.kernels.{name}" for name in MACHINE_CODE))
 """Modules that are not run as plain Python: how kernels are compiled, what they are then made of, what long runs reach."""
 BASES = ("at_time", "axial_constants", "axial_energy", "start_series", "finite_torque", "energy", "body_torque")

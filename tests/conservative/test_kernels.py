@@ -48,9 +48,12 @@ def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> 
             np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=bound, err_msg=name)
 
 
-TURN = """
-from conservative.kernels.fields import in_body
-print(in_body((1.0, 0.5, 0.0, 0.0), (0.0, 1.0, 0.0))[2], sum(in_body.stats.cache_hits.values()))
+QUARTER_TURN = """
+import numpy as np
+from conservative.kernels.samples import to_body_axes
+R, w, one = np.empty((1, 3, 3)), np.empty((1, 3)), (1.0, 1.0, 1.0)
+to_body_axes(np.ones(1), np.eye(1, 4), np.zeros((1, 3)), one, (np.pi / 2, 1.0), None, R, w)
+print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
 """
 
 
@@ -66,18 +69,16 @@ def test_an_edit_of_an_inner_kernel_runs_new_code(tmp_path: Path, setting: str) 
         "NUMBA_DISABLE_JIT": "",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    assert python(["-c", TURN], **environment) == "-0.8 0"
-    assert python(["-c", TURN], **environment) == "-0.8 1"
+    assert python(["-c", QUARTER_TURN], **environment) == "1 0"
+    assert python(["-c", QUARTER_TURN], **environment) == "1 1"
     vector = tmp_path / "conservative" / "kernels" / "vector.py"
     before, text = vector.stat(), vector.read_text()
-    edited = text.replace("return (a[1] * b[2] - a[2] * b[1],", "return (a[2] * b[1] - a[1] * b[2],").replace(
-        "a[0] * b[1] - a[1] * b[0])", "a[1] * b[0] - a[0] * b[1])"
-    )
+    edited = text.replace("q[0] * p[3] + q[1] * p[2]", "q[1] * p[2] - q[0] * p[3]")
     assert edited != text
     vector.write_text(edited)
     os.utime(vector, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert python(["-c", TURN], **environment) == "0.8 0"
-    assert python(["-c", TURN], **environment) == "0.8 1"
+    assert python(["-c", QUARTER_TURN], **environment) == "-1 0"
+    assert python(["-c", QUARTER_TURN], **environment) == "-1 1"
 
 
 NAMES = sorted({family.card.kernel for family in list_families().values() if family.card.kernel})
