@@ -25,7 +25,7 @@ def on_axis(disturbance: float) -> cv.Scene:
     return cv.Scene("axis", cv.RigidBody((13, 5, 10)), TURN, (0, disturbance, 1.0), 100.0)
 
 
-def homotopy(scene: cv.Scene, h: float, parts: int = 300) -> np.ndarray:
+def homotopy(scene: cv.Scene, h: float, parts: int = 100) -> np.ndarray:
     """Return the momentum after one step of h, followed from a step of 0 in tiny parts: plain NumPy, free bodies, body axes."""
     J, L = scene.body.inertia, scene.body.momentum(scene.w_WB_B0)
     a = np.zeros(3)
@@ -42,7 +42,7 @@ def heavy_body(seed: int) -> cv.Scene:
     return free_body(seed).rename("heavy", potential=cv.UniformGravity(2.0, (0.5, -0.3, 0.8)))
 
 
-def collocated(scene: cv.Scene, stages: int, h: float, parts: int = 200) -> np.ndarray | None:
+def collocated(scene: cv.Scene, stages: int, h: float, parts: int = 80) -> np.ndarray | None:
     """Return the momentum after a step of Gauss collocation, followed from a step of 0 in tiny parts; None if the branch ends.
 
     Plain NumPy on momentum and vertical, body axes: L' = L x w + gamma x c, gamma' = gamma x w.

@@ -207,7 +207,7 @@ def order(method, kind):
     state = STATES[case]["states"][0]
     truth = from_quaternion(np.array([float(number) for number in state["q"]]))
     end = float(state["t"])
-    errors = [angle_between(truth, cv.integrate(scene, end / n, method, t_end=end).R_WB[-1]) for n in (200, 400)]
+    errors = [angle_between(truth, cv.integrate(scene, end / n, method, t_end=end).R_WB[-1]) for n in (100, 200)]
     return np.log2(errors[0] / errors[1]) if errors[1] > ROUND_OFF else method.order
 
 

@@ -14,12 +14,11 @@ from conservative.errors import NotConverged
 from conservative.grid import Grid
 from conservative.invariants import sizes
 from conservative.method import Method
-from conservative.methods import gauss, principal_axes
-from conservative.methods.units import SI, Units, bound_rate, find_units
+from conservative.methods.units import SI, bound_rate, find_units
 from conservative.registry import list_scenes, method
 from conservative.registry import scene as registered
 
-from .one_body import START, TURN, body_in_axes, free, in_field
+from .one_body import TURN, body_in_axes
 
 HOOK = np.array([0.3, 0.1, 0.4])
 UNITS = [(1e24, 1.0, 1.0), (1e-24, 1.0, 1.0), (1.0, 1e12, 1.0), (1e-24, 1e-2, 1e-8), (1e24, 1e9, 1e12), (1e-6, 1e-2, 1e-2)]
@@ -97,18 +96,6 @@ def test_units_are_powers_of_two_to_the_sixteenth() -> None:
             assert 2**-17 < size / value < 2**17
 
 
-def test_all_of_a_scene_is_converted() -> None:
-    """With units of 2^32 kg m^2 and 2^-48 s, every number is divided by a power of two."""
-    ours = scene("heavy", 4e9, 1e-10)
-    found, energy = Units(2.0**32, 2.0**-48).convert(ours), 2.0**128
-    assert (found.t_end, found.dt) == (ours.t_end * 2.0**48, ours.dt * 2.0**48)
-    np.testing.assert_array_equal(found.w_WB_B0, ours.w_WB_B0 / 2.0**48)
-    np.testing.assert_array_equal(found.body.inertia, ours.body.inertia / 2.0**32)
-    np.testing.assert_allclose(found.potential.moment_B, ours.potential.moment_B / energy, rtol=1e-15)
-    np.testing.assert_array_equal(found.R_WB0, ours.R_WB0)
-    assert found.name == ours.name
-
-
 def test_a_potential_without_units_is_not_rescaled() -> None:
     class Foreign:
         def __init__(self, inner: Any) -> None:
@@ -158,22 +145,3 @@ def test_scales_of_invariants_neither_overflow_nor_vanish() -> None:
         for w in ((size, 0.5 * size, 0), (0, 0, 0)):
             falling = cv.Scene("extreme", body, np.eye(3), w, 1.0, cv.UniformGravity(size, (size, 0, 0)))
             assert all(0 < invariant.scale < math.inf for invariant in falling.invariants)
-
-
-FREE, GRAVITY = free((1, 1.4, 2), (0.3, -1.9, 0.3)), in_field("gravity")
-
-
-def test_units_of_the_closed_system():
-    model = gauss.closed_system(principal_axes.principal_start(GRAVITY))
-    size = np.linalg.norm(principal_axes.principal_start(GRAVITY).L)
-    assert 0.5 < size / model.unit <= 1
-    np.testing.assert_allclose(model.J_inverse, model.unit / GRAVITY.body.moments)
-    assert math.log2(model.unit).is_integer()
-    np.testing.assert_allclose(model.gamma, START[2] @ GRAVITY.body.R_BP, atol=1e-15)
-    rest = gauss.closed_system(principal_axes.principal_start(free((1, 1.4, 2), (0, 0, 0))))
-    assert (rest.unit, rest.L) == (1.0, (0.0, 0.0, 0.0))
-    hanging = cv.Scene("at rest", GRAVITY.body, START, (0, 0, 0), 1.0, GRAVITY.potential)
-    moment = 2.0 * np.linalg.norm((0.2, 0.1, 0.4))
-    expected = 2.0 ** math.ceil(math.log2(math.sqrt(2.0 * moment)))
-    assert gauss.closed_system(principal_axes.principal_start(hanging)).unit == expected
-    assert np.linalg.norm(gauss.closed_system(principal_axes.principal_start(FREE)).gamma) == pytest.approx(1)
