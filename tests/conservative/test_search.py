@@ -78,6 +78,14 @@ def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected)
     assert (grid.dt, grid.n_steps, grid.every) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    ("estimate", "power", "expected"),
+    [(1e-5, 2, math.sqrt(0.05)), (0.6e-6, 2, 0.9), (1e-3, 2, 0.1), (math.inf, 2, 0.5), (1.6e-5, 4, (0.5 / 16) ** 0.25)],
+)
+def test_the_next_step_follows_from_the_order(estimate, power, expected):
+    assert search.step_factor(estimate, 1e-6, Known(power=power)) == pytest.approx(expected)
+
+
 @pytest.mark.parametrize(("every", "n"), [(1, 8), (2, 8), (3, 8), (1, 6), (3, 10), (4, 10)])
 def test_two_runs_are_compared_at_the_times_that_both_have(every, n):
     estimate, fine, _ = trials.run_twice(Known(size=0.01), SCENE, cv.Grid(0.5, n, every))
