@@ -49,10 +49,10 @@ def test_columns_and_their_types_do_not_depend_on_the_rows():
 
 
 def test_a_row_in_the_table():
-    found = frame([ROW]).iloc[0]
-    shown = found[["role", "quantity", "measure", "unit", "value", "outcome", "reason", "detail"]].tolist()
+    record = frame([ROW]).iloc[0]
+    shown = record[["role", "quantity", "measure", "unit", "value", "outcome", "reason", "detail"]].tolist()
     assert shown == ["ours", "energy", "drift max", "1", 1e-15, "ok", "", ""]
-    assert found[["step", "time", "residual"]].isna().all()
+    assert record[["step", "time", "residual"]].isna().all()
 
 
 @pytest.mark.parametrize("row", [ROW, FAILED])

@@ -1,4 +1,4 @@
-"""Versions of an engine that nobody measured: observations with chosen figures."""
+"""Made-up versions of an engine: observations with chosen figures."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.environment import Environment
 
 TIMES = (1e-6, 1.02e-6, 1.01e-6)
-"""What a step takes, s, on a machine that has little else to do."""
+"""Times of a step, s, on an idle machine."""
 
 
 def near(value, relative=0.01):
@@ -47,7 +47,7 @@ FAILED = Observation(
     dt=0.01,
     outcome=Outcome(OutcomeKind.DIVERGED, "why", time=0.5),
 )
-"""No end of the run."""
+"""A run that fails."""
 
 
 def history(*observations, times=()):
@@ -59,5 +59,5 @@ def history(*observations, times=()):
 
 
 def versions(*names):
-    """Return versions of an engine that nobody installed."""
+    """Return made-up versions of an engine."""
     return [Version(name, "", Environment("made", name, Path(), "3.11.7", (f"made=={name}",))) for name in names]
