@@ -35,6 +35,15 @@ def first_within(credited: Sequence[float], error: float) -> int | None:
     return next((i for i, each in enumerate(credited) if each <= error), None)
 
 
+def list_deciding(errors: Sequence[float], error: float) -> list[int]:
+    """Return the indices of the settings, coarse to fine, that determine the cost of an error.
+
+    They are the coarsest setting that is credited with it and the one before; none if no setting reaches the error.
+    """
+    first = first_within(credit(errors), error)
+    return [] if first is None else [i for i in (first - 1, first) if i >= 0]
+
+
 def cost(errors: Sequence[float], times: Sequence[float], error: float) -> float:
     """Return the time in which a line of settings, coarse to fine, reaches an error; NaN if it does not.
 
@@ -112,7 +121,7 @@ class Contest:
 
     @property
     def lost(self) -> bool:
-        """Whether theirs is faster, or alone in reaching the error."""
+        """True if theirs is faster, or is the only side that reaches the error."""
         return self.theirs is not None and (self.ours is None or self.ratio < 1)
 
 

@@ -69,6 +69,11 @@ class RigidBody:
         return self._principal[1]
 
     @cached_property
+    def condition(self) -> float:
+        """Ratio of the largest principal moment to the smallest."""
+        return float(self.moments.max() / self.moments.min())
+
+    @cached_property
     def inverse(self) -> Array:
         """Inverse inertia (3, 3), 1/(kg m^2), body axes."""
         return self.R_BP @ np.diag(1 / self.moments) @ self.R_BP.T

@@ -152,6 +152,8 @@ def rotation(argument: str, value: object) -> Array:
 
 def choice(argument: str, value: object, options: tuple[object, ...]) -> None:
     """Raise `BadInput` unless `value` is one of `options`, which can be texts, integers and None."""
+    if type(value) is str and value in options:
+        return
     if isinstance(value, bool) or not isinstance(value, str | Integral | None) or value not in options:
         raise BadInput(argument, describe(value), "one of " + ", ".join(repr(o) for o in options))
 
@@ -164,5 +166,5 @@ def set_fields(value: object, **fields: Any) -> None:
 def build_unchecked(kind: type[T], **fields: Any) -> T:
     """Return a frozen dataclass without the checks of its constructor: internal units can have numbers of any size."""
     instance = object.__new__(kind)
-    set_fields(instance, **fields)
+    vars(instance).update(fields)
     return instance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -62,16 +62,20 @@ class Grid:
         steps[-1] = self.n_steps
         return steps
 
+    @cached_property
+    def _times(self) -> Array:
+        return self.steps * self.dt
+
     @property
     def t(self) -> Array:
-        """Times (n,) of the samples, s."""
-        return self.steps * self.dt
+        """Times (n,) of the samples, s, as a new array."""
+        return self._times.copy()
 
     def count_samples(self, done: int) -> int:
         """Return the number of samples in the first `done` steps."""
         return self.n_samples if done == self.n_steps else 1 + done // self.every
 
-    @property
+    @cached_property
     def n_samples(self) -> int:
         """Number of samples."""
         return 1 + -(-self.n_steps // self.every)
@@ -100,7 +104,13 @@ def grid_for(scene: Scene, dt: object, t_end: object = None, sample_every: objec
         raise BadInput("dt", f"{step:g}, {n_steps:.3g} steps", f"{end / MOST_STEPS:.3g} s or more, for up to 2^53 steps")
     every = min(positive_integer("sample_every", sample_every), n_steps)
     require_memory("sample_every", n_steps, every)
-    return build_unchecked(Grid, dt=step, n_steps=n_steps, every=every)
+    return _recall_grid(step, n_steps, every)
+
+
+@lru_cache(maxsize=16)
+def _recall_grid(dt: float, n_steps: int, every: int) -> Grid:
+    """Return a checked grid: the same one for runs of several scenes, so that its times are computed once."""
+    return build_unchecked(Grid, dt=dt, n_steps=n_steps, every=every)
 
 
 @lru_cache(maxsize=1)

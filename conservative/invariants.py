@@ -19,6 +19,7 @@ from .potentials.uniform_gravity import UniformGravity
 
 _NAME = "a text of one character or more"
 MOMENTUM_UNIT = "kg m^2/s"
+AXIAL_MOMENTUM = "axial momentum"
 JACOBI_INTEGRAL = "Jacobi integral"
 """Name of the invariant that replaces the energy in a turning field."""
 
@@ -85,19 +86,6 @@ def energy(body: RigidBody, potential: AnyPotential | None, R_WB: Array, w_WB_B:
     return kinetic if potential is None else kinetic + energy_at(potential, R_WB, t)
 
 
-def conserved_part(body: RigidBody, potential: AnyPotential | None, R: Array, w_WB_B: Array) -> Array:
-    """Return the part (...), J, that added to the kinetic energy is conserved: V, or V - rate n.l in a turning field.
-
-    Attitudes (..., 3, 3) are relative to the axes in which the field is constant (`Scene.in_field_axes`), rates (..., 3),
-    rad/s, are those of the body in the world. The result is 0 for a free body, and if no energy is conserved.
-    """
-    if isinstance(potential, Turning):
-        return potential.potential.energy(R) - potential.orbit.rate * (momentum_W(body, R, w_WB_B) @ potential.orbit.normal_W)
-    if potential is None or depends_on_time(potential):
-        return np.zeros(R.shape[:-2])
-    return energy_at(potential, R, np.zeros(()))
-
-
 def jacobi_scale(body: RigidBody, field: Turning, energy_scale: float) -> float:
     """Return the reference scale of the Jacobi integral, J: the scale of the energy plus the contribution of the turning."""
     return energy_scale + field.orbit.rate * math.sqrt(2 * energy_scale * float(body.moments.max()))
@@ -139,20 +127,21 @@ def invariants_of(
         found.append(Invariant(name, MOMENTUM_UNIT, scale, lambda R, w: momentum_W(body, R, w) @ line))
     axis = axial_direction(body, potential)
     if axis is not None:
-        found.append(Invariant("axial momentum", MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
+        found.append(Invariant(AXIAL_MOMENTUM, MOMENTUM_UNIT, scale, lambda R, w: body.momentum(w) @ axis))
     return tuple(found)
 
 
 def _energies(body: RigidBody, potential: AnyPotential | None, energy_scale: float) -> Iterator[Invariant]:
     """Yield the energy, or the Jacobi integral, or nothing."""
-
-    def evaluate(R: Array, w: Array) -> Array:
-        return kinetic_energy(body, w) + conserved_part(body, potential, R, w)
-
     if isinstance(potential, Turning):
-        yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), evaluate)
+        field, orbit = potential.potential, potential.orbit
+
+        def jacobi_integral(R_OB: Array, w: Array) -> Array:
+            return kinetic_energy(body, w) + field.energy(R_OB) - orbit.rate * (momentum_W(body, R_OB, w) @ orbit.normal_W)
+
+        yield Invariant(JACOBI_INTEGRAL, "J", jacobi_scale(body, potential, energy_scale), jacobi_integral)
     elif not depends_on_time(potential):
-        yield Invariant("energy", "J", energy_scale, evaluate)
+        yield Invariant("energy", "J", energy_scale, lambda R, w: energy(body, potential, R, w, np.zeros(())))
 
 
 def find_energy(invariants: Iterable[Invariant]) -> Invariant | None:
@@ -169,25 +158,6 @@ def kept_sizes(scene: Any, kept: frozenset[str]) -> dict[Invariant, float]:
     most = math.sqrt(2 * scene.energy_scale * float(scene.body.moments.max()))
     found = (each for each in scene.invariants if each.name in kept and each not in scene.extra_invariants)
     return {each: max(each.scale, most) if each.unit == MOMENTUM_UNIT else each.scale for each in found}
-
-
-def kernel_constants(scene: Any, kept: frozenset[str]) -> tuple[Array, Array]:
-    """Return the inertia (3, 3), kg m^2, and constants (5, 4) of a `Scene` for `conservative.kernels.drifts`.
-
-    The constants of invariants whose names are not among `kept` are 0.
-    """
-    body, potential, rows = scene.body, scene.potential, np.zeros((5, 4))
-    for invariant, size in kept_sizes(scene, kept).items():
-        start = invariant.evaluate(scene.R_WB0[None], scene.w_WB_B0[None])[0]
-        if invariant.unit == "J":
-            rows[0] = 1 / size, 0.0, 0.0, start
-        elif invariant.name == "axial momentum":
-            rows[4, :3], rows[4, 3] = scene.symmetry_axis_B / size, start / size
-        else:
-            directions = np.eye(3) if potential is None else potential.axis_W[None]
-            part = slice(1, 1 + len(directions))
-            rows[part, :3], rows[part, 3] = directions / size, start / size
-    return np.array(body.inertia), rows
 
 
 NEARLY_SPHERICAL = 0.005

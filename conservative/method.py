@@ -8,11 +8,15 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
+
 from .card import Card, Maker, Purpose, call_with_settings, maker_of, setting_texts, settings_text
 from .card import Role as Role
+from .drifts import scene_reference
+from .errors import InvalidResult
 from .grid import Grid, grid_for
 from .scene import Scene
-from .trajectory import Bounds, Trajectory, accept
+from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find_mistake
 
 Run = Callable[[], Trajectory]
 
@@ -121,13 +125,24 @@ class Method(ABC):
         """
         return None
 
-    def check(self, scene: Scene, grid: Grid, result: object) -> Trajectory:
+    def check(self, scene: Scene, grid: Grid, result: Any) -> Trajectory:
         """Return the trajectory if it passes every check, otherwise its valid samples and the failure.
 
         Every run is checked here: the result is a `Trajectory` of the scene with all samples of the grid, with the right
-        shapes, types and times, finite, and within `bounds`.
+        shapes, types and times, finite, and within `bounds`. If the method has a kernel, a compiled check runs first. If that
+        passes, no other check is made.
         """
-        return accept(result, scene, grid, self, self.bounds(scene, grid))
+        mistake, conserved, bounds = find_mistake(result, scene, grid), self.conserves, self.bounds(scene, grid)
+        if mistake is None and result.failure is None and self.card.kernel:
+            reference = scene.derive(scene_reference, conserved)
+            drifts = reference.measure(grid, result.t, result.R_WB[None], result.w_WB_B[None])[0]
+            if drifts[0] <= bounds.orthonormality and drifts[4] <= bounds.drift:
+                return result
+        mistake = mistake or find_misplaced(result, grid)
+        if mistake is None:
+            return cut_at_failure(result, conserved, bounds)
+        nothing = np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3))
+        return Trajectory(scene, *nothing, self.label, failure=InvalidResult(self.label, mistake))
 
     def solve(self, scene: Scene, grid: Grid) -> Trajectory:
         """Return the checked trajectory on a grid, whatever its outcome."""

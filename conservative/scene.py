@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -136,6 +137,13 @@ class Scene:
         """
         size = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
         return size or 1.0
+
+    @cached_property
+    def magnitudes(self) -> tuple[int, int | None]:
+        """Binary exponents of the largest moment, kg m^2, and of the rate that all energy allows, 1/s; None without energy."""
+        moment = math.frexp(float(self.body.moments.max()))[1]
+        energy = self.kinetic_energy0 + (self.potential.scale() if self.potential else 0.0)
+        return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
 
     @cached_property
     def invariants(self) -> tuple[Invariant, ...]:

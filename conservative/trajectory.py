@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import invariants, presentation
 from .attitude import Array, orthonormality
-from .deferred_imports import kernels
-from .errors import Diverged, IntegrationFailed, InvalidResult, NotConserved
+from .errors import Diverged, IntegrationFailed, NotConserved
 from .grid import Grid
 from .invariants import Invariant, sizes
 from .outcome import OK, Outcome
@@ -131,8 +130,10 @@ START_TOLERANCE = 1e-6
 """Largest difference of the first sample from the initial state: of attitudes, and of rates relative to their size."""
 
 
-@dataclass(frozen=True)
-class Bounds:
+_FLOAT = np.dtype(np.float64)
+
+
+class Bounds(NamedTuple):
     """Limits for every sample of a run with the outcome ok, dimensionless.
 
     `drift` limits the drift of the invariants that a method conserves, relative to their scales. `orthonormality` limits the
@@ -143,96 +144,57 @@ class Bounds:
     orthonormality: float
 
 
-def accept(found: Any, scene: Scene, steps: Grid, method: Any, bounds: Bounds) -> Trajectory:
-    """Return the trajectory if it passes every check, otherwise its valid samples and the failure.
-
-    Parameters
-    ----------
-    found
-        The result of a run, which should be a `Trajectory`.
-    scene, steps
-        Scene and grid of the run.
-    method, bounds
-        The `Method`, and its bounds on the invariants that it conserves. If it has a kernel, a compiled check runs first. If
-        that passes, no other check is made.
-    """
-    mistake = _find_mistake(found, scene, steps)
-    kept = method.conserves
-    if mistake is None and method.card.kernel and found.failure is None and _is_kept(found, steps, kept, bounds):
-        return found
-    with np.errstate(all="ignore"):
-        mistake = mistake or _find_misplaced(found, steps)
-        if mistake is not None:
-            nothing = np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3))
-            return Trajectory(scene, *nothing, method.label, failure=InvalidResult(method.label, mistake))
-        return _cut_at_drift(_cut_to_finite(found), kept, bounds)
-
-
-def accept_samples(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return the samples of a run, at any times, before the first one outside the bounds of the invariants named `kept`."""
-    with np.errstate(all="ignore"):
-        return _cut_at_drift(_cut_to_finite(found), kept, bounds)
-
-
-def _find_mistake(found: Any, scene: Scene, steps: Grid) -> str | None:
-    """Return the error in type, shape or scene of a result, or None."""
-    if not isinstance(found, Trajectory):
-        return f"a {type(found).__name__}, no Trajectory"
-    if found.scene is not scene:
+def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
+    """Return the error in type, shape or scene of the result of a run on a grid, or None if it is a trajectory of the scene."""
+    is_trajectory: bool = isinstance(result, Trajectory)
+    if not is_trajectory:
+        return f"a {type(result).__name__}, no Trajectory"
+    if result.scene is not scene:
         return "the trajectory of another scene"
-    return _find_mistyped(found, steps)
-
-
-def _find_mistyped(found: Any, steps: Grid) -> str | None:
-    """Return the error in type or shape of a field of a `Trajectory`, or None."""
-    if not isinstance(found.counters, Counters) or not isinstance(found.failure, IntegrationFailed | None):
-        return "counters or a failure of another type"
-    n = len(found.t) if found.failure is not None and isinstance(found.t, np.ndarray) else steps.n_samples
-    for name, values, shape in (("t", found.t, (n,)), ("R_WB", found.R_WB, (n, 3, 3)), ("w_WB_B", found.w_WB_B, (n, 3))):
+    if not isinstance(result.counters, Counters):
+        return "counters of another type"
+    n = grid.n_samples
+    if result.failure is not None:
+        if not isinstance(result.failure, IntegrationFailed):
+            return "a failure of another type"
+        n = len(result.t) if isinstance(result.t, np.ndarray) else n
+    for name, values, shape in (("t", result.t, (n,)), ("R_WB", result.R_WB, (n, 3, 3)), ("w_WB_B", result.w_WB_B, (n, 3))):
         if not isinstance(values, np.ndarray):
             return f"{name} as a {type(values).__name__}"
-        if values.dtype != np.float64 or values.shape != shape:
+        if values.dtype != _FLOAT or values.shape != shape:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
     return None
 
 
-def _find_misplaced(found: Trajectory, steps: Grid) -> str | None:
-    """Return the error in times or initial state of the samples, or None."""
-    t = steps.t
-    if len(found) > len(t) or not np.allclose(found.t, t[: len(found)], rtol=1e-12, atol=0):
+def find_misplaced(result: Trajectory, grid: Grid) -> str | None:
+    """Return the error in times or initial state of the samples of a run on a grid, or None."""
+    t, scene = grid.t, result.scene
+    if len(result) > len(t) or not np.allclose(result.t, t[: len(result)], rtol=1e-12, atol=0):
         return "samples at other times than those of the grid"
-    R_off = np.abs(found.R_WB[:1] - found.scene.R_WB0) > START_TOLERANCE
-    w_off = np.abs(found.w_WB_B[:1] - found.scene.w_WB_B0) > START_TOLERANCE * np.abs(found.scene.w_WB_B0).max()
+    R_off = np.abs(result.R_WB[:1] - scene.R_WB0) > START_TOLERANCE
+    w_off = np.abs(result.w_WB_B[:1] - scene.w_WB_B0) > START_TOLERANCE * np.abs(scene.w_WB_B0).max()
     return "a first sample that is not the start" if R_off.any() or w_off.any() else None
 
 
-def _is_kept(found: Trajectory, steps: Grid, kept: frozenset[str], bounds: Bounds) -> bool:
-    """Return whether compiled code finds all samples within the bounds and all times right."""
-    scene = found.scene
-    V = invariants.conserved_part(scene.body, scene.potential, scene.in_field_axes(found.R_WB, found.t), found.w_WB_B)
-    J, constants = scene.derive(invariants.kernel_constants, kept)
-    times, allowed = (steps.dt, steps.every, steps.n_steps, found.t), (bounds.drift, bounds.orthonormality)
-    return bool(kernels("drifts").are_kept(*times, found.R_WB, found.w_WB_B, V, J, constants, *allowed))
+def cut_at_failure(result: Trajectory, conserved: frozenset[str], bounds: Bounds) -> Trajectory:
+    """Return the samples of a run before the first that is not finite or, of a run that reached its end, beyond a bound.
 
-
-def _cut_to_finite(found: Trajectory) -> Trajectory:
-    """Return the samples before the first that is not finite, with the failure."""
-    good = finite_prefix(found.R_WB, found.w_WB_B)
-    failure = found.failure or Diverged(float(found.t[max(good - 1, 0)]))
-    return found if good == len(found) else _cut(found, good, failure)
-
-
-def _cut_at_drift(found: Trajectory, kept: frozenset[str], bounds: Bounds) -> Trajectory:
-    """Return the samples before the first that is beyond a bound, with the failure; those of a failed run as they are."""
-    if found.failure is not None:
-        return found
-    quantities = [("orthonormality", orthonormality(found.R_WB), bounds.orthonormality)]
-    for invariant, size in invariants.kept_sizes(found.scene, kept).items():
-        quantities.append((invariant.name, sizes(found.drift(invariant)) * (invariant.scale / size), bounds.drift))
-    good, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
-    if good == len(found):
-        return found
-    return _cut(found, good, NotConserved(float(found.t[max(good - 1, 0)]), name, float(values.max()), bound))
+    `conserved` are the names of the bounded invariants. A trajectory without such a sample is returned unchanged, and one that
+    is cut has the failure.
+    """
+    with np.errstate(all="ignore"):
+        n = finite_prefix(result.R_WB, result.w_WB_B)
+        if n < len(result):
+            return _cut(result, n, result.failure or Diverged(float(result.t[max(n - 1, 0)])))
+        if result.failure is not None:
+            return result
+        quantities = [("orthonormality", orthonormality(result.R_WB), bounds.orthonormality)]
+        for invariant, size in invariants.kept_sizes(result.scene, conserved).items():
+            quantities.append((invariant.name, sizes(result.drift(invariant)) * (invariant.scale / size), bounds.drift))
+    n, (name, values, bound) = min(((_count_within(*entry[1:]), entry) for entry in quantities), key=lambda pair: pair[0])
+    if n == len(result):
+        return result
+    return _cut(result, n, NotConserved(float(result.t[max(n - 1, 0)]), name, float(values.max()), bound))
 
 
 def _count_within(values: Array, bound: float) -> int:
@@ -241,8 +203,8 @@ def _count_within(values: Array, bound: float) -> int:
     return len(values) if within.all() else int(np.argmin(within))
 
 
-def _cut(found: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
-    return replace(found, t=found.t[:n], R_WB=found.R_WB[:n], w_WB_B=found.w_WB_B[:n], failure=failure)
+def _cut(result: Trajectory, n: int, failure: IntegrationFailed) -> Trajectory:
+    return replace(result, t=result.t[:n], R_WB=result.R_WB[:n], w_WB_B=result.w_WB_B[:n], failure=failure)
 
 
 def finite_prefix(R_WB: Array, w_WB_B: Array) -> int:

@@ -1,4 +1,4 @@
-"""Which tests run, signals as tests expect them, and programs that end with the test that started them.
+"""Selection of tests by marker, handlers of signals, and programs that end with the test that started them.
 
 `pytest` runs everything that needs neither minutes, a browser, an engine in an environment of its own, nor many processes.
 Tests that do are marked. `pytest --all` runs them as well, except the random search for failures: `pytest --attack`.

@@ -1,4 +1,4 @@
-"""The package as others have it: built, installed into an environment of its own, and run there."""
+"""Build the package, install it into an environment of its own, and run programs there."""
 
 import os
 import re
@@ -12,12 +12,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 LEAN = {"numpy", "scipy", "numba", "mpmath", "lazy-loader"}
-"""What the package requires without an extra."""
+"""Required packages without an extra."""
 PYTEST = "import sys\nfrom pytest import console_main\nsys.exit(console_main())\n"
 
 
 def build(source, target, folder):
-    """Return the wheel or sdist that hatchling, which the tests bring, builds of a folder; no network."""
+    """Return the wheel or sdist that hatchling builds of a folder; no network."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", folder]
     subprocess.run(command, cwd=source, env=variables(), check=True, capture_output=True, timeout=120)
     (built,) = folder.glob("*.whl" if target == "wheel" else "*.tar.gz")
@@ -25,7 +25,7 @@ def build(source, target, folder):
 
 
 def variables(**changed):
-    """Return the environment of a process that finds packages where its interpreter has them, and only there."""
+    """Return environment variables of a process that finds packages only where its interpreter has them."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHONPATH", "PYTEST"))}
     return kept | changed
 
@@ -63,19 +63,30 @@ def programs():
 
 @dataclass(frozen=True)
 class Environment:
-    """A virtual environment with what this one has, but ours."""
+    """A virtual environment with the packages of this one except ours."""
 
     folder: Path
 
     @classmethod
     def create(cls, folder, wheel=None):
-        """Make one, with a wheel in it."""
+        """Make an environment with the packages of this one, and perhaps a wheel."""
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=120)
         environment = cls(folder)
-        environment._link_packages()
-        environment._write_pytest()
+        links = folder / "packages"
+        links.mkdir()
+        for place in dict.fromkeys(sysconfig.get_paths()[name] for name in ("purelib", "platlib")):
+            for entry in Path(place).iterdir():
+                if not re.match(r"_?conservative", entry.name):
+                    (links / entry.name).symlink_to(entry)
+        (site,) = folder.glob("lib/python*/site-packages")
+        (site / "packages.pth").write_text(f"import site; site.addsitedir({str(links)!r})\n")
+        script = folder / "bin" / "pytest"
+        script.write_text(f"#!{environment.python}\n{PYTEST}")
+        script.chmod(0o755)
         if wheel:
-            environment._install(wheel)
+            pip = [sys.executable, "-m", "pip", "--python", environment.python]
+            options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-index"]
+            subprocess.run([*pip, "install", *options, wheel], env=variables(), check=True, timeout=120)
         return environment
 
     @property
@@ -96,26 +107,3 @@ class Environment:
             check=False,
         )
         return done.returncode, done.stdout + done.stderr
-
-    def _link_packages(self):
-        links = self.folder / "packages"
-        links.mkdir()
-        for place in dict.fromkeys(sysconfig.get_paths()[name] for name in ("purelib", "platlib")):
-            for entry in Path(place).iterdir():
-                if not re.match(r"_?conservative", entry.name):
-                    (links / entry.name).symlink_to(entry)
-        (self._site() / "packages.pth").write_text(f"import site; site.addsitedir({str(links)!r})\n")
-
-    def _site(self):
-        (site,) = self.folder.glob("lib/python*/site-packages")
-        return site
-
-    def _write_pytest(self):
-        script = self.folder / "bin" / "pytest"
-        script.write_text(f"#!{self.python}\n{PYTEST}")
-        script.chmod(0o755)
-
-    def _install(self, wheel):
-        pip = [sys.executable, "-m", "pip", "--python", self.python]
-        options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-index"]
-        subprocess.run([*pip, "install", *options, wheel], env=variables(), check=True, timeout=120)

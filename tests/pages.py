@@ -1,4 +1,4 @@
-"""The Markdown pages of the project, and what stands in them: code, links, commands."""
+"""The Markdown pages of the project, and their code, links and commands."""
 
 import re
 import shlex
@@ -24,7 +24,7 @@ def blocks(text, language):
 
 
 def links(text):
-    """Return where the links and pictures of a page lead, without those in its code."""
+    """Return the targets of the links and pictures of a page, without those in its code."""
     return LINK.findall(INDENTED.sub("", FENCE.sub("", text)))
 
 
@@ -36,25 +36,20 @@ def anchors(text):
 
 def dead_links(page):
     """Return the relative links of a page that lead to no file, or to no heading of one."""
-    return [link for link in links(page.read_text(encoding="utf-8")) if "://" not in link and not alive(page, link)]
-
-
-def alive(page, link):
-    name, _, anchor = link.partition("#")
-    target = page.parent / name if name else page
-    if not target.exists():
-        return False
-    return not anchor or anchor in anchors(target.read_text(encoding="utf-8"))
+    dead = []
+    for link in links(page.read_text(encoding="utf-8")):
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        exists = target.exists() and (not anchor or anchor in anchors(target.read_text(encoding="utf-8")))
+        if "://" not in link and not exists:
+            dead.append(link)
+    return dead
 
 
 def shell_lines(text):
-    """Return the commands in blocks of shell and YAML, and in indented lines, each as a list of words."""
+    """Return the commands in blocks of shell and YAML and in indented lines as lists of words, without redirections."""
     fenced = [line for _, code in FENCE.findall(text) for line in code.splitlines()]
     lines = [re.sub(r"^- run: ", "", line) for line in fenced] + INDENTED.findall(FENCE.sub("", text))
     starts = ("conservative ", "pip ", "pytest", "python -m ")
-    return [part for line in lines if line.startswith(starts) for part in parts(COMMENT.sub("", line))]
-
-
-def parts(line):
-    """Return the commands of a line, without what it redirects."""
-    return [shlex.split(part.partition(" > ")[0]) for part in re.split(r" && | \| ", line)]
+    commands = [part for line in lines if line.startswith(starts) for part in re.split(r" && | \| ", COMMENT.sub("", line))]
+    return [shlex.split(command.partition(" > ")[0]) for command in commands]

@@ -1,6 +1,6 @@
-"""Bad input to the public API and the command line: argument, value and valid values are in the message, and no file is left.
+"""Bad input to the public API and the command line: the message has argument, value and valid values, and no file is left.
 
-A row is a call, the argument, a piece of the value, and a piece of the valid values.
+A row has a call, the argument, a part of the value, and a part of the valid values.
 """
 
 import math
@@ -13,9 +13,9 @@ from click.testing import CliRunner
 import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
+from conservative.references.engines.catalogue import MuJoCo
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.model_files import body_from_mjcf
-from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.engines.scipy import SciPy
 from conservative.references.exact import method
 from conservative.references.precise import Precise
@@ -71,6 +71,20 @@ API = [
     (lambda: cv.PointAttraction(1.0, (1, 0, 0), (0, NAN, 1)), "anchor_W", "nan", "finite"),
     (lambda: cv.GravityGradient(0.0, (1, 2, 2.5)), "rate", "0.0", "above 0"),
     (lambda: cv.GravityGradient(1.0, (1, 2, 2.5), (0, 0, 0)), "direction_W", "[0.0, 0.0, 0.0]", "not all 0"),
+    (lambda: cv.GravityGradient(1.0, (1, 2, -3)), "inertia", "-3", "positive"),
+    (lambda: cv.LinearSpring(0, (1, 0, 0), (0, 0, 1)), "stiffness", "0", ""),
+    (lambda: cv.LinearSpring(1, (1, 2), (0, 0, 1)), "point_B", "(2,)", ""),
+    (lambda: cv.LinearSpring(1, (1, 0, 0), (0, 0, 1), -0.1), "rest_length", "-0.1", ""),
+    (lambda: cv.PointAttraction(0, (1, 0, 0), (0, 0, 1)), "strength", "0", ""),
+    (lambda: cv.PointAttraction(1, (0, 0, 0), (0, 0, 0)), "anchor_W", "the fixed point", ""),
+    # shapes
+    (lambda: cv.shapes.box((1, -2, 3), mass=1), "size", "-2.0", "above 0, m"),
+    (lambda: cv.shapes.cone(NAN, 1, mass=1), "radius", "nan", "above 0, m"),
+    (lambda: cv.shapes.box((1, 2, 3)), "mass", "neither", "density"),
+    (lambda: cv.shapes.box((1, 2, 3), mass=1, density=2), "density", "mass = 1", "not both"),
+    (lambda: cv.shapes.box((1, 2, 3), density="iron"), "density", "'iron'", "kg/m^3"),
+    (lambda: cv.shapes.box((1, 2, 3), mass=1).about((0, 0, INF)), "com_B", "inf", "three finite numbers"),
+    (lambda: cv.shapes.box((1, 2, 3), mass=1).rotate(2 * ONE), "R_BS", "|R'R - 1| = 3", "rotation matrix"),
     # runs
     (lambda: cv.integrate("brick_flip"), "scene", "'brick_flip'", "Scene"),
     (lambda: cv.integrate(BRICK, 0), "dt", "0", "above 0"),
@@ -125,6 +139,11 @@ API = [
     # functions of potentials
     (lambda: field(energy=lambda R: "one"), "energy", "'one'", "a real number"),
     (lambda: field(energy=lambda R: 1 / 0), "energy", "ZeroDivisionError", "a real number"),
+    (lambda: field(energy=3), "energy", "3", ""),
+    (lambda: field(gradient=None), "gradient", "None", ""),
+    (lambda: field(gradient=lambda R: np.full((3, 3), NAN)), "gradient", "nan", ""),
+    (lambda: field(gradient=lambda R: -np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK)), "gradient", "", ""),
+    (lambda: field(scale=0), "scale", "0", "above 0"),
     (lambda: field(gradient=lambda R: None), "gradient", "None", "a matrix (3, 3)"),
     (lambda: field(gradient=lambda R: [1, 2, 3]), "gradient", "[1, 2, 3], not a matrix (3, 3)", "a matrix (3, 3)"),
     (lambda: field(axis_W=(0, 0, 2)), "axis_W", "2.0", "a unit vector"),

@@ -1,4 +1,4 @@
-"""What the pages show runs, and their links and commands lead somewhere."""
+"""Code on the pages runs, and links and commands on them are valid."""
 
 import importlib.util
 import re
@@ -77,7 +77,7 @@ def test_commands_on_a_page_are_known(page, pytest_options):
 
 
 def check_command(words, options, extras):
-    """Raise where a command of ours has no such option, pytest has none, or there is no such module or extra."""
+    """Raise an exception if the option, the command, the module or the extra does not exist."""
     match words:
         case ["conservative", name, *arguments]:
             main.commands[name].make_context(name, arguments)
@@ -105,22 +105,14 @@ def test_unknown_commands_are_found(line):
         check_command(*(shell_lines(f"    {line}\n")), {"--benchmark", "--gate"}, {"all": []})
 
 
-def code_cells(notebook):
-    return [cell for cell in notebook.cells if cell.cell_type == "code"]
-
-
-def cells_with_outputs(notebook):
-    return [cell.id for cell in code_cells(notebook) if cell.outputs or cell.execution_count]
-
-
 @pytest.mark.slow
 def test_the_notebook_runs_and_is_checked_in_without_outputs(tmp_path):
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbformat.validate(notebook)
-    assert not cells_with_outputs(notebook)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert not [cell.id for cell in cells if cell.outputs or cell.execution_count]
     NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
-    assert cells_with_outputs(notebook)
-    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in code_cells(notebook) if cell.outputs}
+    shown = {cell.id: cell.outputs[-1]["data"]["text/plain"] for cell in cells if cell.outputs}
     assert "moser_veselov" in shown["cheapest"]
     assert "mujoco" in shown["runs"]
 

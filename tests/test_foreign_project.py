@@ -1,4 +1,4 @@
-"""A project with packages called `benchmarks`, `references` and `reports` notices nothing of ours in its environment."""
+"""A project with packages called `benchmarks`, `references` and `reports` works in an environment with our package."""
 
 import re
 
@@ -25,7 +25,7 @@ RUNS = {
     "pythonpath": (["pytest"], {"pytest.ini": "[pytest]\npythonpath = .\n"}),
     "conftest": (["pytest"], {"conftest.py": CONFTEST}),
 }
-"""How its tests are run, and the files this takes."""
+"""Commands that run its tests, and the files they need."""
 SUMMARY = re.compile(r"^(?:PASSED|FAILED|ERROR) .*$", re.MULTILINE)
 
 
@@ -41,7 +41,7 @@ def without_us(tmp_path_factory):
 
 @pytest.fixture
 def project(tmp_path):
-    """A project as asv has them, whose packages know that they are its own."""
+    """Return the folder of a project for asv whose packages have an OWNER."""
     for name in ("benchmarks", "references", "reports"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text('OWNER = "this project"\n')

@@ -1,4 +1,4 @@
-"""What is installed: one package, each of its modules once and under one name, and as little beside it as it needs."""
+"""The installed package has each module once under one name, and requires few others."""
 
 import re
 import subprocess
@@ -20,13 +20,9 @@ IMPORTED_AS = {"pin": "pinocchio", "vl-convert-python": "vl_convert", "pytest-be
 
 
 def modules():
-    """The files of the package in this checkout, by their paths below its root."""
+    """Return the files of the package in this checkout, by their paths below its root."""
     links = [ROOT / "conservative", *(ROOT / "conservative" / room for room in ROOMS)]
-    return sorted(str(file.relative_to(ROOT)) for link in links for file in link.rglob("*.py") if link == nearest(file, links))
-
-
-def nearest(file, links):
-    return max((link for link in links if file.is_relative_to(link)), key=lambda link: len(link.parts))
+    return sorted({str(file.relative_to(ROOT)) for link in links for file in link.rglob("*.py")})
 
 
 @pytest.mark.slow
@@ -52,7 +48,7 @@ def test_the_sdist_has_no_doubles(sdist):
 
 @pytest.fixture(scope="module")
 def requirements(wheel):
-    """The names of what the wheel requires, by extra; without one under ""."""
+    """Return the names of the required packages by extra; those without an extra have the key ""."""
     with zipfile.ZipFile(wheel) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith("METADATA")]
         lines = message_from_string(archive.read(name).decode()).get_all("Requires-Dist")
@@ -71,7 +67,7 @@ def test_five_packages_are_required_and_no_more(requirements):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("extra", EXTRAS)
-def test_what_an_extra_is_checked_for_is_what_it_brings(requirements, extra):
+def test_an_extra_is_checked_for_its_own_packages(requirements, extra):
     assert set(EXTRAS[extra]) == {IMPORTED_AS.get(package, package) for package in requirements[extra]}
 
 
@@ -110,26 +106,24 @@ print(*(sorted(each) for each in names.values() if len(each) > 1))
 """
 
 
-def test_no_module_is_imported_under_two_names():
-    code, out, error = run_python(EVERYTHING + DOUBLES, str(ROOT))
-    assert (code, out.strip()) == (0, ""), error
+TWICE = """
+import sys, importlib.util
+from pathlib import Path
+import conservative.version
+spec = importlib.util.spec_from_file_location("other", conservative.version.__file__)
+sys.modules["other"] = importlib.util.module_from_spec(spec)
+"""
 
 
-def test_a_module_under_two_names_would_be_seen():
-    twice = "import importlib.util as u\nspec = u.spec_from_file_location('other', conservative.version.__file__)\n"
-    twice += "sys.modules['other'] = u.module_from_spec(spec)\n"
-    code, out, error = run_python(
-        "import sys\nfrom pathlib import Path\nimport conservative.version\n" + twice + DOUBLES, str(ROOT)
-    )
-    assert (code, out.strip()) == (0, "['conservative.version', 'other']"), error
-
-
-PATHS = ["benchmarks/suite/test_speed.py", "benchmarks"]
+@pytest.mark.parametrize(("program", "doubles"), [(EVERYTHING, ""), (TWICE, "['conservative.version', 'other']")])
+def test_no_module_is_imported_under_two_names(program, doubles):
+    code, out, error = run_python(program + DOUBLES, str(ROOT))
+    assert (code, out.strip()) == (0, doubles), error
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", PATHS)
-def test_the_suite_has_one_name_whatever_its_path_is(path):
+@pytest.mark.parametrize("path", ["benchmarks/suite/test_speed.py", "benchmarks"])
+def test_the_suite_has_one_name_for_any_path(path):
     command = [sys.executable, "-m", "pytest", "--benchmark", "--collect-only", "-q", "-k", "lagrange_top-lame", path]
     done = subprocess.run(
         command, cwd=ROOT, env=variables(PYTHONPATH=str(ROOT)), capture_output=True, text=True, timeout=300, check=False

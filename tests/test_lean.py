@@ -1,4 +1,4 @@
-"""Without an extra the package installs, integrates, and says which extra has what is asked for."""
+"""Without extras the package integrates, and errors name the extra that provides a missing package."""
 
 from importlib.metadata import packages_distributions
 
@@ -22,11 +22,11 @@ import importlib.util
 find_spec = importlib.util.find_spec
 importlib.util.find_spec = lambda name, package=None: None if name in refused else find_spec(name, package)
 """
-"""For code that only looks whether a package is there."""
+"""For code that looks for a package without importing it."""
 
 
 def others():
-    """Packages of this environment that a lean one does not have, under the names they are imported by."""
+    """Return the importable names of the packages that the package does not require."""
     lean = {*LEAN, "llvmlite", "conservative-rotation"}
     return ",".join(
         name for name, packages in packages_distributions().items() if not lean & {each.lower() for each in packages}
@@ -55,17 +55,18 @@ def test_a_lean_environment_integrates():
     assert code == 0, error
 
 
-def test_what_a_lean_environment_lacks_is_refused():
-    code, _, error = run_python(REFUSE + "import pandas", others())
+@pytest.mark.parametrize(
+    ("program", "messages"),
+    [
+        ("import pandas", ["No module named 'pandas'"]),
+        (LOOK + SHOWN, ["Trajectory.to_pandas needs pandas", "pip install 'conservative-rotation[report]'"]),
+    ],
+    ids=["import", "table"],
+)
+def test_a_lean_environment_lacks_pandas_and_names_its_extra(program, messages):
+    code, _, error = run_python(REFUSE + program, others())
     assert code == 1
-    assert "No module named 'pandas'" in error
-
-
-def test_a_table_names_its_extra():
-    code, _, error = run_python(REFUSE + LOOK + SHOWN, others())
-    assert code == 1
-    assert "Trajectory.to_pandas needs pandas" in error.splitlines()[-1]
-    assert "pip install 'conservative-rotation[report]'" in error.splitlines()[-1]
+    assert all(message in error.splitlines()[-1] for message in messages)
 
 
 COMMANDS = [

@@ -1,4 +1,4 @@
-"""A method is one file: what is written in it and in one entry point is found wherever methods are used."""
+"""A method is one file and an entry point; every part of the package that uses methods then uses it."""
 
 import importlib
 import sys
@@ -23,7 +23,7 @@ from conservative.methods.reduced import Reduced
 
 @dataclass(frozen=True)
 class Borrowed(Method):
-    """The map of `Reduced`, which says that it costs next to nothing."""
+    """The map of `Reduced` with almost no declared cost."""
 
     parts: int = 1
 
@@ -59,24 +59,24 @@ SILENT = (
         raise NotImplementedError
 """
 )
-"""The same method with nothing but what has no default."""
-
-
-def install(folder, monkeypatch, source, entry="borrowed = borrowed_method:Borrowed"):
-    """Put a package of one file into a folder as pip would, and the folder onto the path."""
-    (folder / "borrowed_method.py").write_text(source)
-    info = folder / "borrowed_method-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: borrowed_method\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{deferred_imports.METHODS}]\n{entry}\n")
-    monkeypatch.syspath_prepend(folder)
-    importlib.invalidate_caches()
-    deferred_imports.list_entries.cache_clear()
+"""The same method with only the members that have no default."""
 
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    yield lambda *text: install(tmp_path, monkeypatch, *text)
+    """Install a package of one file as pip would."""
+
+    def install(source, entry="borrowed = borrowed_method:Borrowed"):
+        (tmp_path / "borrowed_method.py").write_text(source)
+        info = tmp_path / "borrowed_method-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: borrowed_method\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[{deferred_imports.METHODS}]\n{entry}\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        importlib.invalidate_caches()
+        deferred_imports.list_entries.cache_clear()
+
+    yield install
     sys.modules.pop("borrowed_method", None)
     monkeypatch.undo()
     deferred_imports.list_entries.cache_clear()
@@ -88,19 +88,19 @@ def test_the_automatic_choice_considers_it(installed):
     assert "borrowed" not in before
     installed(SOURCE)
     found = [method.family for method in search.candidates(top)]
-    assert found == ["borrowed"] * 3 + ["taylor"] * 3  # of its group the first, and still what is in no group
+    assert found == ["borrowed"] * 3 + ["taylor"] * 3  # the first of its group, and the methods without a group
     assert search.candidates(cv.scenes.brick_flip()) == (cv.MoserVeselov(),)  # an exact family stays alone
     assert cv.integrate(top, error=1e-3).choice.method.family == "borrowed"
 
 
-def test_the_suite_times_the_settings_that_it_names(installed):
+def test_the_suite_times_its_settings(installed):
     installed(SOURCE)
     found = [point for point in points.points() if point.method.family == "borrowed"]
     assert [point.scene.name for point in found] == list(points.SCENES)
     assert {point.method.name for point in found} == {"borrowed:parts=2"}
 
 
-def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
+def test_pictures_use_its_colour_and_its_setting(installed):
     lines = {"heyoka 7.13.2 body": "heyoka", "borrowed parts=2": "borrowed", "reduced": "reduced"}
     assert style.colours(lines)["borrowed parts=2"] != "#123456"
     installed(SOURCE)
@@ -110,7 +110,7 @@ def test_pictures_have_its_colour_and_the_setting_that_it_names(installed):
     assert [method.name for method in sphere_curves.select_methods(methods)] == ["borrowed:parts=3", "reduced:order=4"]
 
 
-def test_a_method_need_not_say_anything(installed):
+def test_a_method_needs_no_card(installed):
     installed(SILENT)
     method = registry.method("borrowed")
     assert method in [point.method for point in points.points()]
@@ -124,7 +124,7 @@ NEEDY = SOURCE.replace(
     "    @property\n    def order",
     "    def __post_init__(self):\n        raise MissingEngine('Engine', 'engine')\n\n    @property\n    def order",
 ).replace("from conservative.method ", "from conservative.errors import MissingEngine\nfrom conservative.method ")
-"""The same method, which needs something that is not installed."""
+"""The same method, which needs an engine that is not installed."""
 
 
 def test_a_method_without_what_it_needs_breaks_nothing(installed):

@@ -1,4 +1,4 @@
-"""Nothing that a test starts outlives it, and what it starts can be interrupted."""
+"""Programs that a test starts end with it and can be interrupted."""
 
 import shlex
 import signal
@@ -19,22 +19,16 @@ child.wait()
 """
 
 
-def test_children_of_a_program_end_with_it():
+@pytest.mark.parametrize("parent_ends", [False, True])
+def test_children_of_a_program_end_with_the_test(parent_ends):
     with programs() as start:
-        parent = start([sys.executable, "-c", PARENT], stdout=subprocess.PIPE)
+        code = PARENT.replace("child.wait()", "") if parent_ends else PARENT
+        parent = start([sys.executable, "-c", code], stdout=subprocess.PIPE)
         child = psutil.Process(int(parent.stdout.readline()))
+        assert not parent_ends or parent.wait(60) == 0
         assert child.is_running()
-    assert parent.returncode == -signal.SIGKILL
+    assert parent.returncode == (0 if parent_ends else -signal.SIGKILL)
     child.wait(60)  # raises if it is still running
-
-
-def test_a_child_that_outlives_its_parent_ends_with_the_test():
-    with programs() as start:
-        parent = start([sys.executable, "-c", PARENT.replace("child.wait()", "")], stdout=subprocess.PIPE)
-        child = psutil.Process(int(parent.stdout.readline()))
-        assert parent.wait(60) == 0
-        assert child.is_running()
-    child.wait(60)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
@@ -47,7 +41,7 @@ def test_a_program_can_be_interrupted(start, number):
 
 @pytest.mark.slow
 def test_a_program_can_be_interrupted_where_a_shell_ignores_signals(start):
-    # A script starts background jobs with SIGINT ignored, nohup with SIGHUP ignored; both are inherited.
+    # A script starts background jobs with SIGINT ignored, and nohup programs with SIGHUP ignored. Children inherit both.
     inner = f"{sys.executable} -m pytest -n0 -q -k test_a_program_can_be_interrupted[ {shlex.quote(__file__)}"
     process = start(
         ["sh", "-c", f"trap '' INT HUP; exec {inner}"], cwd=ROOT, env=variables(), stdout=subprocess.PIPE, text=True

@@ -1,4 +1,4 @@
-"""README.md is generated: it is current, and its numbers are those of the measurements that it is made from."""
+"""README.md is generated from measurements and is current."""
 
 import importlib.util
 import subprocess

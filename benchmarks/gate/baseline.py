@@ -27,7 +27,7 @@ ORDER = Measure.ORDER.text
 COUNTS = tuple(field.name for field in fields(Counters))
 """Measures that are whole numbers: the work that a method counts."""
 SPREADS = 5.0
-"""How many times its measured spread a value may move."""
+"""Largest allowed change of a value, in units of its measured spread."""
 ROUND_OFF = 8 * 2.0**-52
 """Smallest allowed change of an error or a drift: the last digits."""
 ORDER_MARGIN = 0.05

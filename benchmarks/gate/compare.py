@@ -1,4 +1,4 @@
-"""The gate: results against the baseline, row by row. A missing row, NaN, or a row that cannot be compared does not pass."""
+"""The gate: results against the baseline, row by row. Missing rows, NaN and rows of another definition do not pass."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether there is no violation."""
+        """True if there is no violation."""
         return not self.violations
 
     def __str__(self) -> str:

@@ -38,7 +38,7 @@ class GateItem(pytest.Item):
             raise GateFailed(str(verdict))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return the lines without a traceback, which would add nothing."""
+        """Return the lines without a traceback."""
         return (
             str(excinfo.value) if isinstance(excinfo.value, GateFailed | ValueError) else super().repr_failure(excinfo, style)
         )
@@ -68,7 +68,7 @@ class Gate:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        """Keep a row of every benchmark; a failure after its timing only changes the status."""
+        """Record a row for every benchmark; a failure after its timing only changes the status."""
         report = yield
         if "benchmark" in getattr(item, "fixturenames", ()):
             id = row_id(item)
@@ -79,7 +79,7 @@ class Gate:
         return report
 
     def finish(self) -> compare.Verdict:
-        """Leave the results in the folder, and return the verdict.
+        """Write the results to the folder, and return the verdict.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The pytest plugin of `pytest --benchmark`; without the option it only keeps the suite from running.
+"""The pytest plugin of `pytest --benchmark`; without the option it only skips the suite.
 
 It is an entry point that every pytest run of the environment imports, so it imports nothing of the package at the top.
 """
@@ -18,7 +18,7 @@ SUITE = ROOM / "suite"
 TIMER = "benchmark"
 """Name under which pytest knows the plugin pytest-benchmark."""
 MAX_TIME, SHORT, FEW = "--benchmark-max-time", 0.1, 2
-"""The suite has many points, so it times each for 0.1 s or two calls unless the option of pytest-benchmark is given."""
+"""The suite has many points, so each is timed for 0.1 s or two calls unless the option of pytest-benchmark is given."""
 MEASURED = pytest.StashKey[list[dict[str, Any]]]()
 """On the configuration: the rows that pytest-benchmark shows."""
 
@@ -117,7 +117,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True, tryfirst=True)
 def pytest_benchmark_group_stats(config: pytest.Config, benchmarks: list[dict[str, Any]]) -> None:
-    """Keep the rows that pytest-benchmark is about to show; returning nothing leaves the grouping to it."""
+    """Store the rows that pytest-benchmark is about to show. The result None leaves the grouping to pytest-benchmark."""
     config.stash[MEASURED] = list(benchmarks)
 
 

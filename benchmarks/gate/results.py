@@ -1,4 +1,4 @@
-"""The rows of one run of benchmarks, and the file that they are kept in."""
+"""The rows of one run of benchmarks, and their file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENERGY_DRIFT = key(Measure.DRIFT_MAX, "energy")
 
 
 class Status(StrEnum):
-    """How a benchmark ended, as pytest calls it."""
+    """Outcome of a benchmark, as pytest names it."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -40,7 +40,7 @@ class Row:
     id, scene, method
         Name of the test with its parameters, and names for readers.
     status
-        How it ended.
+        Outcome.
     engine
         Name and version of a foreign engine, such as `mujoco==4.0.0/RK4`; empty for the project under test.
     definition
@@ -48,7 +48,7 @@ class Row:
     values, spreads
         Measures that must not get worse, and the change of each by round-off alone.
     reason
-        Why there are no values; "" if there are, or if it is not known.
+        Reason why there are no values; may be empty.
     """
 
     id: str
@@ -72,7 +72,7 @@ class Results:
 
 
 def find_runaway(values: Mapping[str, float]) -> str:
-    """Return why a run counts as a runaway; empty if it does not."""
+    """Return the reason why a run counts as a runaway; empty if it does not."""
     drift = values.get(ENERGY_DRIFT, 0.0)
     return "" if drift <= RUNAWAY else f"{ENERGY_DRIFT} is {drift:.2g}, more than {RUNAWAY:g}: the run failed"
 

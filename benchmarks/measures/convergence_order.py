@@ -44,10 +44,10 @@ class Order:
         Reason why there is no fit; empty if there is one.
     """
 
-    slope: float
-    stderr: float
-    used: tuple[int, ...]
-    floor: float
+    slope: float = math.nan
+    stderr: float = math.nan
+    used: tuple[int, ...] = ()
+    floor: float = math.nan
     reason: str = ""
 
     def __str__(self) -> str:
@@ -70,8 +70,7 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
        `ABOVE_FLOOR` of it are not used. If the slope of the last pair is less than half that of the rest, its finer point is
        not used either.
     3. The coarsest point is dropped as long as the slope of its pair differs from the fit to the others by more than `BEND`,
-    the
-       scatter decreases by more than `CALMER`, and at least four points remain.
+       the scatter decreases by more than `CALMER`, and at least four points remain.
 
     Failed runs, whose error is not finite, are skipped. Errors of zero are at the floor.
 
@@ -88,21 +87,18 @@ def observed_order(steps: ArrayLike, errors: ArrayLike) -> Order:
     h, e = check_points(steps, errors)
     order = [int(i) for i in np.argsort(-h) if math.isfinite(e[i])]
     if len(order) < MIN_POINTS:
-        return _none(float("nan"), f"{len(order)} runs with an error; a fit takes {MIN_POINTS}")
+        return Order(reason=f"{len(order)} runs with an error; a fit takes {MIN_POINTS}")
     x = np.log(h[order])
     y = np.log(np.maximum(e[order], np.finfo(float).tiny))
     first, last = _descent(x, y)
-    floor = float(e[order[last:]].max()) if last < len(order) - 1 else float("nan")
+    floor = float(e[order[last:]].max()) if last < len(order) - 1 else math.nan
     used = [i for i in range(first, last + 1) if not e[order[i]] <= ABOVE_FLOOR * floor and e[order[i]] > 0]
     used = _without_preasymptotic(x, y, _without_bend(x, y, used) if math.isnan(floor) else used)
     if len(used) < MIN_POINTS:
-        return _none(floor, f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}")
+        reason = f"{len(used)} points between the coarsest steps and the floor; a fit takes {MIN_POINTS}"
+        return Order(floor=floor, reason=reason)
     line = fit_line(x[used], y[used])
     return Order(line.slope, line.stderr, tuple(order[i] for i in used), floor)
-
-
-def _none(floor: float, reason: str) -> Order:
-    return Order(float("nan"), float("nan"), (), floor, reason)
 
 
 def grows_with_shorter_steps(steps: ArrayLike, errors: ArrayLike) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ CONSERVED, SMALL = 1e-10, 1e-4
 
 
 class DriftClass(IntEnum):
-    """How well a quantity is conserved: the larger, the worse."""
+    """Class of a drift; a larger number is worse."""
 
     CONSERVED = 0
     SMALL = 1
@@ -102,7 +103,7 @@ def measure_drifts(trajectory: Trajectory) -> list[Value]:
 def blanks(scene: Scene) -> list[Value]:
     """Return the measures of `measure_errors` for a scene without values, for a run that failed."""
     start = Trajectory(scene, np.zeros(1), scene.R_WB0[None], scene.w_WB_B0[None], "start")
-    return [each.blank for each in measure_errors(start, start)]
+    return [replace(value, value=math.nan) for value in measure_errors(start, start)]
 
 
 def secular_slope(t: Array, drift: Array) -> Slope:
@@ -112,7 +113,7 @@ def secular_slope(t: Array, drift: Array) -> Slope:
     only oscillates has a slope within a few standard errors, or one that decreases with the length of the run.
     """
     if len(t) < 3:
-        return Slope(float("nan"), float("nan"))
+        return Slope(math.nan, math.nan)
     if drift.ndim == 1:
         return Slope(*fit_line(t, drift)[:2])
     lines = [fit_line(t, column) for column in drift.T]

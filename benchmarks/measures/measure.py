@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from enum import Enum
 
 
@@ -78,11 +79,6 @@ class Value:
         """Name in tables and in a baseline, such as `energy drift max`."""
         return key(self.measure, self.quantity)
 
-    @property
-    def blank(self) -> Value:
-        """The same measure without a value."""
-        return replace(self, value=float("nan"))
-
 
 def key(measure: Measure, quantity: str = "") -> str:
     """Return the name of a measure, with the quantity of a drift: `energy drift max`."""
@@ -91,4 +87,4 @@ def key(measure: Measure, quantity: str = "") -> str:
 
 def blanks(*measures: Measure) -> list[Value]:
     """Return measures without values."""
-    return [Value(measure, float("nan")) for measure in measures]
+    return [Value(measure, math.nan) for measure in measures]

@@ -26,7 +26,7 @@ class Subject:
     Attributes
     ----------
     study, scene
-        Names of the study and of the scene; the scene is empty if the row belongs to none.
+        Names of the study and of the scene; the scene is empty for a row without one.
     field, seed, body
         Of a random body: its field or kind, the seed, and its index; "" and None for any other scene.
     method
@@ -37,7 +37,7 @@ class Subject:
     family, engine, version, setting
         Parts of the name: `mujoco@4.0.0`, `mujoco`, `4.0.0`, `RK4`. Our methods have neither engine nor version.
     role
-        Which side the method is on.
+        Ours, engine or truth.
     series, series_setting
         Name and setting of a line in a chart: those of the method without its tolerance.
     dt
@@ -70,11 +70,11 @@ class Measurement(Subject):
     bodies, way
         Of a run of many bodies: how many, and how they ran, such as "one at a time"; None and "" for a single body.
     quantity
-        Name of the invariant that a drift is of, or of the statistic of an error over many bodies; else empty.
+        Invariant of a drift, or statistic of an error over many bodies; otherwise empty.
     measure, value
         Measure, and value in its unit; NaN if it could not be measured.
     outcome
-        How the run ended, or why there was none.
+        Outcome of the run, or the reason why there was none.
     detail
         Further information; may be empty.
     """

@@ -40,9 +40,8 @@ class Machine:
         return ", ".join((processor, self.architecture, f"numba {metadata.version('numba')}"))
 
     def as_dict(self) -> dict[str, str]:
-        """Return the fields that reports show."""
-        names = ("processor", "architecture", "cores", "memory", "system")
-        return {name: getattr(self, name) for name in names}
+        """Return the fields that reports show: all except `model`."""
+        return {name: value for name, value in vars(self).items() if name != "model"}
 
 
 def machine() -> Machine:

@@ -147,11 +147,6 @@ class Preparation:
     prepare: float
     first_call: float
 
-    @property
-    def total(self) -> float:
-        """Both together, s."""
-        return self.prepare + self.first_call
-
 
 def prepare_and_run(prepare: Callable[[], Callable[[], Any]]) -> tuple[Callable[[], Any], Any, Preparation]:
     """Return the run from `prepare`, the result of its first call, and the cost of both."""

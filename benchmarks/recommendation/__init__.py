@@ -1,1 +1,1 @@
-"""Which method and step, or which engine setting, reaches an error on a scene, and at what cost."""
+"""Recommend the method and step, or the engine setting, that reaches an error on a scene at the least cost."""

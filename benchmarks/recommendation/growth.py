@@ -94,7 +94,7 @@ class ErrorLaw:
         return 2 * error / (self.linear + root)
 
     def is_measured(self, duration: float) -> bool:
-        """Whether nothing needs to be extrapolated."""
+        """Return whether the run covers the duration."""
         return not self.carried and self.length >= duration * (1 - 1e-9)
 
     def scale(self, factor: float, carried: str) -> ErrorLaw:
@@ -145,7 +145,7 @@ class Amplification:
     """Growth of a small relative change of the initial rates, the `disturbance`, as long as the two motions are comparable.
 
     `factor` (n,) is the largest difference of the attitudes up to the times t (n,), s, in rad, divided by the disturbance.
-    `label` is that of the method that integrated both motions. `is_lost` is whether they have nothing in common after t[-1].
+    `label` belongs to the method that integrated both motions. After t[-1] they have nothing in common if `is_lost`.
     """
 
     t: Array
@@ -169,7 +169,7 @@ class Amplification:
 
     @property
     def unstable(self) -> bool:
-        """Whether the disturbance grows far more than in proportion to time."""
+        """True if the disturbance grows far more than in proportion to time."""
         return self.steepness > FASTER_THAN_LINEAR
 
     def excess(self, start: float, stop: float) -> float:

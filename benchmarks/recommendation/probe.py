@@ -11,7 +11,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from conservative.scene import Scene
 
 from ..measures.timing import wall_time
 from ..studies import step_ladder
-from ..studies.case import Case, Success
+from ..studies.case import Case
 from ..studies.selection import tolerance_setting
 from ..studies.time_limit import attempt_within
 from .growth import Amplification, ErrorLaw, ExpectedDrift, amplification_of, extrapolate_drifts, fit_law
@@ -53,7 +53,7 @@ AFFORDABLE = 0.3
 """Wall time, s, of each of the two disturbed runs if there is no closed form."""
 DENSE = 256
 MOST_GRIDS = 16
-"""Number of grids whose exact attitudes are kept, because methods that are probed alike share them."""
+"""Number of grids whose exact attitudes are stored. Methods with the same samples share them."""
 
 _ROUND = sorted({2**a * 5**b for a in range(44) for b in range(19) if 2**a * 5**b <= 10**13})
 
@@ -142,8 +142,6 @@ class Conditions(Question):
         End of the truth, s.
     rate
         Largest angular speed, rad/s.
-    amplification
-        Growth of a disturbance.
     """
 
     spacing: float
@@ -152,7 +150,6 @@ class Conditions(Question):
     truth: Callable[[Grid], Array]
     truth_until: float
     rate: float
-    amplification: Amplification
 
     @property
     def short(self) -> float:
@@ -163,6 +160,32 @@ class Conditions(Question):
     def target(self) -> float:
         """Error that settings are chosen for, rad."""
         return SAFETY * self.error
+
+    @cached_property
+    def amplification(self) -> Amplification:
+        """Growth of a small change of the initial rates, from two closed forms, otherwise from two runs of our own method."""
+        scene = self.scene
+        size = float(np.linalg.norm(scene.w_WB_B0)) or self.rate
+        disturbed = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
+        exact = Exact().unsupported(scene) is None and Exact().unsupported(disturbed) is None
+        until = self.duration
+        method, dt = (Exact(), until) if exact else self.choose_ours(error=DISTURBANCE / 100)
+        if not exact:  # as far as the method gets within the wall time
+            n = max(1, math.ceil(self.short / dt))
+            run = method.prepare(scene, Grid(dt, n, n))
+            run()
+            until = min(until, AFFORDABLE * n * dt / wall_time(run))
+        times, factors = [], []
+        for end in sorted({min(until, self.short), until}):
+            n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
+            grid = Grid(end / n, n, max(1, n // DENSE))
+            pair = [method.solve(each, grid) for each in (scene, disturbed)]
+            shared = min(map(len, pair))
+            times.append(pair[0].t[:shared])
+            factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
+        t, factor = np.concatenate(times), np.concatenate(factors)
+        order = np.argsort(t, kind="stable")
+        return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)
 
     def step_at_most(self, dt: float) -> float:
         """Return the longest round step, s, of at most dt."""
@@ -214,9 +237,9 @@ class Conditions(Question):
         each = 1 if adaptive else round(samples.dt / dt)
         grid = samples if adaptive else Grid(dt, samples.n_steps * each, each)
         run = attempt_within(self.time_limit, Case("recommendation", self.scene, method, grid))
-        if not isinstance(run, Success):
+        if isinstance(run, Outcome):
             length = samples.dt * samples.n_steps
-            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, run.outcome)
+            return Probe(method, grid.dt, length, math.nan, math.inf, "the run failed", 0.0, None, (), math.nan, run)
         trajectory = run.trajectory
         length, error = float(trajectory.t[-1]), angle_between(self.truth(samples), trajectory.R_WB)
         drifts = extrapolate_drifts(trajectory, self.duration)
@@ -265,7 +288,7 @@ class Conditions(Question):
         return replace(carried, linear=carried.linear + rounding)
 
     def shows_growth(self, probe: Probe) -> bool:
-        """Whether a probe shows the growth of its error: it covered a whole short window and its attitude was not lost."""
+        """Return whether a probe covered a whole short window without losing the attitude, so that it shows how errors grow."""
         whole = probe.length >= min(self.short, self.duration) * (1 - 1e-9)
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
 
@@ -301,10 +324,10 @@ def prepare_conditions(asked: Question) -> Conditions:
         return Exact().solve(scene, grid).R_WB
 
     def sampled(grid: Grid) -> Array:
-        """Return the attitudes at multiples of the spacing, all of which the reference solution has."""
+        """Return the attitudes of the reference solution at multiples of the spacing."""
         return truth.trajectory.R_WB[:: round(grid.dt / spacing)][: grid.n_samples]
 
-    conditions = Conditions(
+    return Conditions(
         **vars(asked),
         spacing=spacing,
         samples=samples,
@@ -312,32 +335,4 @@ def prepare_conditions(asked: Question) -> Conditions:
         truth=closed_form if closed else sampled,
         truth_until=float(max(duration, truth.trajectory.t[-1]) if closed else samples * spacing),
         rate=rate,
-        amplification=Amplification(np.array([0.0, duration]), np.zeros(2), DISTURBANCE, ""),
     )
-    return replace(conditions, amplification=_measure_amplification(conditions))
-
-
-def _measure_amplification(conditions: Conditions) -> Amplification:
-    """Return the effect of a small change of the initial rates: by closed forms, otherwise by our own method."""
-    scene = conditions.scene
-    size = float(np.linalg.norm(scene.w_WB_B0)) or conditions.rate
-    disturbed = scene.rename(scene.name, w_WB_B0=scene.w_WB_B0 + DISTURBANCE * size * np.array([0.48, 0.64, 0.6]))
-    exact = Exact().unsupported(scene) is None and Exact().unsupported(disturbed) is None
-    until = conditions.duration
-    method, dt = (Exact(), until) if exact else conditions.choose_ours(error=DISTURBANCE / 100)
-    if not exact:  # as far as the method gets within the wall time
-        n = max(1, math.ceil(conditions.short / dt))
-        run = method.prepare(scene, Grid(dt, n, n))
-        run()
-        until = min(until, AFFORDABLE * n * dt / wall_time(run))
-    times, factors = [], []
-    for end in sorted({min(until, conditions.short), until}):
-        n = DENSE if exact else max(DENSE // 8, math.ceil(end / dt))
-        grid = Grid(end / n, n, max(1, n // DENSE))
-        pair = [method.solve(each, grid) for each in (scene, disturbed)]
-        shared = min(map(len, pair))
-        times.append(pair[0].t[:shared])
-        factors.append(angle_between(pair[0].R_WB[:shared], pair[1].R_WB[:shared]) / DISTURBANCE)
-    t, factor = np.concatenate(times), np.concatenate(factors)
-    order = np.argsort(t, kind="stable")
-    return amplification_of(t[order], np.maximum.accumulate(factor[order]), DISTURBANCE, method.label)

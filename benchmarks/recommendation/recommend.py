@@ -2,7 +2,7 @@
 
 1. A trial run gives the angular velocity of the body, which determines the sampling interval and the length of probes.
 2. The reference solution is confirmed by a second one. A closed form covers the whole duration, others cover the probes.
-3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `prepare_conditions`).
+3. A disturbed start shows how the motion itself amplifies errors (1 to 3: `Conditions`).
 4. Our methods are those of the automatic choice: its first choice, and if that has no truncation error, the best general
    integrator as well. Each method is probed from coarse to fine (`refine`). A stated law extrapolates errors to the duration.
 5. The resulting settings are timed against each other in interleaved rounds.
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from conservative.scene import Scene
 from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.timing import time_interleaved
 from ..studies import selection, step_ladder
-from ..studies.case import Case, Success, fail_unsupported, names_of
+from ..studies.case import Case, Success, names_of
 from ..studies.selection import tolerance_setting
 from ..studies.study import HANG_LIMIT
 from ..studies.time_limit import attempt_here
@@ -157,7 +158,7 @@ class Advice:
 
     @property
     def general(self) -> bool:
-        """Whether the method is a general integrator, and not a closed form of some motions."""
+        """True for a general integrator, False for a closed form of some motions."""
         return self.best is None or not self.best.method.card.exact
 
 
@@ -245,7 +246,7 @@ def _refine_from_start(conditions: Conditions, method: Method, step: float) -> R
     The result is an outcome if the method does not support the scene.
     """
     if reason := method.unsupported(conditions.scene):
-        return fail_unsupported(reason).outcome
+        return Outcome(OutcomeKind.UNSUPPORTED, reason)
     setting = tolerance_setting(method)
     if setting is not None:
         loosest = 10.0 ** math.floor(math.log10(min(LOOSEST, conditions.error)))
@@ -268,7 +269,7 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
         law = probe.error_law
         return law.error * max(1.0, conditions.duration / law.length) if law and law.error < ASYMPTOTIC else math.inf
 
-    expect = expect_linear if longer else _expected
+    expect = expect_linear if longer else attrgetter("expected")
     short = _refine_until(conditions, [conditions.probe(method, dt, math.nan, long=False)], expect, long=False)
     if not longer or expect(short[-1]) > conditions.target:
         return Refinement(tuple(short))
@@ -281,17 +282,13 @@ def refine(conditions: Conditions, method: Method, dt: float) -> Refinement:
         before = long = [conditions.probe(method, step, last.cost * last.dt / step, True)]
     long = [*long, conditions.probe(last.method, last.dt, last.cost, True, before)]
     first = long[-1]
-    long = _refine_until(conditions, long, _expected, long=True)
+    long = _refine_until(conditions, long, attrgetter("expected"), long=True)
     if order is not None and first.expected < COARSEN_BELOW * conditions.target:
         # At most four times: the error must still shrink with its order there.
         factor = min(4.0, (conditions.target / max(first.expected, 1e-300)) ** (1 / order))
         step = conditions.step_at_most(first.dt * factor)
         long += [conditions.probe(method, step, first.cost * first.dt / step, True)] if step > first.dt else []
     return Refinement(tuple(short), tuple(long))
-
-
-def _expected(probe: Probe) -> float:
-    return probe.expected
 
 
 def _refine_until(conditions: Conditions, probes: list[Probe], expect: Callable[[Probe], float], long: bool) -> list[Probe]:
@@ -326,7 +323,7 @@ def _shorten_step(conditions: Conditions, probes: list[Probe], expected: float) 
 
 
 def _tighten_tolerance(conditions: Conditions, probes: list[Probe], expected: float) -> tuple[Method, float, float] | None:
-    """Return the method with the next tolerance, a power of ten, the sampling interval, s, and the cost, s/s; None if none."""
+    """Return the method with the next tolerance, a power of ten, the sampling interval, s, and the cost, s/s, or None."""
     last = probes[-1]
     name = tolerance_setting(last.method)
     wanted = math.floor(math.log10(conditions.target / expected)) if expected < math.inf else -2

@@ -17,9 +17,9 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.measure import Value
+from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement, Samples
-from ..measures.timing import Preparation, prepare_and_run
+from ..measures.timing import Preparation, Timing, prepare_and_run
 from .selection import Missing, series, tolerance_setting
 
 
@@ -36,13 +36,25 @@ NOT_DRAWN = Drawn()
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and a method on a grid within a study; `drawn` if the scene is a random body."""
+    """A scene and a method on a grid.
+
+    Attributes
+    ----------
+    study
+        Name of the study.
+    drawn
+        The random body that the scene is.
+    bodies, way
+        Of a run of many bodies: how many, and how they run, such as "one at a time".
+    """
 
     study: str
     scene: Scene
     method: Method
     grid: Grid
     drawn: Drawn = NOT_DRAWN
+    bodies: int | None = None
+    way: str = ""
 
     @cached_property
     def _subject(self) -> dict[str, Any]:
@@ -50,14 +62,12 @@ class Case:
         subject = {"study": self.study, "scene": self.scene.name, **self.drawn._asdict(), **names_of(self.method)}
         return subject | {"role": Role(self.method.role), "dt": self.grid.dt}
 
-    def row(
-        self, value: Value, outcome: Outcome = OK, detail: str = "", bodies: int | None = None, way: str = ""
-    ) -> Measurement:
+    def row(self, value: Value, outcome: Outcome = OK, detail: str = "") -> Measurement:
         """Return one row."""
         return Measurement(
             **self._subject,
-            bodies=bodies,
-            way=way,
+            bodies=self.bodies,
+            way=self.way,
             quantity=value.quantity,
             measure=value.measure,
             value=float(value.value),
@@ -65,21 +75,25 @@ class Case:
             detail=detail,
         )
 
+    def rows(self, values: Iterable[Value], outcome: Outcome = OK, detail: str = "") -> list[Measurement]:
+        """Return a row for each value."""
+        return [self.row(value, outcome, detail) for value in values]
+
+    def time_row(self, measure: Measure, spent: float, timing: Timing) -> Measurement:
+        """Return the row of a measured time, s; its detail is the number of rounds and calls."""
+        return self.row(Value(measure, spent), timing.outcome, str(timing) if timing.outcome.ok else "")
+
     def samples(self, quantity: str, t: Array, value: Array) -> Samples:
         """Return one line: values (n,) at times (n,), s."""
         return Samples(**self._subject, quantity=quantity, t=t, value=value)
-
-    def blanks(self, values: Iterable[Value], outcome: Outcome) -> list[Measurement]:
-        """Return a row without a value for each measure of a failed case."""
-        return [self.row(value.blank, outcome) for value in values]
 
 
 def names_of(method: Method) -> dict[str, str]:
     """Return the columns with names of a method; see `Measurement`."""
     if isinstance(method, Missing):  # version and settings of a missing engine are unknown
-        family, _, setting = method.wanted.partition(":")
-        texts = {"label": method.wanted, "family": family, "engine": family, "version": "", "setting": setting}
-        return {"method": method.wanted, **texts, "series": series(method), "series_setting": setting}
+        family, _, setting = method.name.partition(":")
+        texts = {"label": method.label, "family": family, "engine": family, "version": "", "setting": setting}
+        return {"method": method.name, **texts, "series": series(method), "series_setting": setting}
     try:
         label, maker = method.label, method.maker
     except MissingEngine:
@@ -98,28 +112,16 @@ def names_of(method: Method) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Success:
-    """A case that reached its end: the run, which can be called again, its first trajectory, and the cost of both."""
+    """The result of a case that reached its end: the run, which can be called again, its first trajectory, and their cost."""
 
     run: Run
     trajectory: Trajectory
     cost: Preparation
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A case that failed, with the outcome of its rows."""
-
-    outcome: Outcome
-
-
 def drop_step(row: Measurement) -> Measurement:
     """Return the row without a step size."""
     return replace(row, dt=float("nan"))
-
-
-def fail_unsupported(reason: str) -> Failure:
-    """Return the failure of a case that the method does not support."""
-    return Failure(Outcome(OutcomeKind.UNSUPPORTED, reason))
 
 
 def outcome_of_error(method: Method, error: Exception, skip_missing: bool = False) -> Outcome:
@@ -130,7 +132,7 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
     MissingEngine
         The engine is not installed, and `skip_missing` is False.
     Exception
-        It came out of a method of ours: that is a bug. An engine may raise anything, and must not end a run of twenty.
+        A method of ours raised it: that is a bug. An engine may raise anything, which must not end a study of twenty engines.
     """
     if isinstance(error, MissingEngine) and skip_missing:
         return Outcome(OutcomeKind.MISSING, str(error))
@@ -143,18 +145,17 @@ def outcome_of_error(method: Method, error: Exception, skip_missing: bool = Fals
     return Outcome(OutcomeKind.CRASHED, f"{type(error).__name__}: {error}")
 
 
-def attempt(case: Case, skip_missing: bool = False) -> Success | Failure:
+def attempt(case: Case, skip_missing: bool = False) -> Success | Outcome:
     """Prepare and run a case once, and check the trajectory (`Method.check`). Later calls of the run are not checked.
 
     Failures of the integration, unsupported scenes and steps, and exceptions of an engine become an outcome; see
     `outcome_of_error`.
     """
     try:
-        reason = case.method.unsupported(case.scene)
-        if reason:
-            return fail_unsupported(reason)
+        if reason := case.method.unsupported(case.scene):
+            return Outcome(OutcomeKind.UNSUPPORTED, reason)
         run, result, cost = prepare_and_run(lambda: case.method.prepare(case.scene, case.grid))
-        done = Success(run, case.method.check(case.scene, case.grid, result), cost)
+        trajectory = case.method.check(case.scene, case.grid, result)
     except Exception as error:
-        return Failure(outcome_of_error(case.method, error, skip_missing))
-    return done if done.trajectory.ok else Failure(done.trajectory.outcome)
+        return outcome_of_error(case.method, error, skip_missing)
+    return Success(run, trajectory, cost) if trajectory.ok else trajectory.outcome

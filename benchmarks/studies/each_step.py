@@ -7,29 +7,25 @@ within its longer steps.
 * The setting of a method is the coarsest whose largest attitude error over all samples is at most `ERROR`. A method without
   such a setting has errors and no time.
 * It is timed twice, interleaved with all others: with all samples stored as attitude matrices and rates, which for an engine
-  includes the conversion of its state (heyoka takes 0.4 to 0.7 µs per sample on the brick, of which about 0.2 are its own); and
-  with the final state only, as in all other studies.
+  includes the conversion of its state (heyoka takes 0.4 to 0.7 µs per sample on the brick, including about 0.2 µs of its own);
+  and with the final state only, as in all other studies.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator
 
-from conservative.attitude import angle_between
 from conservative.grid import Grid, grid_for
 from conservative.method import Method
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.measure import Measure, Value
+from ..measures.measure import Measure
 from ..measures.measurement import Measurement
-from .case import Case, Failure
-from .convergence import attempt_each
-from .selection import at_tolerance, tolerance_setting
-from .speed import Extend, keep_end
+from .case import Case
+from .line import list_settings, measure_line
+from .speed import Extend, keep_end, time_cases
 from .study import Progress, Study
-from .work_precision import one_of_each_series, time_rows
 
 ERROR = 1e-6
 """Attitude error, rad, that a timed method has to reach."""
@@ -49,38 +45,24 @@ KEPT: dict[Measure, Extend] = {Measure.TIME_SAMPLED: keep_each, Measure.TIME: ke
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the errors of every method up to the setting that reaches `ERROR`, and both times of that setting."""
-    methods = one_of_each_series(study)
-    tell = study.count(progress, len(methods) + 1)
+    tell = study.count(progress, len(study.lines) + 1)
     for scene in study.scenes:
         truth = study.truth(scene, grid_for(scene, scene.dt)).trajectory
         chosen: list[Case] = []
-        for method in methods:
+        for method in study.lines:
             tell(f"{scene.name}: errors of {method.name}")
-            chosen += yield from coarsest(study, cases(study, scene, method), truth)
+            chosen += yield from choose_setting(study, scene, method, truth)
         tell(f"{scene.name}: timing {len(chosen)} methods")
-        yield from time_rows(study, chosen, KEPT)
+        yield from time_cases(study, chosen, KEPT)
 
 
-def cases(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the settings of a method, coarse to fine; a single case if the method does not support the scene."""
-    setting, grid = tolerance_setting(method), grid_for(scene, scene.dt)
-    if method.unsupported(scene) or (setting is None and method.order is None):
-        return [Case(study.name, scene, method, grid)]
-    if setting is None:
-        return [Case(study.name, scene, method, Grid(grid.dt / k, grid.n_steps * k, k)) for k in STEPS]
-    return [
-        Case(study.name, scene, at_tolerance(method, setting, value), grid) for value in TOLERANCES[:: 2 if study.quick else 1]
-    ]
-
-
-def coarsest(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
-    """Yield the errors of a method's settings; return a list of the first setting that reaches `ERROR`, or an empty list."""
-    for case, outcome in attempt_each(study, settings):
-        if isinstance(outcome, Failure):
-            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)
-            continue
-        error = float(angle_between(truth.R_WB, outcome.trajectory.R_WB).max())
-        yield case.row(Value(Measure.ATTITUDE_MAX, error))
-        if error <= ERROR:
-            return [case]
+def choose_setting(study: Study, scene: Scene, method: Method, truth: Trajectory) -> Generator[Measurement, None, list[Case]]:
+    """Yield the errors of a method's settings, coarse to fine; return the first that reaches `ERROR`, or an empty list."""
+    grid = grid_for(scene, scene.dt)
+    grids, tolerances = [Grid(grid.dt / k, grid.n_steps * k, k) for k in STEPS], TOLERANCES[:: 2 if study.quick else 1]
+    settings = list_settings(Case(study.name, scene, method, grid), grids, tolerances)
+    for point in measure_line(study, settings, truth, [Measure.ATTITUDE_MAX]):
+        yield from point.rows()
+        if point.errors[Measure.ATTITUDE_MAX] <= ERROR:
+            return [point.case]
     return []

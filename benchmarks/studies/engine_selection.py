@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from collections.abc import Iterable
+from typing import Any
 
 from conservative import registry
 from conservative.errors import BadInput, MissingEngine, nearest
-from conservative.grid import Grid
 from conservative.method import Method, Role
-from conservative.references.environments.environment import Environment, MissingEnvironment, list_environments
+from conservative.references.environments.environment import list_environments
 from conservative.references.environments.lock import split_requirement
-from conservative.scene import Scene
 
 from .selection import Missing
 
 ALL = "all"
 """The name of all installed engines: those of this environment, and the newest version of each in an environment of its own."""
-
-
-@dataclass(frozen=True)
-class MissingVersion(Missing):
-    """Placeholder for an engine without an environment, or without one of the version `wanted_version`."""
-
-    wanted_version: str = ""
-
-    def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
-        raise MissingEnvironment(self.engine, self.wanted_version)
 
 
 def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Method, ...]:
@@ -60,15 +47,10 @@ def list_installed() -> tuple[str, ...]:
     If the versions are equal, only the engine in this environment is listed, because the results are the same.
     """
     here = {name: _version_here(family) for name, family in registry.list_families().items() if family.role == Role.ENGINE}
-    newest = {environment.engine: environment for environment in _environments()}
+    known = registry.list_engines()
+    newest = {each.engine: each for each in list_environments() if each.engine in known}  # older versions come first
     apart = [f"{name}=={each.version}" for name, each in newest.items() if here.get(name) != each.version]
     return (*(name for name, version in here.items() if version is not None), *apart)
-
-
-def _environments() -> Iterator[Environment]:
-    """Yield the environments of registered engines, older versions first."""
-    known = registry.list_engines()
-    yield from (environment for environment in list_environments() if environment.engine in known)
 
 
 def _version_here(family: type[Method]) -> str | None:
@@ -84,14 +66,10 @@ def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
     family = _family(engine, version)
     try:
         return tuple(dict.fromkeys((*family.settings_for("as_installed"), *family.settings_for("variants"))))
-    except MissingEnvironment as error:
-        if not skip_missing:
-            raise
-        return (MissingVersion(name, error.engine, error.package, version),)
     except MissingEngine as error:
         if not skip_missing:
             raise
-        return (Missing(name, error.engine, error.package),)
+        return (Missing(name, error=error),)
 
 
 def _family(engine: str, version: str) -> type[Method]:
@@ -107,5 +85,5 @@ def _family(engine: str, version: str) -> type[Method]:
 
 
 def is_as_installed(method: Method) -> bool:
-    """Whether a method is its engine as installed, with nothing set but the step."""
+    """Return whether a method is its engine as installed, with nothing set but the step."""
     return not isinstance(method, Missing) and method in method.settings_for("as_installed")

@@ -12,22 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from conservative.attitude import Array
 from conservative.grid import Grid, grid_for
 from conservative.invariants import find_energy
 from conservative.outcome import OK, Outcome
 from conservative.references.worker.client import time_limit
-from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures import errors
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
-from ..measures.timing import time_interleaved
-from .case import Case, Failure, Success
+from .case import Case, Success
 from .engine_selection import is_as_installed
 from .selection import Missing
-from .speed import MEASURES, TimedRun, times
+from .speed import MEASURES, TimedRun, time_steps
 from .step_ladder import SAMPLES
 from .study import Progress, Study
 from .time_limit import attempt_here
@@ -35,7 +32,7 @@ from .time_limit import attempt_here
 AS_INSTALLED = "as installed"
 """Detail of the rows of an engine as installed."""
 FIRST_LIMIT = 180.0
-"""Time, s, that the first run of a setting may take: importing and compiling an engine can take a minute."""
+"""Time limit, s, of the first run of a setting: importing and compiling an engine can take a minute."""
 TURNS = (Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE)
 FAR_SIDE = 0.5
 """Fraction of the initial momentum along the spin axis that the reversed momentum has to reach for a flip."""
@@ -53,57 +50,49 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             ready += yield from measure(study, Case(study.name, scene, method, grid), truth)
         tell(f"{scene.name}: timing {len(ready)} engines")
         with time_limit(study.hang_limit):
-            timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
-        for timed, timing in timings.items():
-            yield from times(timed, timing)
+            yield from time_steps(study, ready)
 
 
-def facts(case: Case, outcome: Outcome) -> list[Measurement]:
+def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, list[TimedRun]]:
+    """Yield the rows of one engine except its times; return the run to be timed in a list, which may be empty."""
+    done = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
+    yield from list_properties(case, OK if isinstance(done, Success) else done)
+    yield from measure_accuracy(case, done, truth)
+    if isinstance(done, Success):
+        # The same steps with few samples, and fewer steps if the run is slow.
+        n_steps = math.ceil(case.grid.n_steps * min(1.0, study.longest_run / done.cost.first_call))
+        case = replace(case, grid=Grid(case.grid.dt, n_steps, math.ceil(n_steps / SAMPLES)))
+        done = study.attempt_here(case)
+    if isinstance(done, Outcome):
+        yield from case.rows(blanks(*MEASURES), done)
+        return []
+    return [TimedRun(case, done, done)]
+
+
+def list_properties(case: Case, outcome: Outcome) -> list[Measurement]:
     """Return the properties of an engine: bits of its numbers, and the expected order or nan."""
     method = case.method
     if isinstance(method, Missing):
         return []
     bits = float(getattr(method, "precision", "f64").removeprefix("f"))
     order = math.nan if method.order is None else float(method.order)
-    detail = AS_INSTALLED if is_as_installed(method) else ""
     known = (Value(Measure.PRECISION, bits), Value(Measure.ORDER_EXPECTED, order))
-    return [case.row(value, outcome, detail) for value in known]
+    return case.rows(known, outcome, AS_INSTALLED if is_as_installed(method) else "")
 
 
-def measure(study: Study, case: Case, truth: Trajectory) -> Generator[Measurement, None, list[TimedRun]]:
-    """Yield the rows of one engine except its times; return the run to be timed in a list, which may be empty."""
-    outcome = attempt_here(max(FIRST_LIMIT, study.hang_limit), case, study.skip_missing)
-    yield from facts(case, outcome.outcome if isinstance(outcome, Failure) else OK)
-    yield from accuracy(case, outcome, truth)
-    few, again = case, outcome
-    if isinstance(outcome, Success):
-        few = replace(case, grid=keep_few(case.grid, study.longest_run / outcome.cost.first_call))
-        again = attempt_here(study.hang_limit, few, study.skip_missing)
-    if isinstance(again, Failure):
-        yield from few.blanks(blanks(*MEASURES), again.outcome)
-        return []
-    return [TimedRun(few, again, again)]
-
-
-def keep_few(grid: Grid, share: float) -> Grid:
-    """Return the same steps (the first `share` of a slow run) with few samples."""
-    n_steps = math.ceil(grid.n_steps * min(1.0, share))
-    return Grid(grid.dt, n_steps, math.ceil(n_steps / SAMPLES))
-
-
-def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
+def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> list[Measurement]:
     """Return errors, drifts and, for a free body, the number of flips; without values if the run failed."""
     counted = TURNS if case.scene.free else ()
-    if isinstance(outcome, Failure):
-        return case.blanks([*errors.blanks(case.scene), *blanks(*counted)], outcome.outcome)
+    if isinstance(done, Outcome):
+        return case.rows([*errors.blanks(case.scene), *blanks(*counted)], done)
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
-        values = errors.measure_errors(outcome.trajectory, truth)
-        rows = [case.row(value, OK, direction(value, outcome.trajectory)) for value in values]
-    turns = (count_turns_over(outcome.trajectory), count_turns_over(truth)) if counted else ()
+        values = errors.measure_errors(done.trajectory, truth)
+        rows = [case.row(value, detail=find_direction(value, done.trajectory)) for value in values]
+    turns = (count_turns_over(done.trajectory), count_turns_over(truth)) if counted else ()
     return rows + [case.row(Value(measure, float(n))) for measure, n in zip(counted, turns, strict=True)]
 
 
-def direction(value: Value, trajectory: Trajectory) -> str:
+def find_direction(value: Value, trajectory: Trajectory) -> str:
     """Return whether the energy drift is a gain or a loss; empty for other quantities."""
     energy = find_energy(trajectory.scene.invariants)
     if energy is None or (value.measure, value.quantity) != (Measure.DRIFT_MAX, energy.name):
@@ -114,18 +103,11 @@ def direction(value: Value, trajectory: Trajectory) -> str:
 def count_turns_over(trajectory: Trajectory) -> int:
     """Return how often a body turned over.
 
-    That is how often the component of its momentum along one principal axis changed sides: the axis that has most of it at the
-    start, about which a body of three different moments turns over where that is the middle one. A side counts from `FAR_SIDE`
-    of the component at the start on, so that a wobble across zero does not.
+    The momentum component along one principal axis changes its sign when the body turns over. The axis is the one with the
+    largest component at the start. A sign counts only if the component reaches `FAR_SIDE` of its initial size, so that small
+    oscillations about zero are ignored.
     """
-    along = momentum_along_spin(trajectory.scene, trajectory.w_WB_B)
-    sides = np.sign(along[np.abs(along) >= FAR_SIDE * abs(along[0])])
-    return int(np.count_nonzero(np.diff(sides)))
-
-
-def momentum_along_spin(scene: Scene, w_WB_B: Array) -> Array:
-    """Return the momentum (n,), kg m^2/s, along the principal axis that has most at the start, for rates (n, 3), rad/s."""
-    along = scene.body.momentum(w_WB_B) @ scene.body.R_BP
-    start = scene.body.momentum(scene.w_WB_B0) @ scene.body.R_BP
-    component: Array = along[:, int(np.argmax(np.abs(start)))]
-    return component
+    body, start = trajectory.scene.body, trajectory.scene.w_WB_B0
+    along = (body.momentum(trajectory.w_WB_B) @ body.R_BP)[:, int(np.argmax(np.abs(body.momentum(start) @ body.R_BP)))]
+    signs = np.sign(along[np.abs(along) >= FAR_SIDE * abs(along[0])])
+    return int(np.count_nonzero(np.diff(signs)))

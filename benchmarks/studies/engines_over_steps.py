@@ -5,26 +5,25 @@ Impulse-based engines in single precision become less accurate with smaller step
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
-
-import numpy as np
 
 from conservative.method import Method
-from conservative.outcome import OK, Outcome, OutcomeKind
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
 
-from ..measures import errors
 from ..measures.convergence_order import grows_with_shorter_steps, observed_order
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved
 from . import step_ladder
-from .case import Case, Failure, Success, drop_step
-from .convergence import attempt_each, no_order, order_rows
+from .case import Case, Success, drop_step
+from .convergence import find_no_order, order_rows
+from .line import LinePoint, measure_line
+from .speed import ROUNDS
 from .study import Progress, Study
-from .work_precision import ROUNDS, one_of_each_series, points
+from .work_precision import list_cases
 
 WORSE = "worse with smaller steps"
 """Reason of an outcome without an order: the error increases as steps get shorter."""
@@ -40,93 +39,68 @@ CALL = 0.002
 """Shortest sample of timed calls, s."""
 
 
-@dataclass(frozen=True, eq=False)
-class EnginePoint:
-    """A run that reached its end, and its largest attitude error, rad."""
-
-    case: Case
-    done: Success
-    error: float
-
-
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the errors of every engine at all step sizes, the observed order, and the times of the same runs."""
-    methods = one_of_each_series(study)
-    tell = study.count(progress, len(methods) + 1)
+    tell = study.count(progress, len(study.lines) + 1)
     for scene in study.scenes:
-        points: list[EnginePoint] = []
-        for method in methods:
+        good: dict[Case, Success] = {}
+        for method in study.lines:
             tell(f"{scene.name}: errors of {method.name}")
-            mine = yield from converge(study, scene, method)
-            yield from order_of(study, scene, method, mine)
-            points += mine
-        good = [point for point in points if point.error <= TIMED]
+            points = yield from converge(study, scene, method)
+            yield from fit_order(study, scene, method, points)
+            for point in points:
+                if isinstance(point.done, Success) and point.errors[Measure.ATTITUDE_MAX] <= TIMED:
+                    good[point.case] = point.done
         tell(f"{scene.name}: timing {len(good)} runs")
         yield from time_rows(study, good)
 
 
-def cases_of(study: Study, scene: Scene, method: Method) -> list[Case]:
-    """Return the cases of a method, coarse to fine: all step sizes, or the cases of `work_precision` if it has none."""
-    if method.order is None or method.unsupported(scene):
-        return points(study, scene, method)
-    grids = step_ladder.steps(scene, method)[:: 2 if study.quick else 1]
-    return [Case(study.name, scene, method, grid) for grid in grids]
-
-
-def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[EnginePoint]]:
+def converge(study: Study, scene: Scene, method: Method) -> Generator[Measurement, None, list[LinePoint]]:
     """Yield the errors of one method; return its points."""
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
-    points_so_far: list[EnginePoint] = []
-    cases = cases_of(study, scene, method)
-    tried: list[Case] = []
-    for case, outcome in attempt_each(study, limit_preparation(cases, points_so_far)):
-        tried.append(case)
-        if isinstance(outcome, Failure):
-            yield case.row(Value(Measure.ATTITUDE_MAX, float("nan")), outcome.outcome)
-            continue
-        with np.errstate(over="ignore", invalid="ignore"):  # a diverging motion can be finite for some time
-            values = errors.measure_errors(outcome.trajectory, truth)
-        error = next(value for value in values if value.measure is Measure.ATTITUDE_MAX)
-        points_so_far.append(EnginePoint(case, outcome, error.value))
-        yield case.row(error)
-    yield from (case.row(Value(Measure.ATTITUDE_MAX, float("nan")), SKIPPED) for case in cases if case not in tried)
-    return points_so_far
+    cases, points = list_cases(study, scene, method), list[LinePoint]()
+    for point in measure_line(study, limit_preparation(cases, points), truth, [Measure.ATTITUDE_MAX]):
+        points.append(point)
+        yield from point.rows()
+    tried = [point.case for point in points]
+    yield from (case.row(Value(Measure.ATTITUDE_MAX, math.nan), SKIPPED) for case in cases if case not in tried)
+    return points
 
 
-def limit_preparation(cases: list[Case], points_so_far: list[EnginePoint]) -> Iterator[Case]:
-    """Yield the first case, then the others within the time limit; every second one if preparing the first was slow."""
+def limit_preparation(cases: list[Case], points: list[LinePoint]) -> Iterator[Case]:
+    """Yield the first case, then the others within the time limit; every second one if preparing the first was slow.
+
+    `points` are those of the cases so far; the caller adds each.
+    """
     yield cases[0]
-    is_slow = bool(points_so_far) and points_so_far[0].done.cost.prepare > SLOW_PREPARATION
-    for case in cases[2::2] if is_slow else cases[1:]:
-        if sum(point.done.cost.prepare for point in points_so_far) > PREPARATIONS:
+
+    def spent() -> float:
+        return sum(point.done.cost.prepare for point in points if isinstance(point.done, Success))
+
+    for case in cases[2::2] if spent() > SLOW_PREPARATION else cases[1:]:
+        if spent() > PREPARATIONS:
             return
         yield case
 
 
-def order_of(study: Study, scene: Scene, method: Method, points: list[EnginePoint]) -> list[Measurement]:
+def fit_order(study: Study, scene: Scene, method: Method, points: list[LinePoint]) -> list[Measurement]:
     """Return the observed order and its standard error, or the reason why there is no order."""
     case, names = Case(study.name, scene, method, step_ladder.samples(scene, method)), (Measure.ORDER, Measure.ORDER_STDERR)
-    if failed := no_order(case, study.skip_missing):
-        return [drop_step(row) for row in case.blanks(blanks(*names), failed.outcome)]
-    steps, values = [point.case.grid.dt for point in points], [point.error for point in points]
+    if failed := find_no_order(study, case):
+        return list(map(drop_step, case.rows(blanks(*names), failed)))
+    steps, values = [point.case.grid.dt for point in points], [point.errors[Measure.ATTITUDE_MAX] for point in points]
     order = observed_order(steps, values)
     return order_rows(case, names, order, WORSE if order.reason and grows_with_shorter_steps(steps, values) else order.reason)
 
 
-def time_rows(study: Study, points: list[EnginePoint]) -> Iterator[Measurement]:
-    """Yield the times of all points of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
-    quick = {point: point.done.run for point in points if point.done.cost.first_call <= study.longest_run}
+def time_rows(study: Study, runs: dict[Case, Success]) -> Iterator[Measurement]:
+    """Yield the times of all runs of a scene, in interleaved rounds; for a run beyond the budget, its only time."""
+    quick = {case: done.run for case, done in runs.items() if done.cost.first_call <= study.longest_run}
     with time_limit(study.hang_limit):
         timings = time_interleaved(quick, min(study.rounds, ROUNDS), min_time=CALL, budget=study.timing_budget / 2)
-    for point, timing in timings.items():
-        yield time_row(point, timing.minimum, timing.outcome, str(timing))
-    for point in points:
-        if point not in quick:
-            yield time_row(point, point.done.cost.first_call, OK, "a single run")
-
-
-def time_row(point: EnginePoint, spent: float, outcome: Outcome, detail: str) -> Measurement:
-    """Return the row of a run that took `spent` s."""
-    grid = point.case.grid
-    value = Value(Measure.TIME, spent / (grid.dt * grid.n_steps))
-    return point.case.row(value, outcome, detail if outcome.ok else "")
+    for case, timing in timings.items():
+        yield case.time_row(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps), timing)
+    for case, done in runs.items():
+        if case not in quick:
+            value = Value(Measure.TIME, done.cost.first_call / (case.grid.dt * case.grid.n_steps))
+            yield case.row(value, detail="a single run")

@@ -17,7 +17,7 @@ from conservative.scene import Scene
 
 from ..measures.measurement import Measurement
 from .case import Case
-from .paper import accuracy
+from .paper import measure_accuracy
 from .selection import Missing
 from .study import HANG_FACTOR, Progress, Study
 from .time_limit import attempt_apart
@@ -61,4 +61,4 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         for method in study.competitors:
             tell(f"{scene.name}: {method.name}")
             case = Case(study.name, scene, method, steps)
-            yield from accuracy(case, attempt_apart(limit, case, study.skip_missing), truth)
+            yield from measure_accuracy(case, attempt_apart(limit, case, study.skip_missing), truth)

@@ -54,29 +54,22 @@ class Way:
 
 def list_ways(method: Method) -> tuple[Way, ...]:
     """Return the compared ways of a method; for our methods also one body at a time, and two threads."""
-    if not takes_many(method):
+    if not method.card.many:  # it runs one body at a time
         return (Way(method, together=False),)
     return (Way(method), Way(method, together=False), Way(method, threads=2)) if method.role == Role.OURS else (Way(method),)
 
 
-def takes_many(method: Method) -> bool:
-    """Return whether a method can run many bodies at once."""
-    return bool(method.card.many)
-
-
 class RunBlocks:
-    """A run of many bodies, block by block, which stores the result of the last block."""
+    """A run of many bodies, block by block, which returns the result of the last block."""
 
-    def __init__(self, way: Way, runs: list[RunMany]) -> None:
-        self._way, self._runs = way, runs
-        self._pool = ThreadPoolExecutor(way.threads) if way.threads > 1 else None
+    def __init__(self, runs: list[RunMany], threads: int) -> None:
+        self._runs = runs
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def __call__(self) -> Block:
-        if self._pool is None:
-            for run in self._runs[:-1]:
-                run()
-            return self._runs[-1]()
-        return list(self._pool.map(lambda run: run(), self._runs))[-1]
+        for block in (self._pool.map if self._pool else map)(lambda run: run(), self._runs):
+            last = block
+        return last
 
     def wall_time(self, calls: int) -> float:
         """Return the wall time of calls, s, without the communication with engines in other processes."""
@@ -93,7 +86,7 @@ def prepare_blocks(way: Way, bodies: Batch, grid: Grid) -> RunBlocks:
         together = way.method.prepare_many(block, grid) if way.together else None
         alone = (way.method.prepare(block.take(i), grid) for i in range(len(block)))
         runs.append(_Loop(list(alone), grid) if together is None else together)
-    return RunBlocks(way, runs)
+    return RunBlocks(runs, way.threads)
 
 
 class _Loop:
@@ -132,15 +125,17 @@ def attempt_many(way: Way, bodies: Batch, grid: Grid, limit: float, skip_missing
         return Outcome(OutcomeKind.UNSUPPORTED, reason)
     try:
         with time_limit(limit):
-            start = perf_counter()
-            run = prepare_blocks(way, bodies, grid)
-            if (spent := perf_counter() - start) > COMPILED:
-                start = perf_counter()
-                run = prepare_blocks(way, bodies, grid)
-                spent = perf_counter() - start
+            run, spent = _time_preparation(way, bodies, grid)
+            if spent > COMPILED:
+                run, spent = _time_preparation(way, bodies, grid)
             return ManyDone(run, run(), spent, wall_time(run))
     except Exception as error:
         return outcome_of_error(way.method, error, skip_missing)
+
+
+def _time_preparation(way: Way, bodies: Batch, grid: Grid) -> tuple[RunBlocks, float]:
+    start = perf_counter()
+    return prepare_blocks(way, bodies, grid), perf_counter() - start
 
 
 def settings(method: Method) -> tuple[Method, ...]:

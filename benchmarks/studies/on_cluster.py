@@ -16,7 +16,7 @@ from conservative.integration.cluster import start_executor
 from conservative.references.truth import reference
 
 from . import studies
-from .study import Finding, Progress, Study, Truths
+from .study import Finding, Progress, Study, remember_truths
 
 UNTIMED = ("paper", "convergence", "long_runs", "sphere_curves", "paper_figures", "stability", "hard_cases")
 """Studies without times."""
@@ -54,4 +54,4 @@ def find_on_cluster(client: Any, study: Study, progress: Progress) -> Iterator[F
 
 def _find_all(study: Study) -> list[Finding]:
     """Return all findings of a study; the worker computes the reference solutions."""
-    return list(studies.findings(replace(study, truth=Truths())))
+    return list(studies.findings(replace(study, truth=remember_truths())))

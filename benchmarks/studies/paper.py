@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from conservative.grid import grid_for
 from conservative.method import Role
+from conservative.outcome import Outcome
 from conservative.references.truth import Truth
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
@@ -13,9 +14,8 @@ from conservative.trajectory import Trajectory
 from ..measures import errors
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Failure, Success
+from .case import Case, Success
 from .study import Progress, Study
-from .time_limit import attempt_within
 
 FRACTIONS = (1.0, 0.5, 0.25)
 """Steps of the paper's figures, relative to the scene's own."""
@@ -30,18 +30,17 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
         grids = [grid_for(scene, scene.dt * fraction) for fraction in FRACTIONS]
         tell(f"{scene.name}: truth")
         truths = [study.truth(scene, grid) for grid in grids]
-        yield from (agreement(study, scene, grid.dt, truth) for grid, truth in zip(grids, truths, strict=True))
+        yield from (agreement_row(study, scene, grid.dt, truth) for grid, truth in zip(grids, truths, strict=True))
         for method in study.methods:
             tell(f"{scene.name}: {method.name}")
             for grid, truth in zip(grids, truths, strict=True):
                 case = Case(study.name, scene, method, grid)
-                outcome = attempt_within(study.hang_limit, case, study.skip_missing)
-                yield from accuracy(case, outcome, truth.trajectory)
+                yield from measure_accuracy(case, study.attempt(case), truth.trajectory)
                 if method.order is None:
                     break  # neither accuracy nor samples depend on dt
 
 
-def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
+def agreement_row(study: Study, scene: Scene, dt: float, truth: Truth) -> Measurement:
     """Return the agreement of the two reference solutions, in a row with both labels."""
     return Measurement(
         study=study.name,
@@ -57,15 +56,15 @@ def agreement(study: Study, scene: Scene, dt: float, truth: Truth) -> Measuremen
     )
 
 
-def accuracy(case: Case, outcome: Success | Failure, truth: Trajectory) -> list[Measurement]:
+def measure_accuracy(case: Case, done: Success | Outcome, truth: Trajectory) -> list[Measurement]:
     """Return a row for every measure and counter; without values if the run failed."""
-    if isinstance(outcome, Failure):
-        return case.blanks(errors.blanks(case.scene), outcome.outcome)
-    counters = outcome.trajectory.counters
+    if isinstance(done, Outcome):
+        return case.rows(errors.blanks(case.scene), done)
+    counters = done.trajectory.counters
     work = {
         Measure.STEPS: counters.steps,
         Measure.NEWTON_ITERATIONS: counters.iterations,
         Measure.EVALUATIONS: counters.evaluations,
     }
     counts = [Value(measure, float(count)) for measure, count in work.items() if count is not None]
-    return [case.row(value) for value in errors.measure_errors(outcome.trajectory, truth) + counts]
+    return case.rows(errors.measure_errors(done.trajectory, truth) + counts)

@@ -8,14 +8,12 @@ top, m.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from conservative import registry
 from conservative.attitude import Array
 from conservative.grid import grid_for
-from conservative.method import Method
 from conservative.methods.convected import Convected
 from conservative.methods.reduced import Reduced
 from conservative.potentials.uniform_gravity import UniformGravity
@@ -40,23 +38,6 @@ ENERGY, MOMENTUM = "energy", "momentum"
 X1, X2 = "x1", "x2"
 
 
-@dataclass(frozen=True)
-class PaperFigure:
-    """A figure of the paper: the name of its study, and its scene."""
-
-    study: str
-    scene: Scene
-
-    def run(self, name: str, dt: float) -> tuple[Case, Trajectory]:
-        """Return the case and the trajectory of a method at a step size, s, or raise the failure of its run."""
-        method: Method = registry.method(name)
-        case = Case(self.study, self.scene, method, grid_for(self.scene, dt))
-        trajectory = method.solve(self.scene, case.grid)
-        if trajectory.failure is not None:
-            raise trajectory.failure
-        return case, trajectory
-
-
 def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     """Yield the lines of the figures whose scene is in the study, and the position errors of the top as rows.
 
@@ -66,38 +47,42 @@ def findings(study: Study, progress: Progress) -> Iterator[Finding]:
     names = [scene.name for scene in study.scenes if scene.name in figures]
     for k, name in enumerate(names):
         progress(k, len(names), f"{name}: the paper's figure")
-        yield from figures[name](PaperFigure(study.name, registry.scene(name)))
+        yield from figures[name](study.name)
 
 
-def yield_brick(figure: PaperFigure) -> Iterator[Samples]:
+def run(study: str, scene: str, method: str, dt: float) -> tuple[Case, Trajectory]:
+    """Return the case and the trajectory of a method at a step size, s, or raise the failure of its run."""
+    value = registry.scene(scene)
+    case = Case(study, value, registry.method(method), grid_for(value, dt))
+    trajectory = case.method.solve(value, case.grid)
+    if trajectory.failure is not None:
+        raise trajectory.failure
+    return case, trajectory
+
+
+def yield_brick(study: str) -> Iterator[Samples]:
     """Yield figure 1: rates by the paper's map; errors of energy and |L|, relative and signed, by both maps."""
     for name in (PAPER_MAP, REDUCED_MAP):
-        case, trajectory = figure.run(name, BRICK_STEP)
+        case, trajectory = run(study, BRICK, name, BRICK_STEP)
         length = np.linalg.norm(trajectory.momentum_W, axis=1)
         rates = dict(zip(RATES, trajectory.w_WB_B.T, strict=True)) if name == PAPER_MAP else {}
         relative = {ENERGY: trajectory.energy / trajectory.energy[0] - 1, MOMENTUM: length / length[0] - 1}
         yield from (case.samples(quantity, trajectory.t, values) for quantity, values in (rates | relative).items())
 
 
-def yield_top(figure: PaperFigure) -> Iterator[Finding]:
+def yield_top(study: str) -> Iterator[Finding]:
     """Yield figure 2, the paper's map at two steps and the exact motion, then the errors after one period of precession."""
     for name, dt in (*((PAPER_MAP, dt) for dt in TOP_STEPS[:2]), (EXACT, TOP_STEPS[1])):
-        case, trajectory = figure.run(name, dt)
-        positions = com_W(figure.scene, trajectory.R_WB).T
+        case, trajectory = run(study, TOP, name, dt)
+        positions = com_W(case.scene, trajectory.R_WB).T
         yield from (case.samples(quantity, trajectory.t, x) for quantity, x in zip((X1, X2), positions, strict=False))
     for dt in TOP_STEPS:
-        (case, ours), (_, exact) = figure.run(PAPER_MAP, dt), figure.run(EXACT, dt)
-        yield from (case.row(value) for value in position_errors(ours, exact, round(figure.scene.t_end / dt)))
-
-
-def position_errors(ours: Trajectory, exact: Trajectory, step: int) -> tuple[Value, Value, Value]:
-    """Return the time of a step and the errors of the centre of mass: of the coordinate x1, and the distance."""
-    gap = com_W(ours.scene, ours.R_WB[step] - exact.R_WB[step])
-    return (
-        Value(Measure.PERIOD, float(ours.t[step])),
-        Value(Measure.PERIOD_X1, abs(float(gap[0]))),
-        Value(Measure.PERIOD_DISTANCE, float(np.linalg.norm(gap))),
-    )
+        (case, ours), (_, exact) = (run(study, TOP, name, dt) for name in (PAPER_MAP, EXACT))
+        step = round(case.scene.t_end / dt)
+        gap = com_W(case.scene, ours.R_WB[step] - exact.R_WB[step])
+        yield case.row(Value(Measure.PERIOD, float(ours.t[step])))
+        yield case.row(Value(Measure.PERIOD_X1, abs(float(gap[0]))))
+        yield case.row(Value(Measure.PERIOD_DISTANCE, float(np.linalg.norm(gap))))
 
 
 def com_W(scene: Scene, R_WB: Array) -> Array:

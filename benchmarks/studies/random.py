@@ -19,14 +19,13 @@ confirm it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from conservative.attitude import angle_between
 from conservative.check import positive_integer
-from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role, Run
 from conservative.outcome import Outcome, OutcomeKind
@@ -37,15 +36,15 @@ from conservative.scene import Scene
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 from conservative.trajectory import Trajectory
 
-from ..contest import cost, credit, first_within
+from ..contest import cost, list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import time_interleaved, wall_time
-from .case import NOT_DRAWN, Case, Drawn, Failure, Success, outcome_of_error
-from .selection import Missing, at_tolerance, series, takes_exact_steps, tolerance_setting
+from .case import NOT_DRAWN, Case, Drawn, Success, outcome_of_error
+from .line import list_settings
+from .selection import Missing, tolerance_setting
 from .speed import keep_end
-from .study import Progress, Study, Truths
-from .time_limit import attempt_here
+from .study import Progress, Study, remember_truths
 
 DECADES = tuple(10.0**-k for k in range(2, 13))
 """Attitude errors, rad, at which methods are compared."""
@@ -68,10 +67,10 @@ LONG = 0.002
 CALL = 1e-4
 """Smallest duration of a timed sample, s: mostly one call, because short samples are rarely interrupted."""
 MARGIN = 3.0
-"""Largest ratio of an estimated time to that of the fastest setting of its side for a setting that is timed."""
+"""A setting is timed if its estimated time is at most this multiple of the fastest setting's on its side."""
 BITS = 96
 SLOW, EVERY = 0.01, 3
-"""Time, s, of a run above which a line gets one setting of so many."""
+"""Time, s, of a run above which only every third setting of a line is measured."""
 ROUNDS, QUICK_ROUNDS, BUDGET = 15, 7, 0.15
 """Rounds of timing, rounds of a quick study, and the time budget, s, for all rounds of one setting."""
 TIME = Value(Measure.TIME, math.nan)
@@ -99,7 +98,7 @@ def random_study(
     places = [(field, seed, index) for field in FIELDS for index in range(bodies)]
     scenes = tuple(random_body(*place).rename(name_of(*place)) for place in places)
     drawn = tuple(Drawn(*place) for place in places)
-    return RandomStudy("random", scenes, methods, quick, skip_missing, Truths(precise), drawn=drawn)
+    return RandomStudy("random", scenes, methods, quick, skip_missing, remember_truths(precise), drawn=drawn)
 
 
 def settings(method: Method) -> tuple[Method, ...]:
@@ -147,59 +146,46 @@ Line = list[TimedSetting]
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     """Yield the error of every setting on every body, and the time of those that are worth timing."""
     every = study.drawn if isinstance(study, RandomStudy) else (NOT_DRAWN,) * len(study.scenes)
-    methods = list({series(method): method for method in study.competitors}.values())
-    tell = study.count(progress, len(methods) + 2)
+    tell = study.count(progress, len(study.lines) + 2)
     for scene, drawn in zip(study.scenes, every, strict=True):
         tell(f"{scene.name}: truth")
         coarsest = Grid(scene.t_end / SAMPLES, SAMPLES)
         truth = study.truth(scene, coarsest).trajectory
         lines: list[Line] = []
-        for method in methods:
+        for method in study.lines:
             tell(f"{scene.name}: errors of {method.name}")
-            line = cases(study.quick, Case(study.name, scene, method, coarsest, drawn))
-            lines.append((yield from measure_line(study, line, truth)))
+            cases = list_cases(Case(study.name, scene, method, coarsest, drawn), study.quick)
+            lines.append((yield from find_errors(study, cases, truth)))
         chosen = worth_timing(lines)
         tell(f"{scene.name}: timing {len(chosen)} settings")
         yield from time_rows(study, chosen)
         yield from (point.case.row(TIME, UNTIMED) for line in lines for point in line if point not in chosen)
 
 
-def cases(quick: bool, case: Case) -> list[Case]:
-    """Return the settings of a line, coarse to fine; only the given case if the method does not support the scene."""
-    method, t_end = case.method, case.scene.t_end
-    tolerance, few = tolerance_setting(method), FEW if quick else slice(None)
-    if method.unsupported(case.scene) or takes_exact_steps(method):
-        return [case]
-    if tolerance is None:
-        return [replace(case, grid=Grid(t_end / n, n, n // SAMPLES)) for n in STEPS[few]]
-    return [replace(case, method=each) for each in at_tolerances(method, tolerance, TOLERANCES[few])]
+def list_cases(case: Case, quick: bool = False) -> list[Case]:
+    """Return the settings of a line, coarse to fine; `case` has the coarsest step."""
+    few, t_end = FEW if quick else slice(None), case.scene.t_end
+    return list_settings(case, [Grid(t_end / n, n, n // SAMPLES) for n in STEPS[few]], TOLERANCES[few])
 
 
-def at_tolerances(method: Method, setting: str, tolerances: Iterable[float]) -> Iterator[Method]:
-    """Yield the method at those of the tolerances that it takes."""
-    for tolerance in tolerances:
-        with suppress(BadInput):
-            yield at_tolerance(method, setting, tolerance)
-
-
-def measure_line(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, Line]:
+def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Generator[Measurement, None, Line]:
     """Yield the errors of a line, coarse to fine, until there is no decade left; return its points."""
     line: Line = []
     for i, case in enumerate(settings):
         slow = bool(line) and line[-1].spent * case.scene.t_end > SLOW
         if (slow and i % EVERY) or [point.error < FLOOR for point in line[-2:]] == [True, True]:
             continue
-        outcome = attempt_here(study.hang_limit, case, study.skip_missing)
-        if isinstance(outcome, Failure):
-            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), outcome.outcome)
+        done = study.attempt_here(case)
+        if isinstance(done, Outcome):
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan), done)
             continue
-        error = float(angle_between(truth.R_WB, outcome.trajectory.R_WB).max())
-        line.append(TimedSetting(case, outcome, error, estimate(outcome) / case.scene.t_end))
+        error = float(angle_between(truth.R_WB, done.trajectory.R_WB).max())
+        line.append(TimedSetting(case, done, error, estimate_time(done) / case.scene.t_end))
         yield case.row(Value(Measure.ATTITUDE_MAX, error))
     return line
 
 
-def estimate(done: Success) -> float:
+def estimate_time(done: Success) -> float:
     """Return the estimated time of a run, s: the smallest of a few calls, of two if it is slow. The first may compile."""
     spent = min(wall_time(done.run) for _ in range(2))
     return spent if spent > SLOW else min(spent, *(wall_time(done.run) for _ in range(3)))
@@ -208,30 +194,28 @@ def estimate(done: Success) -> float:
 def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
     """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
 
-    Of each line whose estimated time is at most `MARGIN` times that of the fastest of its side, these are the coarsest point
-    credited with the decade (see `cost_at_error`), and the one before it.
+    They belong to lines with an estimated time of at most `MARGIN` times the fastest of the side. Each line contributes the
+    coarsest point that is credited with the decade (see `contest`), and the one before it.
     """
     sides: dict[str, list[Line]] = {}
     for line in filter(None, lines):
         sides.setdefault(line[0].side, []).append(line)
-    return list({id(point): point for side in sides.values() for error in DECADES for point in _deciding(side, error)}.values())
-
-
-def _deciding(lines: list[Line], error: float) -> Iterator[TimedSetting]:
-    costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in lines]
-    least = min((each for each in costs if not math.isnan(each)), default=math.nan)
-    for line, each in zip(lines, costs, strict=True):
-        first = first_within(credit([p.error for p in line]), error)
-        if first is not None and each <= MARGIN * least:
-            yield from line[max(first - 1, 0) : first + 1]
+    chosen: dict[int, TimedSetting] = {}
+    for side, error in itertools.product(sides.values(), DECADES):
+        costs = [cost([p.error for p in line], [p.spent for p in line], error) for line in side]
+        least = min((each for each in costs if not math.isnan(each)), default=math.nan)
+        for line, each in zip(side, costs, strict=True):
+            if each <= MARGIN * least:
+                chosen.update((id(line[i]), line[i]) for i in list_deciding([p.error for p in line], error))
+    return list(chosen.values())
 
 
 def time_rows(study: Study, points: list[TimedSetting]) -> Iterator[Measurement]:
-    """Yield the times of the points of a body, s per simulated second, in interleaved rounds."""
+    """Yield the times of the points of a body, s per simulated second, final state only, in interleaved rounds."""
     runs: dict[tuple[int, Case], Run] = {}
     with time_limit(study.hang_limit):
         for number, point in enumerate(points):
-            case = longer(point)
+            case = lengthen(point)
             run = prepare_unchecked(case)
             if isinstance(run, Outcome):
                 yield point.case.row(TIME, run)
@@ -239,8 +223,13 @@ def time_rows(study: Study, points: list[TimedSetting]) -> Iterator[Measurement]
                 runs[number, case] = run
         timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=BUDGET)
     for (number, case), timing in timings.items():
-        value = Value(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps))
-        yield points[number].case.row(value, timing.outcome, str(timing) if timing.outcome.ok else "")
+        yield points[number].case.time_row(Measure.TIME, timing.minimum / (case.grid.dt * case.grid.n_steps), timing)
+
+
+def lengthen(point: TimedSetting) -> Case:
+    """Return the timed case: the motion, `DURATIONS` times as long if the run is fast, final state only."""
+    is_fast = point.spent * point.case.scene.t_end < LONG
+    return replace(point.case, grid=keep_end(point.case.grid, DURATIONS if is_fast else 1))
 
 
 def prepare_unchecked(case: Case) -> Run | Outcome:
@@ -254,9 +243,3 @@ def prepare_unchecked(case: Case) -> Run | Outcome:
     except Exception as error:
         return outcome_of_error(case.method, error)
     return run if outcome.ok else outcome
-
-
-def longer(point: TimedSetting) -> Case:
-    """Return the case whose run is timed, final state only: the motion, `DURATIONS` times as long if it is fast."""
-    quick = point.spent * point.case.scene.t_end < LONG
-    return replace(point.case, grid=keep_end(point.case.grid, DURATIONS if quick else 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, NoReturn
 
 from conservative import registry
@@ -26,33 +26,37 @@ def all_variants(method: Method) -> tuple[Method, ...]:
 
 
 @dataclass(frozen=True)
-class Missing(Method):
-    """Placeholder for a method whose engine is not installed: every run raises `MissingEngine`.
+class StandIn(Method):
+    """A method that is not in this process, under the name, label and order that it has elsewhere."""
 
-    Attributes: `wanted` (the name as the user wrote it), and `engine` and `package` of the error.
-    """
+    given_name: str
+    given_label: str = ""
+    given_order: int | None = None
 
-    wanted: str
-    engine: str
-    package: str
+    @property
+    def name(self) -> str:
+        return self.given_name
+
+    @property
+    def label(self) -> str:
+        return self.given_label or self.given_name
+
+    @property
+    def order(self) -> int | None:
+        return self.given_order
+
+
+@dataclass(frozen=True)
+class Missing(StandIn):
+    """A method whose engine is not installed, under the name that the user wrote. Every run raises `error`."""
+
+    error: MissingEngine = field(compare=False, kw_only=True)
 
     family: ClassVar[str] = "missing"
     role: ClassVar[Role] = Role.ENGINE
 
-    @property
-    def name(self) -> str:
-        return self.wanted
-
-    @property
-    def label(self) -> str:
-        return self.wanted
-
-    @property
-    def order(self) -> None:
-        return None
-
     def prepare(self, scene: Scene, grid: Grid) -> NoReturn:
-        raise MissingEngine(self.engine, self.package)
+        raise self.error
 
 
 def scenes(names: Iterable[str] = DEFAULT_SCENES) -> tuple[Scene, ...]:
@@ -89,11 +93,11 @@ def methods(
         except MissingEngine as error:
             if not skip_missing:
                 raise
-            selected[Missing(name, error.engine, error.package)] = None
+            selected[Missing(name, error=error)] = None
         except NotLoadable as error:  # a broken entry point of another package
             if not skip_missing:
                 raise
-            selected[Missing(name, name, error.place)] = None
+            selected[Missing(name, error=MissingEngine(name, error.place))] = None
     return tuple(sorted(selected, key=lambda method: list(Role).index(Role(method.role))))
 
 
@@ -111,7 +115,7 @@ def tolerance_setting(method: Method) -> str | None:
     """Return the name of the setting that determines the accuracy of an adaptive method, or None."""
     if method.order is not None:
         return None
-    return next((field.name for field in fields(method) if field.name in TOLERANCES), None)
+    return next((each.name for each in fields(method) if each.name in TOLERANCES), None)
 
 
 def takes_exact_steps(method: Method) -> bool:
@@ -125,25 +129,9 @@ def at_tolerance(method: Method, setting: str, tolerance: float) -> Method:
 
 
 def series(method: Method) -> str:
-    """Return the name of a line in a chart: that of the method without its tolerance."""
+    """Return the name of a line in a chart: the name of the method without its tolerance."""
     setting = tolerance_setting(method)
     if setting is None:
         return method.name
-    default = next(field.default for field in fields(method) if field.name == setting)
+    default = next(each.default for each in fields(method) if each.name == setting)
     return at_tolerance(method, setting, default).name if isinstance(default, float) else method.name
-
-
-def identifier(scene: Scene, method: Method, dt: float) -> str:
-    """Return the id of a benchmark, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
-
-    It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's integrator.
-    """
-    shown = []
-    for position, field in enumerate(fields(method)):
-        value = getattr(method, field.name)
-        if isinstance(value, str):
-            if position == 0 or value != field.default:
-                shown.append(value.lower())
-        elif value != field.default:
-            shown.append({"order": "o", "stages": "s"}.get(field.name, field.name) + str(value))
-    return f"{scene.name}-{'_'.join([method.family, *shown])}-dt{dt:g}"

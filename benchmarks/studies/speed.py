@@ -7,19 +7,19 @@ then the conversion of the scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from conservative.grid import Grid, grid_for
 from conservative.method import Run
-from conservative.outcome import OK
+from conservative.outcome import OK, Outcome, OutcomeKind
 
 from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved, wall_time
-from .case import Case, Failure, Success, fail_unsupported
-from .study import HANG_LIMIT, Progress, Study
-from .time_limit import attempt_here, attempt_within, is_known_to_end
+from .case import Case, Success
+from .study import Progress, Study
+from .time_limit import is_known_to_end
 
 MEASURES = (
     Measure.TIME_PER_STEP,
@@ -32,12 +32,14 @@ MEASURES = (
 CALL = 0.004
 """Target duration of a timed call, s, for which the overhead of a call is a few percent."""
 TRIAL = 8
-"""Steps of the run that determines the speed of a foreign method."""
+"""Number of steps of the run that determines the speed of a foreign method."""
 LONGEST = 2**16
 """Largest factor by which the number of steps of a timed run increases."""
+ROUNDS = 5
+"""Largest number of rounds for each of hundreds of points."""
 Extend = Callable[[Grid, int], Grid]
 """Maps a grid and a factor to a grid with that many times as many steps."""
-UNCOUNTED = fail_unsupported("its engine does not count steps").outcome
+UNCOUNTED = Outcome(OutcomeKind.UNSUPPORTED, "its engine does not count steps")
 
 
 def keep_end(grid: Grid, times: int = 1) -> Grid:
@@ -45,46 +47,9 @@ def keep_end(grid: Grid, times: int = 1) -> Grid:
     return Grid(grid.dt, grid.n_steps * times, grid.n_steps * times)
 
 
-def shorten(study: Study, case: Case) -> Case:
-    """Return the case, with fewer steps if a foreign method would exceed the time budget."""
-    few = replace(case, grid=keep_end(replace(case.grid, n_steps=min(TRIAL, case.grid.n_steps))))
-    if is_known_to_end(case.method):
-        return case
-    trials = [attempt_within(study.hang_limit, few, skip_missing=True) for _ in range(2)]  # the first may compile
-    spent = [trial.cost.first_call for trial in trials if isinstance(trial, Success)]
-    if not spent:
-        return few
-    affordable = int(few.grid.n_steps * study.longest_run / max(min(spent), 1e-9))
-    n = min(case.grid.n_steps, max(few.grid.n_steps, affordable))
-    return replace(case, grid=Grid(case.grid.dt, n, n))
-
-
-def lengthen(case: Case, done: Success, limit: float = HANG_LIMIT, extend: Extend = keep_end) -> tuple[Case, Success]:
-    """Return the case with so many steps that a call takes about `CALL` s, or with the most steps that do not fail.
-
-    No run may take more than `limit` s. `extend` determines the samples. The number is found in several rounds, because a short
-    call is mostly overhead.
-    """
-    bare, times = case, 1
-    while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
-        times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
-        longer = replace(bare, grid=extend(bare.grid, times))
-        outcome = attempt_here(limit, longer)
-        if not isinstance(outcome, Success):
-            break
-        case, done = longer, outcome
-    return case, done
-
-
-def _shortest(run: Run) -> float:
-    """Return the wall time of a call, s: the smallest of three, or the first if it is far too long."""
-    spent = wall_time(run)
-    return spent if spent > 10 * CALL else min(spent, wall_time(run), wall_time(run))
-
-
 @dataclass(frozen=True, eq=False)
 class TimedRun:
-    """A case to be timed: the timed case, and the first call."""
+    """A case to be timed, its result, and the result of the first call."""
 
     case: Case
     done: Success
@@ -96,12 +61,44 @@ class TimedRun:
         return self.case.grid.dt * self.case.grid.n_steps
 
 
-def make_timed(study: Study, case: Case, extend: Extend = keep_end) -> TimedRun | Failure:
-    """Return a case that is ready to be timed, with as many steps as fill a call, or its failure."""
-    outcome = attempt_here(study.hang_limit, case, study.skip_missing)
-    if isinstance(outcome, Failure):
-        return outcome
-    return TimedRun(*lengthen(case, outcome, study.hang_limit, extend), outcome)
+def make_timed(study: Study, case: Case, extend: Extend = keep_end) -> TimedRun | Outcome:
+    """Return a case that is ready to be timed, or the outcome of its failure.
+
+    It has so many steps that a call takes about `CALL` s, or the most steps that do not fail. `extend` determines the samples.
+    The number of steps is determined in several rounds, because a short call is mostly overhead.
+    """
+    first = study.attempt_here(case)
+    if isinstance(first, Outcome):
+        return first
+    longest, done, times = case, first, 1
+    while times < LONGEST and (spent := _shortest(done.run)) < CALL / 2:
+        times = min(LONGEST, times * max(2, math.ceil(CALL / spent)))
+        longer = replace(case, grid=extend(case.grid, times))
+        again = study.attempt_here(longer)
+        if isinstance(again, Outcome):
+            break
+        longest, done = longer, again
+    return TimedRun(longest, done, first)
+
+
+def _shortest(run: Run) -> float:
+    """Return the wall time of a call, s: the smallest of three, or the first if it is far too long."""
+    spent = wall_time(run)
+    return spent if spent > 10 * CALL else min(spent, wall_time(run), wall_time(run))
+
+
+def shorten(study: Study, case: Case) -> Case:
+    """Return the case, with fewer steps if a foreign method would exceed the time budget."""
+    if is_known_to_end(case.method):
+        return case
+    few = replace(case, grid=keep_end(replace(case.grid, n_steps=min(TRIAL, case.grid.n_steps))))
+    trials = [study.attempt(few) for _ in range(2)]  # the first may compile
+    spent = [trial.cost.first_call for trial in trials if isinstance(trial, Success)]
+    if not spent:
+        return few
+    affordable = int(few.grid.n_steps * study.longest_run / max(min(spent), 1e-9))
+    n = min(case.grid.n_steps, max(few.grid.n_steps, affordable))
+    return replace(case, grid=Grid(case.grid.dt, n, n))
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
@@ -114,14 +111,19 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             scene.forget()  # so that the scene is converted again; compiled code stays warm
             case = shorten(study, Case(study.name, scene, method, keep_end(grid_for(scene, scene.dt))))
             timed = make_timed(study, case)
-            if isinstance(timed, Failure):
-                yield from case.blanks(blanks(*MEASURES), timed.outcome)
+            if isinstance(timed, Outcome):
+                yield from case.rows(blanks(*MEASURES), timed)
             else:
                 ready.append(timed)
         tell(f"{scene.name}: timing {len(ready)} methods")
-        timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
-        for timed, timing in timings.items():
-            yield from times(timed, timing)
+        yield from time_steps(study, ready)
+
+
+def time_steps(study: Study, ready: Sequence[TimedRun]) -> Iterator[Measurement]:
+    """Yield the `MEASURES` of runs, all in interleaved rounds."""
+    timings = time_interleaved({timed: timed.done.run for timed in ready}, study.rounds, budget=study.timing_budget)
+    for timed, timing in timings.items():
+        yield from times(timed, timing)
 
 
 def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
@@ -139,3 +141,22 @@ def times(timed: TimedRun, timing: Timing) -> Iterator[Measurement]:
     for measure, value in zip(MEASURES, values, strict=True):
         outcome = OK if not math.isnan(value) else UNCOUNTED if timing.outcome.ok else timing.outcome
         yield timed.case.row(Value(measure, value), outcome, detail if outcome.ok else "")
+
+
+def time_cases(study: Study, cases: Sequence[Case], extend: Mapping[Measure, Extend]) -> Iterator[Measurement]:
+    """Yield the times of cases, s per simulated second, all in interleaved rounds.
+
+    `extend` has the measures of each case, and the functions that lengthen the grid of their runs.
+    """
+    ready: dict[tuple[Case, Measure], TimedRun] = {}
+    for case in cases:
+        for measure, lengthen in extend.items():
+            timed = make_timed(study, replace(case, grid=lengthen(case.grid, 1)), lengthen)
+            if isinstance(timed, Outcome):
+                yield case.row(Value(measure, math.nan), timed)
+            else:
+                ready[case, measure] = timed
+    runs = {key: timed.done.run for key, timed in ready.items()}
+    timings = time_interleaved(runs, min(study.rounds, ROUNDS), min_time=CALL / 2, budget=study.timing_budget / 2)
+    for key, timing in timings.items():
+        yield ready[key].case.time_row(key[1], timing.minimum / ready[key].simulated, timing)

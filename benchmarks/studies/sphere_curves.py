@@ -17,10 +17,9 @@ from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
 from ..measures.measurement import Samples
-from .case import Case, Failure
+from .case import Success
 from .long_runs import case_for
 from .study import Progress, Study
-from .time_limit import attempt_within
 
 SAMPLES = 700
 """Largest number of samples of a curve."""
@@ -38,9 +37,13 @@ def findings(study: Study, progress: Progress) -> Iterator[Samples]:
     for k, (scene, method) in enumerate(pairs):
         progress(k, len(pairs), f"{scene.name}: {method.name}")
         case = case_for(study.name, scene, method)
-        outcome = attempt_within(study.hang_limit, case, study.skip_missing)
-        if not isinstance(outcome, Failure):
-            yield from curve(case, outcome.trajectory)
+        done = study.attempt(case)
+        if not isinstance(done, Success):
+            continue
+        trajectory = done.trajectory
+        some = np.unique(np.linspace(0, len(trajectory) - 1, SAMPLES).round().astype(int))
+        for axis, values in zip(AXES, project_on_sphere(trajectory)[some].T, strict=True):
+            yield case.samples(axis, trajectory.t[some], values)
 
 
 def select_methods(methods: Sequence[Method]) -> list[Method]:
@@ -54,13 +57,6 @@ def select_methods(methods: Sequence[Method]) -> list[Method]:
 def truth(scene: Scene, methods: Sequence[Method]) -> list[Method]:
     """Return the first reference method that supports a scene, if there is one."""
     return [method for method in methods if method.role == Role.TRUTH and method.unsupported(scene) is None][:1]
-
-
-def curve(case: Case, trajectory: Trajectory) -> Iterator[Samples]:
-    """Yield the coordinates of the curve of one run, at evenly spaced times."""
-    some = np.unique(np.linspace(0, len(trajectory) - 1, SAMPLES).round().astype(int))
-    for axis, values in zip(AXES, project_on_sphere(trajectory)[some].T, strict=True):
-        yield case.samples(axis, trajectory.t[some], values)
 
 
 def project_on_sphere(trajectory: Trajectory) -> Array:

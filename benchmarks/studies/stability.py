@@ -34,7 +34,7 @@ from conservative.trajectory import Trajectory
 
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
-from .case import Case, Failure, drop_step
+from .case import Case, drop_step
 from .selection import Missing
 from .study import Progress, Study
 from .time_limit import attempt_apart
@@ -102,11 +102,14 @@ class TrueMotion:
 
 def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measurement]:
     """Return the rows of one method on one scene."""
-    works, limit, outcome = math.nan, max(FIRST_LIMIT, study.longest_run), OK
+    works, fails, limit, outcome = math.nan, math.nan, max(FIRST_LIMIT, study.longest_run), OK
     case = Case(study.name, motion.scene, method, motion.grid(STEP_SIZES[0]))
-    fails = math.nan
     for size in STEP_SIZES:
-        outcome = outcome_at(study, replace(case, grid=motion.grid(size)), motion, size, limit)
+        done = attempt_apart(limit, replace(case, grid=motion.grid(size)), study.skip_missing)
+        if isinstance(done, Outcome):
+            outcome = done
+        else:
+            outcome = detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
         if not outcome.ok:
             fails = UNIT * size if works > 0 else math.nan
             break
@@ -118,16 +121,8 @@ def longest_step(study: Study, motion: TrueMotion, method: Method) -> list[Measu
     return [drop_step(row) for row in rows]
 
 
-def outcome_at(study: Study, case: Case, motion: TrueMotion, size: int, limit: float) -> Outcome:
-    """Return how a method does at a size of its steps, with `limit` s of time."""
-    done = attempt_apart(limit, case, study.skip_missing)
-    if isinstance(done, Failure):
-        return done.outcome
-    return detect_divergence(done.trajectory) or detect_wrong_branch(done.trajectory, motion, size) or OK
-
-
 def detect_divergence(trajectory: Trajectory) -> Outcome | None:
-    """Return the outcome of a run whose energy, or Jacobi integral, leaves its own scale; None where it stays."""
+    """Return the outcome of a run whose energy or Jacobi integral drifts by more than its reference scale, otherwise None."""
     energy = find_energy(trajectory.scene.invariants)
     if energy is None:
         return None
@@ -137,7 +132,7 @@ def detect_divergence(trajectory: Trajectory) -> Outcome | None:
 
 
 def detect_wrong_branch(trajectory: Trajectory, motion: TrueMotion, size: int) -> Outcome | None:
-    """Return the outcome of a run whose first step ends further from the truth than where it began; None of any other."""
+    """Return the outcome of a run whose first step ends further from the truth than it began, otherwise None."""
     if size >= len(motion.R_WB):
         return None
     true = motion.R_WB[size]

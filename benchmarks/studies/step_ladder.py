@@ -33,17 +33,13 @@ def samples(scene: Scene, method: Method) -> Grid:
 
 def steps(scene: Scene, method: Method) -> list[Grid]:
     """Return the grids of a method with a step, coarse to fine, over the scene's duration."""
-    return [_grid(scene, k) for k in _per_interval(scene, method)]
+    if (method.order or 0) >= HIGH_ORDER:
+        return [_grid(scene, k) for k in sorted({round(2 ** (k / 2)) for k in range(HIGH_LENGTH)})]
+    rate = float(np.linalg.norm(scene.w_WB_B0))
+    coarsest = max(1, round(scene.t_end * rate / RADIANS / SAMPLES))
+    return [_grid(scene, coarsest * 2**k) for k in range(FIRST_ORDER_LENGTH if method.order == 1 else LENGTH)]
 
 
 def _grid(scene: Scene, per_interval: int) -> Grid:
     n = SAMPLES * per_interval
     return Grid(scene.t_end / n, n, per_interval)
-
-
-def _per_interval(scene: Scene, method: Method) -> list[int]:
-    if (method.order or 0) >= HIGH_ORDER:
-        return sorted({round(2 ** (k / 2)) for k in range(HIGH_LENGTH)})
-    rate = float(np.linalg.norm(scene.w_WB_B0))
-    coarsest = max(1, round(scene.t_end * rate / RADIANS / SAMPLES))
-    return [coarsest * 2**k for k in range(FIRST_ORDER_LENGTH if method.order == 1 else LENGTH)]

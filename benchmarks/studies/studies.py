@@ -7,7 +7,6 @@ for study in studies.cross_studies(studies.MAIN, selection.scenes(), selection.m
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 from conservative.check import choice
 from conservative.method import Method
@@ -31,24 +30,13 @@ from . import (
     throughput,
     work_precision,
 )
-from .study import Finding, Maker, Progress, Study, Truths
+from .study import Finding, Maker, Progress, Study, remember_truths
 
-MAKERS: Mapping[str, Maker] = {
-    "paper": paper.findings,
-    "convergence": convergence.findings,
-    "speed": speed.findings,
-    "work_precision": work_precision.findings,
-    "each_step": each_step.findings,
-    "long_runs": long_runs.findings,
-    "sphere_curves": sphere_curves.findings,
-    "paper_figures": paper_figures.findings,
-    "engines_at_one_step": engines_at_one_step.findings,
-    "engines_over_steps": engines_over_steps.findings,
-    "stability": stability.findings,
-    "hard_cases": hard_cases.findings,
-    "random": random.findings,
-    "throughput": throughput.findings,
-}
+_IN_ORDER = (
+    *(paper, convergence, speed, work_precision, each_step, long_runs, sphere_curves, paper_figures),
+    *(engines_at_one_step, engines_over_steps, stability, hard_cases, random, throughput),
+)
+MAKERS: Mapping[str, Maker] = {study.__name__.rpartition(".")[2]: study.findings for study in _IN_ORDER}
 """Function of each study, by the name of its file."""
 HARD = ("stability", "hard_cases")
 """Studies of the hard cases: of selected scenes, and of every registered scene."""
@@ -73,7 +61,7 @@ def cross_studies(
     time_limit: float | None = None,
 ) -> tuple[Study, ...]:
     """Return the named studies of the same scenes and methods; they share their reference solutions."""
-    truths = Truths()
+    truths = remember_truths()
     return tuple(Study(name, scenes, methods, quick, skip_missing, truths, time_limit) for name in names)
 
 
@@ -81,10 +69,10 @@ def list_hard_studies(
     methods: tuple[Method, ...], skip_missing: bool = False, time_limit: float | None = None
 ) -> tuple[Study, ...]:
     """Return the studies of the hard cases: stability, and every registered scene with one or two settings of each family."""
-    options: dict[str, Any] = {"skip_missing": skip_missing, "time_limit": time_limit}
+    scenes, settings = selection.scenes(stability.SCENES), hard_cases.settings(methods)
     return (
-        Study("stability", selection.scenes(stability.SCENES), methods, **options),
-        Study("hard_cases", hard_cases.scenes(), hard_cases.settings(methods), **options),
+        Study("stability", scenes, methods, skip_missing=skip_missing, time_limit=time_limit),
+        Study("hard_cases", hard_cases.scenes(), settings, skip_missing=skip_missing, time_limit=time_limit),
     )
 
 

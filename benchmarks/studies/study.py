@@ -11,36 +11,32 @@ from conservative.check import positive_number
 from conservative.errors import BadInput
 from conservative.grid import Grid
 from conservative.method import Method, Role
+from conservative.outcome import Outcome
 from conservative.references.truth import Truth, reference
 from conservative.scene import Scene
 
 from ..measures.measurement import Measurement, Samples
+from .case import Case, Success
+from .selection import series
+from .time_limit import attempt_here, attempt_within
 
 Progress = Callable[[int, int, str], None]
 """Called before each piece of work with the number of finished pieces, of all pieces, and a description of the next."""
 MOST_TRUTHS = 32
-"""Number of reference solutions in `Truths`: about six for each scene of a report."""
+"""Number of cached reference solutions: about six for each scene of a report."""
 HANG_LIMIT = 60.0
 """Shortest time limit of a run, s: a first run may compile."""
 HANG_FACTOR = 10.0
 """Ratio of the time limit of a run to the time budget."""
 FindTruth = Callable[[Scene, Grid], Truth]
+"""Returns the reference solution of a scene at the samples of a grid."""
 Finding = Measurement | Samples
 """A result of a study: a row of the table, or the samples of a line in a chart."""
 
 
-class Truths:
-    """A cache of the last `MOST_TRUTHS` reference solutions, shared by studies of the same scenes.
-
-    `find` returns the reference solution of a scene at the samples of a grid.
-    """
-
-    def __init__(self, find: FindTruth = reference) -> None:
-        self._find = lru_cache(maxsize=MOST_TRUTHS)(find)
-
-    def __call__(self, scene: Scene, grid: Grid) -> Truth:
-        """Return the reference solution of a scene at the samples of a grid."""
-        return self._find(scene, grid)
+def remember_truths(find: FindTruth = reference) -> FindTruth:
+    """Return `find` with a cache of its last `MOST_TRUTHS` reference solutions, for studies of the same scenes to share."""
+    return lru_cache(maxsize=MOST_TRUTHS)(find)
 
 
 @dataclass(frozen=True)
@@ -73,7 +69,7 @@ class Study:
     methods: tuple[Method, ...]
     quick: bool = False
     skip_missing: bool = False
-    truth: FindTruth = field(default_factory=Truths)
+    truth: FindTruth = field(default_factory=remember_truths)
     time_limit: float | None = None
 
     @property
@@ -100,6 +96,19 @@ class Study:
     def competitors(self) -> tuple[Method, ...]:
         """The methods except reference solutions."""
         return tuple(method for method in self.methods if method.role != Role.TRUTH)
+
+    @property
+    def lines(self) -> tuple[Method, ...]:
+        """One of the competitors for each line of a chart. Variants that differ only in their tolerance are one line."""
+        return tuple({series(method): method for method in self.competitors}.values())
+
+    def attempt(self, case: Case) -> Success | Outcome:
+        """Return the result of a case within the time limit of a run; see `attempt_within`."""
+        return attempt_within(self.hang_limit, case, self.skip_missing)
+
+    def attempt_here(self, case: Case) -> Success | Outcome:
+        """Return the result of a case whose run is to be timed; see `time_limit.attempt_here`."""
+        return attempt_here(self.hang_limit, case, self.skip_missing)
 
     def count(self, progress: Progress, per_scene: int) -> Callable[[str], None]:
         """Return a function to be called with what comes next, before each of `per_scene` pieces of work for each scene."""

@@ -29,15 +29,17 @@ from conservative.grid import Grid
 from conservative.method import Method
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engines.heyoka import SMALLEST_TOL, Heyoka
+from conservative.scene import Scene
 
-from ..contest import credit, first_within
+from ..contest import list_deciding
 from ..measures.measure import Measure, Value
 from ..measures.measurement import Measurement
 from ..measures.timing import Timing, time_interleaved
 from .case import Case, Drawn
 from .ensembles import DURATION, KINDS, draw
+from .line import list_settings
 from .many_runs import ManyDone, Way, attempt_many, list_ways
-from .selection import Missing, at_tolerance, takes_exact_steps, tolerance_setting
+from .selection import Missing, takes_exact_steps, tolerance_setting
 from .speed import CALL, UNCOUNTED, keep_end
 from .study import Progress, Study
 
@@ -59,7 +61,7 @@ SIZES, QUICK_SIZES = tuple(10**k for k in range(7)), (1, 100)
 BODIES, QUICK_BODIES = 64, 8
 """Number of bodies whose errors are measured."""
 PREPARATION = 8.0
-"""Largest ratio of the time of a preparation to that of a call."""
+"""Largest time of a preparation, in units of the time limit of a call."""
 ROUNDS, QUICK_ROUNDS = 5, 3
 MEDIAN, MOST = "median", "95 %"
 """Statistics of the errors of the bodies."""
@@ -69,7 +71,7 @@ EXACT = "closed form"
 
 @dataclass(frozen=True)
 class ThroughputStudy(Study):
-    """The study, of so many bodies.
+    """The study of many bodies.
 
     Attributes
     ----------
@@ -150,53 +152,39 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
     tell = study.count(progress, len(ways) + len(study.sizes))
     for scene in study.scenes:
         try:
-            kind = yield from find_kind(study, scene.name)
+            kind = yield from find_truth(study, scene)
         except MissingEngine as error:
             if not study.skip_missing:
                 raise
-            grid = Grid(DURATION / SAMPLES, SAMPLES)
-            case = Case(study.name, scene, Missing("heyoka", "heyoka", "heyoka"), grid, Drawn(scene.name, study.seed))
+            case = _case(study, scene, Missing("heyoka", error=error), SAMPLES)
             yield case.row(Value(Measure.AGREEMENT, math.nan), Outcome(OutcomeKind.MISSING, str(error)))
             continue
         points: list[BatchSetting] = []
         for way in ways:
             tell(f"{scene.name}: errors of {way.method.name}")
-            points += decide((yield from measure_errors(kind, way)))
+            points += select_deciding((yield from measure_errors(kind, way)))
         for size in study.sizes:
             tell(f"{scene.name}: timing {size} bodies")
             points = yield from time_rows(kind, points, size)
 
 
-def find_kind(study: ThroughputStudy, name: str) -> Generator[Measurement, None, Kind]:
+def find_truth(study: ThroughputStudy, scene: Scene) -> Generator[Measurement, None, Kind]:
     """Yield the largest difference of two formulations of the reference solution, rad; return the bodies."""
-    bodies = draw(name, max(*study.sizes, study.bodies), study.seed)
-    grid, few = Grid(DURATION / SAMPLES, SAMPLES), bodies[: study.bodies]
+    bodies = draw(scene.name, max(*study.sizes, study.bodies), study.seed)
     methods = [Heyoka(SMALLEST_TOL, frame) for frame in ("base_vectors", "body")]
-    attitudes = [_attitudes(attempt_many(Way(method, together=False), few, grid, study.hang_limit)) for method in methods]
-    kind = Kind(study, bodies, attitudes[0])
+    cases = [_case(study, bodies.scene, method, SAMPLES) for method in methods]
+    attitudes = []
+    for case in cases:
+        done = attempt_many(Way(case.method, together=False), bodies[: study.bodies], case.grid, study.hang_limit)
+        assert isinstance(done, ManyDone), done
+        attitudes.append(done.block.R_WB)
     agreement = float(angle_between(*attitudes).max(axis=1).max())
-    yield _case(kind, methods[0], grid).row(Value(Measure.AGREEMENT, agreement), detail=methods[1].label)
-    return kind
+    yield cases[0].row(Value(Measure.AGREEMENT, agreement), detail=methods[1].label)
+    return Kind(study, bodies, attitudes[0])
 
 
-def _attitudes(done: ManyDone | Outcome) -> Array:
-    assert isinstance(done, ManyDone), done
-    return done.block.R_WB
-
-
-def _case(kind: Kind, method: Method, grid: Grid) -> Case:
-    scene = kind.bodies.scene
-    return Case(kind.study.name, scene, method, grid, Drawn(scene.name, kind.study.seed))
-
-
-def list_cases(kind: Kind, method: Method) -> list[Case]:
-    """Return the settings of a line, coarse to fine."""
-    few, setting = FEW if kind.study.quick else slice(None), tolerance_setting(method)
-    if takes_exact_steps(method):
-        return [_case(kind, method, _grid(EXACT_STEPS))]
-    if setting is None:
-        return [_case(kind, method, _grid(n)) for n in STEPS[few]]
-    return [_case(kind, at_tolerance(method, setting, tol), _grid(SAMPLES)) for tol in TOLERANCES[few]]
+def _case(study: ThroughputStudy, scene: Scene, method: Method, n: int) -> Case:
+    return Case(study.name, scene, method, _grid(n), Drawn(scene.name, study.seed))
 
 
 def _grid(n: int) -> Grid:
@@ -205,24 +193,21 @@ def _grid(n: int) -> Grid:
 
 def measure_errors(kind: Kind, way: Way) -> Generator[Measurement, None, list[BatchSetting]]:
     """Yield the errors of a line, coarse to fine, down to the last of `ERRORS` or to the time budget; return its points."""
-    line: list[BatchSetting] = []
-    for case in list_cases(kind, way.method):
-        if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * len(kind.few) > kind.study.longest_errors):
+    study, n, line = kind.study, len(kind.few), list[BatchSetting]()
+    exact, few = takes_exact_steps(way.method), FEW if study.quick else slice(None)
+    one = _case(study, kind.bodies.scene, way.method, EXACT_STEPS if exact else SAMPLES)
+    one = replace(one, bodies=n, way=way.text)
+    for case in list_settings(one, map(_grid, STEPS[few]), TOLERANCES[few]):
+        if line and (line[-1].errors[MOST] < ERRORS[-1] / 3 or 2 * line[-1].spent * n > study.longest_errors):
             break
-        done = attempt_many(
-            replace(way, method=case.method), kind.few, case.grid, kind.study.hang_limit, kind.study.skip_missing
-        )
+        done = attempt_many(replace(way, method=case.method), kind.few, case.grid, study.hang_limit, study.skip_missing)
         if isinstance(done, Outcome):
-            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done, bodies=len(kind.few), way=way.text)
-            if way.method.unsupported(kind.bodies.scene):
-                break
+            yield case.row(Value(Measure.ATTITUDE_MAX, math.nan, MEDIAN), done)
             continue
         errors = read_errors(done, kind.truth)
-        n = len(kind.few)
         line.append(BatchSetting(way, case, errors, done.spent / n, done.prepare / n))
-        detail = EXACT if takes_exact_steps(case.method) else ""
-        for statistic, error in errors.items():
-            yield case.row(Value(Measure.ATTITUDE_MAX, error, statistic), detail=detail, bodies=n, way=way.text)
+        values = (Value(Measure.ATTITUDE_MAX, error, statistic) for statistic, error in errors.items())
+        yield from case.rows(values, detail=EXACT if exact else "")
     return line
 
 
@@ -234,43 +219,39 @@ def read_errors(done: ManyDone, truth: Array) -> dict[str, float]:
     return {MEDIAN: float(np.median(off)), MOST: float(np.quantile(off, 0.95))}
 
 
-def decide(line: list[BatchSetting]) -> list[BatchSetting]:
+def select_deciding(line: list[BatchSetting]) -> list[BatchSetting]:
     """Return the points of a line that determine the cost at an error."""
     if line and takes_exact_steps(line[0].case.method):
         return line
-    chosen: set[int] = set()
-    for name in (MEDIAN, MOST):
-        credited = credit([point.errors[name] for point in line])
-        firsts = [first_within(credited, error) for error in ERRORS]
-        chosen.update(i for first in firsts if first is not None for i in (first - 1, first) if i >= 0)
+    errors = [[point.errors[statistic] for point in line] for statistic in (MEDIAN, MOST)]
+    chosen = {i for each in errors for error in ERRORS for i in list_deciding(each, error)}
     return [line[i] for i in sorted(chosen)]
 
 
 def time_rows(kind: Kind, points: list[BatchSetting], size: int) -> Generator[Measurement, None, list[BatchSetting]]:
     """Yield the times of points on `size` bodies; return the points that can run more bodies within the time budget."""
-    study = kind.study
-    ready: dict[BatchSetting, ManyDone] = {}
-    for point in points:
-        if reason := too_long(point, size, study.longest_run):
-            yield point.case.row(Value(Measure.TIME, math.nan), reason, bodies=size, way=point.way.text)
-            continue
-        way = replace(point.way, method=point.case.method)
-        attempted = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
-        if isinstance(attempted, Outcome):
-            yield point.case.row(Value(Measure.TIME, math.nan), attempted, bodies=size, way=point.way.text)
+    study, ready = kind.study, dict[BatchSetting, ManyDone]()
+    for point in (replace(each, case=replace(each.case, bodies=size)) for each in points):
+        done: ManyDone | Outcome | None = refuse_long(point, size, study.longest_run)
+        if done is None:
+            way = replace(point.way, method=point.case.method)
+            done = attempt_many(way, kind.bodies[:size], keep_end(point.case.grid), study.hang_limit)
+        if isinstance(done, Outcome):
+            yield point.case.row(Value(Measure.TIME, math.nan), done)
         else:
-            ready[point] = attempted
-    runs = {point: attempted.run for point, attempted in ready.items()}
+            ready[point] = done
+    runs = {point: done.run for point, done in ready.items()}
     timings = time_interleaved(runs, QUICK_ROUNDS if study.quick else ROUNDS, CALL, budget=study.timing_budget)
-    done = []
+    timed = []
     for point, timing in timings.items():
-        timed = replace(point, spent=min(point.spent, timing.minimum / size), prepare=ready[point].prepare / size)
-        yield from rows_of(timed, size, timing)
-        done += [timed] * timing.outcome.ok
-    return done
+        prepare = ready[point].prepare / size
+        yield from time_body(point.case, size, timing, prepare)
+        if timing.outcome.ok:
+            timed.append(replace(point, spent=min(point.spent, timing.minimum / size), prepare=prepare))
+    return timed
 
 
-def too_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
+def refuse_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
     """Return the outcome of a skipped run if a call with `size` bodies would take longer than `limit`, s."""
     for what, seconds, most in (("a call", point.spent, limit), ("preparing a call", point.prepare, PREPARATION * limit)):
         if size > 1 and seconds * size > most:
@@ -278,15 +259,12 @@ def too_long(point: BatchSetting, size: int, limit: float) -> Outcome | None:
     return None
 
 
-def rows_of(point: BatchSetting, size: int, timing: Timing) -> Iterator[Measurement]:
+def time_body(case: Case, size: int, timing: Timing, prepare: float) -> Iterator[Measurement]:
     """Yield the cost of a body in a batch: time, s per simulated second, steps per second, and preparation, s."""
-    case, a_body = point.case, timing.minimum / size
-    values = {
-        Measure.TIME: a_body / DURATION,
-        Measure.BODY_STEPS: math.nan if tolerance_setting(case.method) else case.grid.n_steps / a_body,
-        Measure.PREPARE: point.prepare,
-    }
-    for measure, value in values.items():
-        outcome = UNCOUNTED if timing.outcome.ok and math.isnan(value) else timing.outcome
-        detail = str(timing) if outcome.ok else ""
-        yield case.row(Value(measure, value), outcome, detail, bodies=size, way=point.way.text)
+    a_body = timing.minimum / size
+    yield case.time_row(Measure.TIME, a_body / DURATION, timing)
+    if timing.outcome.ok and tolerance_setting(case.method):
+        yield case.row(Value(Measure.BODY_STEPS, math.nan), UNCOUNTED)
+    else:
+        yield case.time_row(Measure.BODY_STEPS, case.grid.n_steps / a_body, timing)
+    yield case.time_row(Measure.PREPARE, prepare, timing)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from weakref import WeakKeyDictionary
@@ -18,25 +17,26 @@ from conservative.references.worker.client import EngineCrashed, EngineTimeout, 
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from .case import Case, Failure, Success, attempt
+from .case import Case, Success, attempt
 from .selection import Missing
 
 _timeouts: WeakKeyDictionary[Scene, dict[Method, tuple[float, Grid]]] = WeakKeyDictionary()
 """Limit, s, and grid of the last run that was stopped, by scene and method, so that it is not tried again."""
 
 
-def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Return the outcome of a case that may take `limit` s of wall time, if it is not known to end; see `attempt_apart`."""
-    here = is_known_to_end(case.method) and not isinstance(case.method, EngineMethod)
-    return (attempt if here else partial(attempt_apart, limit))(case, skip_missing)
+def attempt_within(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
+    """Return the result of a case. A method that is not known to end has `limit` s of wall time; see `attempt_apart`."""
+    if is_known_to_end(case.method) and not isinstance(case.method, EngineMethod):
+        return attempt(case, skip_missing)
+    return attempt_apart(limit, case, skip_missing)
 
 
-def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Return the outcome of a case that may take `limit` s of wall time; see `attempt`.
+def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
+    """Return the result of a case that has `limit` s of wall time; see `attempt`.
 
-    What is not our own may go on for ever, or end the process that it is in: it runs in another one, which is ended after the
-    limit. The trajectory is the same bit for bit. The `run` of a success prepares itself here when it is first called. A method
-    that no bytes can be made of, as it holds an open file or a lock, runs here, without a limit.
+    A method of other people may never end, or may end its process. It runs in a worker process, which is ended after the limit.
+    The trajectory is the same bit for bit. The `run` of a success is prepared in this process when it is first called. A method
+    that cannot be pickled, for example because it holds an open file, runs in this process, without a limit.
 
     Raises
     ------
@@ -55,32 +55,33 @@ def attempt_apart(limit: float, case: Case, skip_missing: bool = False) -> Succe
     except (EngineTimeout, EngineCrashed) as failure:
         if isinstance(failure, EngineTimeout):
             _timeouts.setdefault(case.scene, {})[case.method] = limit, case.grid
-        return Failure(failure.outcome)
+        return failure.outcome
     except NotTransferable:
         return attempt(case, skip_missing)
-    if isinstance(done, Failure) and done.outcome.kind is OutcomeKind.MISSING:
-        return attempt(case, skip_missing)
-    return replace(done, run=_prepare_later(case)) if isinstance(done, Success) else done
+    if isinstance(done, Success):
+        prepare = cache(lambda: case.method.prepare(case.scene, case.grid))
+        return replace(done, run=lambda: prepare()())
+    return attempt(case, skip_missing) if done.kind is OutcomeKind.MISSING else done
 
 
-def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Failure:
-    """Return the outcome of a case whose run is to be timed in this process.
+def attempt_here(limit: float, case: Case, skip_missing: bool = False) -> Success | Outcome:
+    """Return the result of a case whose run is to be timed in this process.
 
     A method that is not known to end is tried in another process first, with `limit` s of wall time; see `attempt_apart`.
     """
-    if isinstance(case.method, EngineMethod):  # its run is timed where it is
+    if isinstance(case.method, EngineMethod):  # its process times its runs
         return attempt_apart(limit, case, skip_missing)
     tried = None if is_known_to_end(case.method) else attempt_apart(limit, case, skip_missing)
-    return tried if isinstance(tried, Failure) else attempt(case, skip_missing)
+    return tried if isinstance(tried, Outcome) else attempt(case, skip_missing)
 
 
 def is_known_to_end(method: Method) -> bool:
-    """Whether the run of a method ends: of ours, and of engines that take a known number of steps and that we know."""
+    """Return whether the run of a method ends: of ours, and of our adapters of engines with a fixed number of steps."""
     return is_bounded(method) or (_is_ours(method) and method.order is not None)
 
 
 def is_bounded(method: Method) -> bool:
-    """Whether a run ends for certain: our own kernels take a known number of steps, and truths limit themselves."""
+    """Return whether a run ends for certain: our kernels take a fixed number of steps, and reference solutions have limits."""
     return bool(method.card.kernel) or isinstance(method, Missing) or (method.role == Role.TRUTH and _is_ours(method))
 
 
@@ -88,26 +89,20 @@ def _is_ours(method: Method) -> bool:
     return type(method).__module__.startswith("conservative.")
 
 
-def _find_timeout(limit: float, case: Case) -> Failure | None:
-    """Return the outcome of a case with as many steps, and as long a motion, as one that was ended after as much time."""
+def _find_timeout(limit: float, case: Case) -> Outcome | None:
+    """Return the outcome of a case that is at least as long, in steps and in time, as one that was stopped at this limit."""
     before, grid = _timeouts.get(case.scene, {}).get(case.method, (0.0, case.grid))
     longer = case.grid.n_steps >= grid.n_steps and case.grid.dt * case.grid.n_steps >= grid.dt * grid.n_steps * (1 - 1e-9)
     if limit > before or not longer:
         return None
-    return Failure(Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s"))
+    return Outcome(OutcomeKind.TIMEOUT, f"a run of {grid.n_steps} steps was ended after {before:g} s")
 
 
-def _attempt(case: Case) -> Success | Failure:
-    """Return how a case ends, without its run, which stays where it is."""
+def _attempt(case: Case) -> Success | Outcome:
+    """Return the result of a case without its run, which stays in the worker."""
     done = attempt(case, skip_missing=True)
-    return replace(done, run=_stay) if isinstance(done, Success) else done
+    return replace(done, run=_refuse) if isinstance(done, Success) else done
 
 
-def _stay() -> Trajectory:
+def _refuse() -> Trajectory:
     raise BadInput("run", "a run of another process", "a run that was prepared here")
-
-
-def _prepare_later(case: Case) -> Callable[[], Trajectory]:
-    """Return the run of a case, which is prepared when it is first called."""
-    prepare = cache(lambda: case.method.prepare(case.scene, case.grid))
-    return lambda: prepare()()

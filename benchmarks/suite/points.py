@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,12 +22,12 @@ from ..measures.convergence_order import observed_order
 from ..measures.measure import Measure
 from ..studies import selection, step_ladder
 from ..studies.case import Case, Success, attempt
-from ..studies.study import Truths
+from ..studies.study import FindTruth, remember_truths
 
 SCENES = ("brick_flip", "lagrange_top", "near_separatrix", "falling_top", "asymmetric_top")
 """The paper's two, and a motion along a separatrix, a top that loses its stability, and one without an exact solution."""
 PAPER = SCENES[:2]
-"""Where orders are fitted."""
+"""Scenes on which orders are fitted."""
 NUDGES = (-2, -1, 1, 2)
 """Changes of the start, in units of the last digit of the largest rate, whose effect is the spread of a measure."""
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
@@ -52,7 +52,7 @@ class Point:
 
     scene: Scene
     method: Method
-    truths: Truths = field(default_factory=Truths, repr=False, compare=False)
+    truths: FindTruth = field(default_factory=remember_truths, repr=False, compare=False)
 
     @cached_property
     def grid(self) -> Grid:
@@ -61,8 +61,20 @@ class Point:
 
     @property
     def id(self) -> str:
-        """Such as `brick_flip-reduced_o4-dt0.01`."""
-        return selection.identifier(self.scene, self.method, self.scene.dt)
+        """The id in pytest, such as `brick_flip-reduced_o4-dt0.01`: letters, digits, `_`, `.`, `+` and `-` only.
+
+        It contains the settings that are not defaults, and always a first setting that is a text, such as an engine's
+        integrator.
+        """
+        shown = []
+        for position, each in enumerate(fields(self.method)):
+            value = getattr(self.method, each.name)
+            if isinstance(value, str):
+                if position == 0 or value != each.default:
+                    shown.append(value.lower())
+            elif value != each.default:
+                shown.append({"order": "o", "stages": "s"}.get(each.name, each.name) + str(value))
+        return f"{self.scene.name}-{'_'.join([self.method.family, *shown])}-dt{self.scene.dt:g}"
 
     @property
     def labels(self) -> dict[str, str]:
@@ -114,7 +126,7 @@ def points() -> Iterator[Point]:
     """Yield the points: the settings of `Card.suite` of every registered method on every scene of the suite."""
     every = selection.methods(skip_missing=True, settings=lambda method: method.settings_for("suite"))
     methods = [method for method in every if method.role != Role.TRUTH]
-    truths = Truths()
+    truths = remember_truths()
     return (Point(scene, method, truths) for scene in selection.scenes(SCENES) for method in methods)
 
 
@@ -141,7 +153,7 @@ def _measure_run(trajectory: Trajectory, exact: Trajectory) -> dict[str, float]:
 
 
 def fit_order(point: Point) -> dict[str, GatedValue]:
-    """Return the observed order of the attitude; nothing where a method has or shows none."""
+    """Return the observed order of the attitude; empty if the method has no order or the errors show none."""
     scene, method = point.scene, point.method
     if method.order is None:
         return {}

@@ -13,11 +13,12 @@ from enum import Enum
 
 from conservative.outcome import Outcome
 
+from ..measures.convergence_order import Order
 from ..measures.errors import DriftClass, classify
-from .engine import EngineComparison, Fit, Observation, Spread, StepTimes, differ, ratio
+from .engine import EngineComparison, Observation, Spread, StepTimes, differ, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 3.0
-"""Orders differ if their difference is larger than the first, and than so many standard errors."""
+"""Orders differ if their difference exceeds the first, and this number of standard errors."""
 FACTOR = 3.0
 """Smallest ratio of errors, or drifts, that differ."""
 ROUND_OFF = 1e-9
@@ -52,8 +53,8 @@ class Change:
     """
 
     aspect: Aspect
-    was: Outcome | Fit | Spread
-    now: Outcome | Fit | Spread
+    was: Outcome | Order | Spread
+    now: Outcome | Order | Spread
     quantity: str = ""
     lost: bool = False
 
@@ -116,7 +117,7 @@ def direction(was: Spread, now: Spread) -> int:
 
 @dataclass(frozen=True)
 class Transition:
-    """The changes from one version to the next, with one setting on one scene; may be none."""
+    """The changes from one version to the next, with one setting on one scene; may be empty."""
 
     was: Observation
     now: Observation

@@ -19,7 +19,7 @@ TIMING = 0.5
 
 
 class Side(Protocol[Measured]):
-    """A version that settings are measured in."""
+    """A version whose settings are measured."""
 
     version: Version
 
@@ -29,7 +29,7 @@ class Side(Protocol[Measured]):
 
 @dataclass(frozen=True)
 class Line(Generic[Result, Times]):
-    """One setting on one scene: a result for each version (None if it does not have the setting), and their times."""
+    """One setting on one scene: the result of each version (None for a version without the setting), and the times."""
 
     scene: str
     setting: str
@@ -46,7 +46,7 @@ class Comparison(Generic[Result, Times]):
 
     @property
     def steps(self) -> Iterator[tuple[Line[Result, Times], Result | None, Result | None]]:
-        """Each line with its results in two consecutive versions, version by version."""
+        """Lines with their results in two consecutive versions, version by version."""
         for pair in pairwise(range(len(self.versions))):
             for line in self.lines:
                 yield line, line.results[pair[0]], line.results[pair[1]]
@@ -67,7 +67,7 @@ def compare(
     scenes
         Registered names.
     finish
-        Takes all lines and returns the times of those that are timed, by scene and setting.
+        Takes all lines and returns the measured times by scene and setting.
     tell
         Progress.
     """

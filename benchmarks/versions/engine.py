@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from conservative import registry
+from conservative.attitude import angle_between
 from conservative.card import settings_text
 from conservative.errors import BadInput
 from conservative.grid import Grid, grid_for
@@ -20,15 +21,14 @@ from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..measures.convergence_order import MIN_POINTS, observed_order
-from ..measures.errors import measure_errors
+from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from ..measures.measure import Measure
 from ..measures.timing import time_interleaved
-from ..studies import convergence, selection, step_ladder
-from ..studies.case import Case, Failure, Success
-from ..studies.speed import TimedRun, keep_end, lengthen, shorten
+from ..studies import selection, step_ladder
+from ..studies.case import Case, Success
+from ..studies.line import measure_line
+from ..studies.speed import TimedRun, keep_end, make_timed, shorten
 from ..studies.study import Study
-from ..studies.time_limit import attempt_here, attempt_within
 from .comparison import Comparison, Line, Tell, compare
 from .version import Version
 
@@ -44,6 +44,7 @@ TIME_FACTOR = 1.25
 """Smallest ratio of times that differ."""
 NO_TIME = (OutcomeKind.SKIPPED, OutcomeKind.TIMEOUT)
 NO_STEP = "its accuracy does not depend on dt"
+NO_ORDER = Order()
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Iterable[float]) -> Spread:
-        """Return the spread of values, of which the first is the one that counts; NaN are ignored."""
+        """Return the spread of values; the first is the measured value, and NaN are ignored."""
         first, *rest = values
         known = [value for value in (first, *rest) if not math.isnan(value)] or [math.nan]
         return cls(first, min(known), max(known))
@@ -73,15 +74,6 @@ class Spread:
 
 NOTHING = Spread(math.nan, math.nan, math.nan)
 """The spread of a value that could not be measured."""
-
-
-@dataclass(frozen=True)
-class Fit:
-    """An order of convergence: slope and standard error, or NaN and the reason."""
-
-    slope: float = math.nan
-    stderr: float = math.nan
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,8 +118,8 @@ class Observation:
     dt: float
     outcome: Outcome = OK
     points: tuple[StepError, ...] = ()
-    attitude_order: Fit = Fit()
-    rates_order: Fit = Fit()
+    attitude_order: Order = NO_ORDER
+    rates_order: Order = NO_ORDER
     error: Spread = NOTHING
     drifts: Mapping[str, Spread] = field(default_factory=dict)
 
@@ -139,22 +131,20 @@ def observe(study: Study, scene: Scene, method: Method, version: str) -> Observa
     cases = [Case(study.name, scene, method, Grid(scene.t_end / count, count, math.ceil(count / SAMPLES))) for count in counts]
     setting, dt = method.setting(), cases[0].grid.dt
     observation = Observation(scene=scene.name, setting=setting, version=version, label=method.label, dt=dt)
-    first = attempt_within(study.hang_limit, cases[0], study.skip_missing)
-    if isinstance(first, Failure):
-        return replace(observation, outcome=first.outcome)
-    done = [first, *(attempt_within(study.hang_limit, case, study.skip_missing) for case in cases[1:])]
+    first = study.attempt(cases[0])
+    if isinstance(first, Outcome):
+        return replace(observation, outcome=first)
+    done = [first, *map(study.attempt, cases[1:])]
     runs = [each.trajectory for each in done if isinstance(each, Success)]
     return replace(
         observation,
         points=tuple(_points(study, scene, method)),
-        error=Spread.of(_largest_error(study, run, case.grid) for run, case in zip(runs, cases, strict=False)),
+        error=Spread.of(
+            float(angle_between(study.truth(scene, case.grid).trajectory.R_WB, run.R_WB).max())
+            for run, case in zip(runs, cases, strict=False)
+        ),
         drifts={invariant.name: Spread.of(_largest_change(run, invariant) for run in runs) for invariant in scene.invariants},
     )
-
-
-def _largest_error(study: Study, run: Trajectory, grid: Grid) -> float:
-    truth = study.truth(run.scene, grid).trajectory
-    return next(each.value for each in measure_errors(run, truth) if each.measure is Measure.ATTITUDE_MAX)
 
 
 def _largest_change(run: Trajectory, invariant: Invariant) -> float:
@@ -170,18 +160,16 @@ def _points(study: Study, scene: Scene, method: Method) -> Iterator[StepError]:
         return
     truth = study.truth(scene, step_ladder.samples(scene, method)).trajectory
     cases = [Case(study.name, scene, method, grid) for grid in step_ladder.steps(scene, method)]
-    for case, done in convergence.attempt_each(study, cases):
-        if isinstance(done, Success):
-            by_measure = {each.measure: each.value for each in measure_errors(done.trajectory, truth)}
-            yield StepError(case.grid.dt, by_measure[Measure.ATTITUDE_MAX], by_measure[Measure.RATES_MAX])
-        else:
-            yield StepError(case.grid.dt, math.nan, math.nan, reached=done.outcome.kind not in NO_TIME)
+    for point in measure_line(study, cases, truth, (Measure.ATTITUDE_MAX, Measure.RATES_MAX)):
+        attitude, rates = point.errors[Measure.ATTITUDE_MAX], point.errors[Measure.RATES_MAX]
+        yield StepError(point.case.grid.dt, attitude, rates, reached=point.outcome.kind not in NO_TIME)
 
 
 def fit_orders(observations: Sequence[Observation]) -> tuple[Observation, ...]:
     """Return the observations of all versions with their orders, over the steps that every version had time for.
 
-    An order depends a little on the steps that it is fitted to. A version with too few steps for a fit takes none from others.
+    An order depends a little on the steps that it is fitted to. A version with too few steps for a fit does not limit the steps
+    of the others.
     """
     reached = [{point.dt for point in each.points if point.reached} for each in observations]
     enough = [steps for steps in reached if len(steps) >= MIN_POINTS]
@@ -193,13 +181,11 @@ def _with_orders(seen: Observation, steps: set[float]) -> Observation:
     if not seen.outcome.ok:
         return seen
     if not seen.points:
-        return replace(seen, attitude_order=Fit(reason=NO_STEP), rates_order=Fit(reason=NO_STEP))
+        return replace(seen, attitude_order=Order(reason=NO_STEP), rates_order=Order(reason=NO_STEP))
     points = [point for point in seen.points if point.dt in steps]
-    fits = []
-    for errors in ([point.attitude for point in points], [point.rates for point in points]):
-        order = observed_order([point.dt for point in points], errors)
-        fits.append(Fit(reason=order.reason) if order.reason else Fit(order.slope, order.stderr))
-    return replace(seen, attitude_order=fits[0], rates_order=fits[1])
+    times = [point.dt for point in points]
+    attitude, rates = [point.attitude for point in points], [point.rates for point in points]
+    return replace(seen, attitude_order=observed_order(times, attitude), rates_order=observed_order(times, rates))
 
 
 StepTimes = tuple[float, ...]
@@ -249,7 +235,7 @@ def plan_versions(
     scene_names
         By default those of a report that a setting supports.
     time_limit
-        Longest single run to plan for, s; see `Study`.
+        Time budget of a run, s; see `Study`.
 
     Raises
     ------
@@ -308,16 +294,14 @@ def compare_engine(sides: Sequence[EngineSide], tell: Tell) -> EngineComparison:
 def time_versions(study: Study, scene: Scene, methods: Mapping[str, Method]) -> dict[str, StepTimes]:
     """Return the times of a step by version, from rounds that go through all versions: one version computes at a time.
 
-    Versions whose run does not reach its end are left out. If a time differs from that of the version before, all are measured
-    again: a real difference appears again.
+    Versions whose run fails are left out. If a time differs from the time of the previous version, all are measured again: a
+    real difference appears again.
     """
     grid = keep_end(grid_for(scene, scene.dt))
-    ready = {}
-    for version, method in methods.items():
-        case = shorten(study, Case(study.name, scene, method, grid))
-        done = attempt_here(study.hang_limit, case, study.skip_missing)
-        if isinstance(done, Success):
-            ready[version] = TimedRun(*lengthen(case, done, study.hang_limit), done)
+    timed = {
+        version: make_timed(study, shorten(study, Case(study.name, scene, method, grid))) for version, method in methods.items()
+    }
+    ready = {version: run for version, run in timed.items() if isinstance(run, TimedRun)}
     times = _repeat(study, ready, range(REPEATS))
     if any(differ(was, now) for was, now in pairwise(times.values())):
         again = _repeat(study, ready, range(REPEATS, 2 * REPEATS))

@@ -1,17 +1,17 @@
-"""Versions of a project: errors, drifts, orders and counts judged as the gate judges a baseline, and times in turn.
+"""Versions of a project: the gate judges errors, drifts, orders and counts, as against a baseline; times are measured in turn.
 
-Errors of all versions are against one reference solution, that of this process, and drifts are computed here. Nothing that a
-version reports about itself counts, except how a run ended.
+This process measures the errors of all versions against its own reference solution, and computes the drifts. A version only
+integrates, and reports the outcome of its runs.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,7 +20,7 @@ import numpy as np
 from conservative import registry
 from conservative.errors import BadInput, IntegrationFailed
 from conservative.grid import Grid
-from conservative.method import Method, Role
+from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.scene import Scene
@@ -30,7 +30,8 @@ from ..gate import compare as gate
 from ..gate.baseline import update_baseline
 from ..gate.compare import Verdict, Violation
 from ..gate.results import Results, Row, Status, find_runaway
-from ..studies.study import Truths
+from ..studies.selection import StandIn
+from ..studies.study import FindTruth, remember_truths
 from ..suite import points
 from . import inside
 from .comparison import Comparison, Line, Tell, compare
@@ -46,7 +47,7 @@ ProjectComparison = Comparison[Row, TimeRow]
 
 
 class FailedThere(IntegrationFailed):
-    """A run of a version failed. Attribute: `outcome`, as that version has it."""
+    """A run of a version failed. Attribute: `outcome`, as that version reports it."""
 
     def __init__(self, outcome: Outcome) -> None:
         self.outcome = outcome
@@ -54,10 +55,13 @@ class FailedThere(IntegrationFailed):
 
 
 class ProjectSide:
-    """A version and its process, with its own folder of compiled kernels. `names` are methods; empty for all under test."""
+    """A version and its process, with its own folder of compiled kernels.
 
-    def __init__(self, version: Version, names: Sequence[str] = (), truths: Truths | None = None) -> None:
-        self.version, self._names, self._truths = version, list(names), truths or Truths()
+    `names` are the compared methods, by default all methods with the role `Role.OURS`.
+    """
+
+    def __init__(self, version: Version, names: Sequence[str] = (), truths: FindTruth | None = None) -> None:
+        self.version, self._names, self._truths = version, list(names), truths or remember_truths()
         kernels = version.environment.folder / "home" / "kernels"
         self._worker = version.environment.start_worker({"NUMBA_CACHE_DIR": str(kernels)})
 
@@ -81,7 +85,7 @@ class ProjectSide:
             row_id = f"{scene} / {each['name']}"
             rows[each["name"]] = Row(row_id, scene, each["name"], Status.PASSED, each["engine"], here)
         try:
-            there = _define(scene, self.ask("describe_scene", **_question(scene)))
+            there = define_scene(scene, partial(self.ask, "describe_scene"))
         except IntegrationFailed as failure:
             yield from ((name, replace(row, status=Status.ERROR, reason=str(failure.outcome))) for name, row in rows.items())
             return
@@ -96,7 +100,8 @@ class ProjectSide:
             pair = self.ask("describe_pair", scene=name, method=setting["name"])
             if pair["unsupported"]:
                 return replace(row, status=Status.SKIPPED, reason=pair["unsupported"])
-            method = Remote(self, setting["name"], setting["label"], setting["order"], name, pair["longest_step"])
+            names = setting["name"], setting["label"], setting["order"]
+            method = Remote(*names, side=self, scene_name=name, longest=pair["longest_step"])
             point = points.Point(registry.scene(name), method, self._truths)
             first = method.solve(point.scene, point.grid)
             if not first.ok:
@@ -106,19 +111,20 @@ class ProjectSide:
             return replace(row, status=Status.FAILED, reason=str(failure.outcome))
 
     def solver(self, states: States, **values: Any) -> WorkerRun[Trajectory]:
-        """Return a run that gives a trajectory."""
+        """Return a run whose result is a trajectory."""
         return WorkerRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "solve"}, **values}, states)
 
     def timed(self, scene: str, method: str, dt: float, n_steps: int) -> VersionRun:
         """Return a prepared run of n_steps steps dt, s, to be timed."""
         values = {"scene": scene, "method": method, "dt": dt, "n_steps": n_steps}
-        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, States())
+        states = States(registry.scene(scene), method)
+        run = VersionRun(self._worker, {"adapter": _ADAPTER, "settings": {"task": "time"}, **values}, states)
         run.prepare()
         return run
 
 
 class VersionRun(WorkerRun[Trajectory]):
-    """A run that is only timed."""
+    """A run that is only timed; the time does not include a conversion to a trajectory."""
 
     def __call__(self) -> Any:
         return self.wall_time(1)
@@ -131,46 +137,29 @@ class VersionRun(WorkerRun[Trajectory]):
 class States:
     """Makes trajectories of a scene from the states of a version."""
 
-    scene: Scene | None = None
-    label: str = ""
+    scene: Scene
+    label: str
 
     def trajectory(self, answer: Mapping[str, Any]) -> Trajectory:
-        assert self.scene is not None
         counts = Counters(**{name: answer["counts"].get(name) for name in _COUNTS})
         failure = answer["failure"]
         ended = FailedThere(Outcome(OutcomeKind(failure[0]), *failure[1:])) if failure else None
         return Trajectory(self.scene, answer["t"], answer["R_WB"], answer["w_WB_B"], self.label, counts, ended)
 
     def failure(self, failure: IntegrationFailed) -> Trajectory:
-        assert self.scene is not None
         return Trajectory(self.scene, np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), self.label, Counters(0), failure)
 
 
-@dataclass(frozen=True)
-class Remote(Method):
-    """A method of a version, as `Method` for studies and measures, on the scene with the name `scene_name`."""
+@dataclass(frozen=True, kw_only=True)
+class Remote(StandIn):
+    """A method of a version, on the scene with the name `scene_name` and with its longest step there, s."""
 
     side: ProjectSide = field(compare=False, repr=False)
-    its_name: str
-    its_label: str
-    its_order: int | None
     scene_name: str
     longest: float
 
     family: ClassVar[str] = "remote"
     role: ClassVar[Role] = Role.OURS
-
-    @property
-    def name(self) -> str:
-        return self.its_name
-
-    @property
-    def label(self) -> str:
-        return self.its_label
-
-    @property
-    def order(self) -> int | None:
-        return self.its_order
 
     def longest_step(self, scene: Scene) -> float:
         return self.longest
@@ -181,16 +170,9 @@ class Remote(Method):
         return self.side.solver(States(scene, self.label), scene=self.scene_name, method=self.name, **values)
 
 
-def _question(scene: str) -> dict[str, Any]:
-    return {"scene": scene, "probes": np.array(points.PROBES)}
-
-
-def define_scene(name: str) -> str:
-    """Return the hash of a scene as this process has it. Raise `BadInput` if it does not."""
-    return _define(name, inside.describe_scene(**_question(name)))
-
-
-def _define(name: str, answer: Mapping[str, Any]) -> str:
+def define_scene(name: str, describe: Callable[..., Mapping[str, Any]] = inside.describe_scene) -> str:
+    """Return the hash of a scene, by default as this process has it. Raise `BadInput` if it does not have the scene."""
+    answer = describe(scene=name, probes=np.array(points.PROBES))
     numbers = [answer[each] for each in ("inertia", "R_WB0", "w_WB_B0", "ends", "energies")]
     return points.define([name, *answer["invariants"]], numbers)
 
@@ -233,7 +215,7 @@ def compare_projects(
     for name in scenes:
         define_scene(name)  # before any work
     with ExitStack() as stack:
-        truths = Truths()
+        truths = remember_truths()
         sides = ProjectSide(base, methods, truths), ProjectSide(head, methods, truths)
         for side in sides:
             stack.callback(side.close)
@@ -241,15 +223,15 @@ def compare_projects(
         def finish(lines: Sequence[ProjectLine]) -> dict[tuple[str, str], TimeRow]:
             if not lines:
                 raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
-            good = [line for line in lines if all(each is not None and _has_values(each) for each in line.results)]
+            good = [
+                line
+                for line in lines
+                if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
+            ]
             timed = [Timed(line.scene, line.setting, registry.scene(line.scene).dt) for line in good]
             return compare_times(*sides, timed, processes)
 
         return compare(sides, scenes, finish, tell)
-
-
-def _has_values(row: Row) -> bool:
-    return row.status is Status.PASSED and not row.reason
 
 
 def judge(comparison: ProjectComparison) -> Verdict:
@@ -274,7 +256,7 @@ def _time_violations(line: ProjectLine) -> Iterator[Violation]:
 
 
 def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]:
-    """Yield findings that are not violations, and the reasons of rows without values."""
+    """Yield the notes on a row: missing rows, reasons of rows without values, and times that changed."""
     name, time = f"{line.scene}, {line.setting}", line.times
     for when, row in (("was", was), ("is", now)):
         if row is None:

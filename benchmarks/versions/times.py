@@ -1,12 +1,14 @@
 """Times of two versions against each other: sampled in turn, in several processes of each, with an interval for their ratio.
 
-Three things besides the code change a time. Other processes interrupt: so samples are short and many, both versions take
-theirs in turn, and the shortest of each counts. The place of machine code and data in memory can make a loop several percent
-slower for the life of a process: so both versions are started again and again, data is laid out several times in each process,
-and the faster half of the processes counts. The machine has slow spells of seconds: so a slower row is measured again.
+Three things besides the code change a time:
 
-The interval is a bootstrap of whole processes, those of one time together (Efron and Tibshirani, An Introduction to the
-Bootstrap, 1993, chapter 13); samples of one process would say nothing about another process.
+* Other processes interrupt. Samples are therefore short and many, both versions take turns, and the shortest sample counts.
+* The place of machine code and data in memory can make a loop several percent slower for the life of a process. Both versions
+  are therefore started repeatedly, data is placed several times in each process, and the faster half of the processes counts.
+* The machine can be slow for seconds. A slower row is therefore measured again.
+
+The interval is a bootstrap of whole processes, in pairs that ran at the same time (Efron and Tibshirani, An Introduction to the
+Bootstrap, 1993, chapter 13); samples of one process contain no information about other processes.
 """
 
 from __future__ import annotations
@@ -24,9 +26,9 @@ from conservative.errors import IntegrationFailed
 from ..measures.timing import wall_time
 
 SLOWER = 0.05
-"""Part by which a row may become slower."""
+"""Fraction by which a row may become slower."""
 CONFIDENCE = 0.99
-"""Confidence of each end of an interval: how surely the true ratio is above the lower end, and how surely below the upper."""
+"""Probability that the true ratio is above the lower end of an interval, and probability that it is below the upper end."""
 PROCESSES = 7
 """Processes of each version in a measurement."""
 ROUNDS = 50
@@ -34,11 +36,11 @@ ROUNDS = 50
 LAYOUTS = 3
 """Runs of each version in a process, each with its data elsewhere."""
 MOST_TURNS = 6
-"""Most measurements of so many processes each, until it is no longer open whether a row is slower."""
+"""Largest number of measurements for a row whose interval contains the limit."""
 SAMPLE = 0.0004
 """Duration of a sample, s: most fit between two interruptions."""
 MOST_STEPS, MOST_CALLS = 2**20, 10_000
-"""Most steps of a run and most calls of it in a sample, if they take no time."""
+"""Largest number of steps of a run, and of calls in a sample."""
 RESAMPLES = 4999
 
 
@@ -66,7 +68,7 @@ class Timed:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Time of the later version in times of the earlier one: value, ends of the interval, and from how many processes."""
+    """Time of the later version divided by that of the earlier one: value, interval, and number of processes."""
 
     value: float
     low: float
@@ -75,12 +77,12 @@ class Ratio:
 
     @property
     def slower(self) -> bool:
-        """Whether it is slower than allowed beyond doubt."""
+        """True if the whole interval is above the limit."""
         return self.low > 1 + SLOWER
 
     @property
     def open(self) -> bool:
-        """Whether the interval contains the limit, so that more processes are needed."""
+        """True if the interval contains the limit, so that more processes are needed."""
         return self.low <= 1 + SLOWER < self.high
 
 
@@ -96,7 +98,7 @@ class TimeRow:
 
     @property
     def failed(self) -> bool:
-        """Whether the row is slower, each time that it was measured, or could not be timed."""
+        """True if the row was slower both times, or could not be timed."""
         return bool(self.reason) or (self.first.slower and self.again is not None and self.again.slower)
 
 
@@ -106,7 +108,7 @@ Times = dict[Key, list[tuple[float, float]]]
 
 
 def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[Key, TimeRow]:
-    """Return the times of two versions by scene and method; rows that are slower beyond doubt are measured again."""
+    """Return the times of two versions by scene and method; rows that are slower are measured again."""
     clock = Clock(base, head)
     first = settle(clock, rows, processes)
     ratios = {row.key: ratio_of(first[row.key]) for row in rows}
@@ -122,7 +124,7 @@ def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes
 
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
-    """Return the times of rows from so many processes, and from more for rows whose interval contains the limit."""
+    """Return the times of rows from a number of processes, and from more for rows whose interval contains the limit."""
     times_by_key: Times = {row.key: [] for row in rows}
     for _ in range(MOST_TURNS):
         for key, times in clock.measure(rows, processes).items():
@@ -132,7 +134,7 @@ def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
 
 
 class Clock:
-    """Measures rows in new processes each time. Attribute: `failures`, why rows have no times, by scene and method."""
+    """Measures rows in new processes each time. `failures` has the reasons of rows without times, by scene and method."""
 
     def __init__(self, base: Process, head: Process) -> None:
         self._sides = base, head
@@ -140,7 +142,7 @@ class Clock:
         self.failures: dict[Key, str] = {}
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
-        """Return the times of rows from so many processes."""
+        """Return the times of rows from a number of processes."""
         times_by_key: Times = {row.key: [] for row in rows}
         for turn in range(processes if rows else 0):
             for side in self._sides:
@@ -168,7 +170,7 @@ class Clock:
 
 
 def last_a_sample(prepare: Callable[[int], Callable[[], Any]]) -> tuple[int, Callable[[], Any]]:
-    """Return the number of steps that take as long as a sample, to several percent, and the run that takes them."""
+    """Return the number of steps that take as long as a sample, to several percent, and their run."""
     n = 16
     while True:
         run = prepare(n)

@@ -82,7 +82,7 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
 
 
 def _wheel_of_commit(commit_hash: str, project: Path, source: Source) -> Path:
-    """Return the wheel of a commit: a kept one, or a new one built from the files of the commit."""
+    """Return the wheel of a commit: a stored one, or a new one built from the files of the commit."""
     inside, top = git(project, "rev-parse", "--show-prefix"), git(project, "rev-parse", "--show-toplevel")
 
     def make_wheel(folder: Path) -> Path:

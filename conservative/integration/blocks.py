@@ -17,11 +17,11 @@ import numpy as np
 
 from ..attitude import Array
 from ..batch import Batch
+from ..drifts import arrange_drifts, find_reference
 from ..errors import BadInput, IntegrationFailed, NotRun
 from ..grid import Grid
 from ..method import Method
 from ..methods.many import Block, pause, watch
-from .drifts import find_drifts, list_drifts
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
 """Bodies of a block at most, and about how many bytes its samples take at most."""
@@ -40,7 +40,7 @@ class BlockResult:
     R_WB, w_WB_B
         Attitudes (n, m, 3, 3), body to world, and angular velocities (n, m, 3), rad/s, body axes; nan after a failure.
     drifts
-        Largest drifts (n, k), dimensionless, by the names that `conservative.integration.drifts.list_drifts` has of the bodies.
+        Largest drifts (n, k), dimensionless, by the names that `conservative.drifts.list_drifts` has of the bodies.
     failures
         The failures of those that did not reach their end, by their indices in the block.
     """
@@ -66,36 +66,39 @@ def list_blocks(n: int, grid: Grid) -> range:
 
 def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
     """Return the samples of bodies, whose outcomes are those of `Method.solve` for each of them alone."""
-    run = method.prepare_many(bodies, grid)
-    n, m = len(bodies), grid.n_samples
-    block = run() if run else Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool))
-    found = find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B) if run else None
-    good = np.zeros(n, dtype=bool) if found is None else block.finished & are_conserved(method, bodies, grid, found.bounded)
+    n, m, run, reference = (
+        len(bodies),
+        grid.n_samples,
+        method.prepare_many(bodies, grid),
+        find_reference(bodies, method.conserves),
+    )
+    if run is None:
+        block, alone = Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool)), np.arange(n)
+    else:
+        block = run()
+        measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
+        alone = np.flatnonzero(~(block.finished & are_accepted(method, bodies, grid, measured)))
     failures = {}
-    for i in np.flatnonzero(~good).tolist():
+    for i in alone.tolist():
         pause()
         failure = run_alone(method, bodies, grid, i, block)
         if failure is not None:
             failures[i] = failure
-    if found is None or not good.all():
-        found = find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B)
-    return BlockResult(block.R_WB, block.w_WB_B, found.values, failures)
+    if len(alone):
+        measured = reference.measure(grid, grid.t, block.R_WB, block.w_WB_B)
+    return BlockResult(block.R_WB, block.w_WB_B, arrange_drifts(bodies, measured, block.R_WB, block.w_WB_B), failures)
 
 
-def are_conserved(method: Method, bodies: Batch, grid: Grid, bounded: Array) -> Any:
-    """Return which of n bodies (n,) are within the bounds of a method, by their drifts (n, k), dimensionless.
+def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> Any:
+    """Return which of n bodies (n,) are within the bounds of a method, by their drifts (n, 5) of `ReferenceValues.measure`.
 
-    Bounds grow with the ratio of a body's moments. So those of the body with the smallest ratio hold for all, and only bodies
-    beyond them need their own.
+    Bounds grow with the ratio of the moments. So those of the body with the smallest ratio hold for all, and only bodies beyond
+    them need their own.
     """
-    names, kept = list_drifts(bodies), method.conserves
-    own = {each.name for each in bodies.scene.extra_invariants}
-    columns = [column for column, name in enumerate(names) if column > 0 and name in kept and name not in own]
-    skew, drift = bounded[:, 0], np.nan_to_num(bounded[:, columns], nan=np.inf).max(axis=1, initial=0.0)
 
     def are_within(i: int, part: Any) -> Any:
         bounds = method.bounds(bodies.take(i), grid)
-        return (drift[part] <= bounds.drift) & (skew[part] <= bounds.orthonormality)
+        return (measured[part, 4] <= bounds.drift) & (measured[part, 0] <= bounds.orthonormality)
 
     if bodies.inertia is None:
         return are_within(0, slice(None))

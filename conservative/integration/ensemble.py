@@ -16,16 +16,15 @@ from numpy.typing import ArrayLike
 from ..attitude import Array
 from ..batch import Batch
 from ..check import choice as require_choice
+from ..drifts import arrange_drifts, find_reference, list_drifts
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
-from ..methods.run_kernel import build_whole
 from ..outcome import OK, Choice, Counters, Outcome
 from ..presentation import COLUMNS
 from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
 from .blocks import BlockResult
-from .drifts import find_drifts, list_drifts
 from .store import read_store, write_store
 
 if TYPE_CHECKING:
@@ -243,30 +242,6 @@ def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
     return Ensemble(**read_store(path, scene))
 
 
-@dataclass(frozen=True, eq=False)
-class DriftsOnDemand(Mapping[str, Array]):
-    """The drifts of an ensemble of one body, whose `Method.solve` has a check of its own: they are found when asked for."""
-
-    bodies: Batch
-    grid: Grid
-    R_WB: Array
-    w_WB_B: Array
-
-    @cached_property
-    def _values(self) -> dict[str, Array]:
-        found = find_drifts(self.bodies, self.grid.t, self.R_WB, self.w_WB_B).values
-        return dict(zip(list_drifts(self.bodies), found.T, strict=True))
-
-    def __getitem__(self, name: str) -> Array:
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-
 def ensemble_of_one(bodies: Batch, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
     """Return the ensemble of one body whose trajectory is known."""
     R_WB, w_WB_B, failures = found.R_WB[None], found.w_WB_B[None], {}
@@ -275,6 +250,6 @@ def ensemble_of_one(bodies: Batch, grid: Grid, found: Trajectory, choice: Choice
         R_WB = np.pad(R_WB, (*missing, (0, 0), (0, 0)), constant_values=np.nan)
         w_WB_B = np.pad(w_WB_B, (*missing, (0, 0)), constant_values=np.nan)
         failures[0] = found.failure
-    samples = {"bodies": bodies, "grid": grid, "R_WB": R_WB, "w_WB_B": w_WB_B}
-    drifts, rest = build_whole(DriftsOnDemand, samples), {"label": found.label, "failures": failures, "choice": choice}
-    return build_whole(Ensemble, {**samples, "drifts": drifts, **rest})
+    measured = find_reference(bodies).measure(grid, grid.t, R_WB, w_WB_B)
+    drifts = dict(zip(list_drifts(bodies), arrange_drifts(bodies, measured, R_WB, w_WB_B).T, strict=True))
+    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, found.label, failures, choice)

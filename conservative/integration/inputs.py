@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..attitude import ROTATION_TOLERANCE, Array
+from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
 from ..batch import Batch
 from ..body import RigidBody
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, rotation
-from ..deferred_imports import kernels
 from ..errors import BadInput, nearest
 from ..potentials.turning import static_part
 from ..scene import Scene
@@ -53,7 +52,8 @@ def read_bodies(
     R = given.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
     w = given.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
     if "R_WB0" in given:
-        good = kernels("drifts_of_many").are_rotations(np.ascontiguousarray(R), ROTATION_TOLERANCE)
+        with np.errstate(all="ignore"):
+            good = (orthonormality(R) <= ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
         _refuse_first("R_WB0", R, ~good, lambda each: rotation("R_WB0", each))
     if "w_WB_B0" in given:
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..batch import Batch
 from ..check import describe, positive_integer, positive_number
+from ..drifts import list_drifts
 from ..errors import BadInput, IntegrationFailed
 from ..grid import SAMPLE_BYTES, Grid, grid_for, most_samples
 from ..method import Method
@@ -25,7 +26,6 @@ from ..scene import Scene
 from .blocks import SAMPLE_BYTES as KEPT_BYTES
 from .blocks import BlockResult, list_blocks, run_blocks, start_threads
 from .cluster import start_executor
-from .drifts import list_drifts
 from .ensemble import Ensemble, ensemble_of_one, open_ensemble
 from .inputs import read_bodies
 from .one import DEFAULT_DT, interrupt_of, read_method, require_support

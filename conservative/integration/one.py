@@ -1,4 +1,4 @@
-"""`integrate`: a scene, a method and a step, checked, to a trajectory or an exception that says what failed."""
+"""`integrate`: a scene, a method and a step size to a checked trajectory, or an exception with the failure."""
 
 from __future__ import annotations
 
@@ -22,33 +22,36 @@ from ..scene import Scene
 from ..trajectory import Trajectory
 
 DEFAULT_DT = 0.01
-"""Step, s, where nobody names one: the paper's."""
+"""Default step size, s: the paper's."""
 
 
 def require_support(method: Method, scene: Scene) -> None:
-    """Raise `Unsupported` if the method cannot do the scene."""
+    """Raise `Unsupported` if the method does not support the scene."""
     reason = method.unsupported(scene)
     if reason:
         raise Unsupported("method", f"{method.name} for the scene {scene.name!r}", f"a scene that it supports ({reason})")
 
 
+_REDUCED = Reduced()
+
+
 def default_method(scene: Scene) -> Method:
-    """Return what a scene is integrated with where nobody names a method."""
-    first = Reduced()
-    return first if first.unsupported(scene) is None else (*candidates(scene), first)[0]
+    """Return the default method for a scene."""
+    return _REDUCED if _REDUCED.unsupported(scene) is None else (*candidates(scene), _REDUCED)[0]
 
 
 def read_method(method: object, scene: Scene) -> Method:
-    """Return a method from what users give: one, the name of one, or None for that of the scene.
+    """Return a method given as a `Method`, by its name, or as None for the default method of the scene.
 
     Raises
     ------
     BadInput
-        It is none of these.
+        The argument is something else, or the name is unknown.
     """
+    if method is None:
+        return default_method(scene)
     if isinstance(method, str):
         method = registry.method(method)
-    method = default_method(scene) if method is None else method
     if not isinstance(method, Method):
         raise BadInput("method", describe(method), "a Method, such as Reduced(), or the name of one, such as 'mujoco:RK4'")
     return method
@@ -118,70 +121,61 @@ def integrate(
     choice("on_failure", on_failure, ("raise", "return"))
     if progress is not None and not callable(progress):
         raise BadInput("progress", describe(progress), "a function of a Progress, such as print, or None")
-    at = None if t_eval is None else _read_t_eval(scene, t_end, sample_every, t_eval)
+    at = None
+    if t_eval is not None:
+        if sample_every != 1:
+            allowed = "1, the default, together with t_eval, which has the samples"
+            raise BadInput("sample_every", describe(sample_every), allowed)
+        at = read_times(t_eval, read_end(scene, t_end))
     try:
         if error is not None:
-            _require_choice(error, dt, method, at)
-            trajectory = _integrate_to(error, scene, dt, t_end, sample_every, at, progress)
+            trajectory = _integrate_to(error, scene, method, dt, read_end(scene, t_end), sample_every, at, progress)
         else:
-            trajectory = _integrate_with(method, scene, dt, t_end, sample_every, at)
+            method = read_method(method, scene)
+            grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every if at is None else MOST_STEPS)
+            require_support(method, scene)
+            if at is None:
+                trajectory = method.solve(scene, grid)
+            else:
+                grid = grid_before(scene, method, grid.dt, at)
+                trajectory = sample_between(method.solve(scene, grid), method, grid, at)
     except SystemError as failure:
-        raise interrupt_of(failure)  # noqa: B904  # where it is the failure itself, its own reasons stay
+        raise interrupt_of(failure)  # noqa: B904  # if it is the failure itself, it keeps its own cause
     if trajectory.failure is not None and on_failure == "raise":
         raise trajectory.failure
     return trajectory
 
 
 def interrupt_of(failure: SystemError) -> BaseException:
-    """Return the interrupt that came while Python called machine code, which makes `SystemError`s of it; else the failure."""
+    """Return the interrupt that is the cause of a `SystemError`, as one during a call of machine code is; else the failure."""
     reason: BaseException | None = failure
     while isinstance(reason, SystemError):
         reason = reason.__cause__ or reason.__context__
     return reason if isinstance(reason, KeyboardInterrupt) else failure
 
 
-def _read_t_eval(scene: Scene, t_end: float | None, sample_every: int, t_eval: ArrayLike | int) -> Array:
-    """Return the times of samples, s, that `integrate` was asked for."""
-    if sample_every != 1:
-        raise BadInput("sample_every", describe(sample_every), "1, the default, together with t_eval, which says what is kept")
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
-    return read_times(t_eval, end)
-
-
-def _require_choice(error: float, dt: float | None, method: Method | str | None, at: Array | None) -> None:
-    """Raise `BadInput` unless a method and a step can be chosen for an error, rad, with no step dt, s, asked for as well."""
-    positive_number("error", error, "a finite attitude error above 0, rad")
-    if method is not None:
-        raise BadInput("method", describe(method), "None together with error, which chooses the method")
-    if dt is not None and at is not None:
-        raise BadInput(
-            "dt", describe(dt), "None together with error, which chooses the step, and t_eval, which has the samples"
-        )
-
-
-def _integrate_with(
-    method: Method | str | None, scene: Scene, dt: float | None, t_end: float | None, sample_every: int, at: Array | None
-) -> Trajectory:
-    method = read_method(method, scene)
-    step = DEFAULT_DT if dt is None else dt
-    grid = grid_for(scene, step, t_end, sample_every if at is None else MOST_STEPS)
-    require_support(method, scene)
-    if at is None:
-        return method.solve(scene, grid)
-    grid = grid_before(scene, method, grid.dt, at)
-    return sample_between(method.solve(scene, grid), method, grid, at)
+def read_end(scene: Scene, t_end: float | None) -> float:
+    """Return the duration of a run, s; the scene's if t_end is None."""
+    return scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
 
 
 def _integrate_to(
     error: float,
     scene: Scene,
+    method: Method | str | None,
     dt: float | None,
-    t_end: float | None,
+    end: float,
     sample_every: int,
     at: Array | None,
     progress: Callable[[Progress], object] | None,
 ) -> Trajectory:
-    end = scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
+    """Return the trajectory for a target error, rad, up to the time `end`, s."""
+    positive_number("error", error, "a finite attitude error above 0, rad")
+    if method is not None:
+        raise BadInput("method", describe(method), "None together with error, which chooses the method")
+    if dt is not None and at is not None:
+        allowed = "None together with error, which chooses the step, and t_eval, which has the samples"
+        raise BadInput("dt", describe(dt), allowed)
     spacing = None if dt is None else grid_for(scene, dt, end).dt
     samples = Samples(spacing, positive_integer("sample_every", sample_every), at)
     return integrate_to_error(scene, error, end if at is None else at[-1] or end, samples, progress)

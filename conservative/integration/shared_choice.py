@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..batch import Batch
+from ..drifts import field_scales, momenta_of
 from ..errors import AccuracyNotReached
 from ..grid import Grid
 from ..method import Method
@@ -26,7 +27,6 @@ from ..methods.between import Samples
 from ..methods.search import find_cheapest
 from ..methods.trials import Estimate, trials_of
 from ..outcome import ChoiceForMany
-from .drifts import field_scales, momenta_of
 
 HARDEST, RANDOM, VERIFIED = 3, 5, 8
 """Numbers of bodies for which the step is chosen (the fastest ones and random ones), and on which it is verified."""

@@ -43,6 +43,7 @@ from .. import files
 from ..attitude import Array
 from ..batch import Batch
 from ..check import build_unchecked, describe, read_only
+from ..drifts import list_drifts
 from ..errors import (
     BadInput,
     Diverged,
@@ -60,7 +61,6 @@ from ..outcome import Outcome, OutcomeKind
 from ..scene import Scene
 from ..version import VERSION
 from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, count_bodies
-from .drifts import list_drifts
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
 NEW_FOLDER = "a folder that is not there yet, in one that can be written, on a disk with room for it"

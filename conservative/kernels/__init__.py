@@ -41,21 +41,34 @@ def _can_cache() -> bool:
 CACHED = COMPILED and _can_cache()
 """Whether compiled code is kept for the next process."""
 
-kernel: Any = partial(njit, cache=CACHED, error_model="numpy")
-"""The one way a kernel is compiled: cached, IEEE arithmetic as written (no fastmath: compensated sums must survive)."""
+entry: Any = partial(njit, cache=CACHED, error_model="numpy", nogil=True)
+"""Compile a function that Python calls and that runs long: without the interpreter's lock, so that other threads go on."""
+
+brief: Any = partial(njit, cache=CACHED, error_model="numpy")
+"""Compile a function that Python calls and that takes microseconds. It keeps the interpreter's lock: giving it up and taking it
+again is expensive where many threads want it."""
 
 SMALL: Any = {"forceinline": True, "fastmath": {"contract"}}
-"""Options of small functions in the inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
+"""Options of small functions in inner loops: no calls, and a product that is added at once is rounded once (FMA)."""
 
-entry: Any = partial(kernel, nogil=True)
-"""How what runs long is compiled: other threads go on meanwhile. Giving the interpreter's lock up and taking it again is dear
-where many threads want it, so that what Python calls many times a step keeps it."""
+
+def kernel(function: Any, **options: Any) -> Any:
+    """Compile a function that only kernels call (`parts`).
+
+    IEEE arithmetic as written: no fastmath, as compensated sums must survive.
+    """
+    if not COMPILED:
+        return function
+    from .parts import as_part
+
+    return as_part(function, error_model="numpy", **options)
+
 
 small: Any = partial(kernel, **SMALL)
-"""How those are compiled. Contraction is safe in compensated sums, which have no product to contract with."""
+"""Compile a small function in an inner loop. Contraction is safe in compensated sums: they have no product to contract with."""
 
 
-def _digest(package: Path) -> str:
+def digest(package: Path) -> str:
     """Return a digest of all source files that kernels are compiled from."""
     found = hashlib.sha256()
     for file in (package / "arithmetic.py", *sorted(package.glob("kernels/*.py")), *sorted(package.glob("potentials/*.py"))):
@@ -66,13 +79,13 @@ def _digest(package: Path) -> str:
 
 def _drop_stale_code(cache: Path, sources: Path) -> None:
     """Delete numba's indices in `cache`, without which it finds nothing, unless they are of the `sources` as they are."""
-    stamp, digest = cache / "sources.sha256", _digest(sources)
-    if stamp.exists() and stamp.read_text() == digest:
+    stamp, current = cache / "sources.sha256", digest(sources)
+    if stamp.exists() and stamp.read_text() == current:
         return
     for index in cache.glob("*.nbi"):
         index.unlink(missing_ok=True)  # another process may be at it
-    write_text(stamp, digest, "NUMBA_CACHE_DIR")
+    write_text(stamp, current, "NUMBA_CACHE_DIR")
 
 
 if CACHED:
-    _drop_stale_code(Path(kernel(lambda: None).stats.cache_path), Path(__file__).parents[1])
+    _drop_stale_code(Path(brief(lambda: None).stats.cache_path), Path(__file__).parents[1])

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import kernel
+from . import brief, kernel
 from .fields import finite_derivative
 
 
@@ -24,7 +24,7 @@ def skew(a):
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-@kernel
+@brief
 def G(q):
     """(8): w = -1/2 G(q) qdot and G(q) p = -L, (3, 9). Linear in q, with G(a) b = -G(b) a."""
     out = np.zeros((3, 9))
@@ -71,14 +71,14 @@ def S(kappa):
     return times_identity(np.array([[k[0], k[5], k[4]], [k[5], k[1], k[3]], [k[4], k[3], k[2]]]))
 
 
-@kernel
+@brief
 def conjugate_momentum(q, L):
     """(12) on a rigid motion: [p1 p2 p3] = 1/2 Q hat(L), for which G(q) p = -L and (17) C(q) p = 0 hold, (9,)."""
     Q = q.copy().reshape(3, 3).T
     return (0.5 * (Q @ skew(L))).T.copy().reshape(9)
 
 
-@kernel
+@brief
 def residual_and_tangent(dt, J_inverse, V_star, dV_star, q0, p0, q1, p1):
     """Return r (18,) of (27a, b) with (23), (25), (26) and K = dr/du (18, 18) of (29), analytic.
 
@@ -125,7 +125,7 @@ def residual_and_tangent(dt, J_inverse, V_star, dV_star, q0, p0, q1, p1):
     return r, K
 
 
-@kernel
+@brief
 def finite_gradient(field, q0, q1):
     """V* (9,) between base vectors q0 and q1, and its derivative by q1 (9, 9)."""
     return finite_derivative(field, q0, q1)

@@ -1,56 +1,87 @@
-"""Whether samples keep what a motion keeps, at once: what every run of a compiled method is asked.
+"""Largest drifts of the invariants of n bodies over their samples.
 
-Source: the definitions in `conservative.invariants`, which is asked sample by sample where the answer here is no.
+The definitions are those of `conservative.invariants`; `conservative.drifts` fills the reference values.
 """
 
 from __future__ import annotations
 
-from . import kernel, small
+import math
+
+from . import entry, small
 
 
 @small
-def departure(R, w, V, J, constants):
-    """Sum of the sizes of what an attitude R (3, 3) and rates w (3,) are off by, as `are_kept` has it."""
-    x = J[0, 0] * w[0] + J[0, 1] * w[1] + J[0, 2] * w[2]
-    y = J[1, 0] * w[0] + J[1, 1] * w[1] + J[1, 2] * w[2]
-    z = J[2, 0] * w[0] + J[2, 1] * w[1] + J[2, 2] * w[2]
-    energy = 0.5 * (x * w[0] + y * w[1] + z * w[2]) + V
-    total = abs((energy - constants[0, 3]) * constants[0, 0])
-    X = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
-    Y = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
-    Z = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
-    for row in range(1, 4):
-        total += abs(constants[row, 0] * X + constants[row, 1] * Y + constants[row, 2] * Z - constants[row, 3])
-    return total + abs(constants[4, 0] * x + constants[4, 1] * y + constants[4, 2] * z - constants[4, 3])
+def transform(A, x):
+    """Return A x for a matrix A (3, 3) and a vector x (3,)."""
+    return (
+        A[0, 0] * x[0] + A[0, 1] * x[1] + A[0, 2] * x[2],
+        A[1, 0] * x[0] + A[1, 1] * x[1] + A[1, 2] * x[2],
+        A[2, 0] * x[0] + A[2, 1] * x[1] + A[2, 2] * x[2],
+    )
 
 
 @small
-def skewness(R):
-    """Sum of the sizes of the components of R'R - 1, those off the diagonal once."""
-    total = abs(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0] + R[2, 0] * R[2, 0] - 1.0)
-    total += abs(R[0, 1] * R[0, 1] + R[1, 1] * R[1, 1] + R[2, 1] * R[2, 1] - 1.0)
-    total += abs(R[0, 2] * R[0, 2] + R[1, 2] * R[1, 2] + R[2, 2] * R[2, 2] - 1.0)
-    total += abs(R[0, 0] * R[0, 1] + R[1, 0] * R[1, 1] + R[2, 0] * R[2, 1])
-    total += abs(R[0, 1] * R[0, 2] + R[1, 1] * R[1, 2] + R[2, 1] * R[2, 2])
-    return total + abs(R[0, 2] * R[0, 0] + R[1, 2] * R[1, 0] + R[2, 2] * R[2, 0])
+def largest_skewness(R):
+    """Return the largest component of |R'R - 1|."""
+    worst = abs(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0] + R[2, 0] * R[2, 0] - 1.0)
+    worst = max(worst, abs(R[0, 1] * R[0, 1] + R[1, 1] * R[1, 1] + R[2, 1] * R[2, 1] - 1.0))
+    worst = max(worst, abs(R[0, 2] * R[0, 2] + R[1, 2] * R[1, 2] + R[2, 2] * R[2, 2] - 1.0))
+    worst = max(worst, abs(R[0, 0] * R[0, 1] + R[1, 0] * R[1, 1] + R[2, 0] * R[2, 1]))
+    worst = max(worst, abs(R[0, 1] * R[0, 2] + R[1, 1] * R[1, 2] + R[2, 1] * R[2, 2]))
+    return max(worst, abs(R[0, 2] * R[0, 0] + R[1, 2] * R[1, 0] + R[2, 2] * R[2, 0]))
 
 
-@kernel
-def are_kept(dt, every, n_steps, t, R_WB, w_WB_B, V, J, constants, drift, orthonormality):
-    """Whether all samples are at their times, finite and within the bounds; where it is close, the answer may be no.
+@entry
+def measure(dt, every, n_steps, t, R_WB, w_WB_B, V, reference, drifts):
+    """Measure the largest drifts of n bodies over m samples.
 
-    Times are t (n,), s, attitudes R_WB (n, 3, 3), rates w_WB_B (n, 3), rad/s, body axes, V potential energies (n,), J, and J
-    the inertia (3, 3), kg m^2, body axes. With `constants` (5, 4), each row a, b, c, d, what is kept to `drift` is
+    Parameters
+    ----------
+    dt, every, n_steps, t
+        Step, s, and number of steps of the grid, and the times (m,), s, at which the samples should be its.
+    R_WB, w_WB_B
+        Attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    V
+        Energies (n, m), J, to add to the kinetic ones; (0, 0) if there are none.
+    reference
+        Rows (n, 10, 3). With J the inertia, kg m^2, and S the reference scale of momentum, kg m^2/s:
 
-        row 0        (energy - d) a
-        rows 1 to 3  (a, b, c) . R J w - d
-        row 4        (a, b, c) . J w - d
+            0 to 2    J, body axes
+            3 to 5    directions along which momentum is conserved, world axes, divided by S; otherwise 0
+            6         the initial momentum along them, divided by S
+            7         the symmetry axis, body axes, divided by S; otherwise 0
+            8         initial energy, J; 1 / reference scale of the energy; initial axial momentum / S
+            9         weights of energy, momentum and axial momentum in the last column of `drifts`; 0 if not conserved
+    drifts
+        Filled with the largest drifts (n, 5), dimensionless: orthonormality, energy, momentum, axial momentum, and the largest
+        of the last three times their weights. They are nan if a sample is not finite, or not at its time.
     """
-    for i in range(len(t)):
-        # Samples end with the last step, which is no multiple of `every` where that does not divide n_steps.
-        if t[i] != min(i * every, n_steps) * dt:
-            return False
-        # No comparison with what is not a number is true.
-        if not (skewness(R_WB[i]) <= orthonormality and departure(R_WB[i], w_WB_B[i], V[i], J, constants) <= drift):
-            return False
-    return True
+    for k in range(len(t)):
+        # The last sample is that of the last step, whose number need not be a multiple of `every`.
+        if t[k] != min(k * every, n_steps) * dt:
+            drifts[:] = math.nan
+            return
+    for i in range(len(R_WB)):
+        at, axes = reference[i], reference[i, 3:6]
+        skew = energy = momentum = axial = total = 0.0
+        for k in range(len(t)):
+            R, w = R_WB[i, k], w_WB_B[i, k]
+            L_B = transform(at, w)
+            E = 0.5 * (L_B[0] * w[0] + L_B[1] * w[1] + L_B[2] * w[2])
+            if len(V):
+                E += V[i, k]
+            L = transform(axes, transform(R, L_B))
+            a, b, c = L[0] - at[6, 0], L[1] - at[6, 1], L[2] - at[6, 2]
+            of_R = largest_skewness(R)
+            of_energy = abs((E - at[8, 0]) * at[8, 1])
+            of_momentum = a * a + b * b + c * c
+            of_axial = abs(at[7, 0] * L_B[0] + at[7, 1] * L_B[1] + at[7, 2] * L_B[2] - at[8, 2])
+            skew, energy = max(skew, of_R), max(energy, of_energy)
+            momentum, axial = max(momentum, of_momentum), max(axial, of_axial)
+            total += of_R + of_energy + of_momentum + of_axial  # a sum is nan if a term is, a maximum need not be
+        momentum = math.sqrt(momentum)
+        if math.isfinite(total):
+            drifts[i, 0], drifts[i, 1], drifts[i, 2], drifts[i, 3] = skew, energy, momentum, axial
+            drifts[i, 4] = max(energy * at[9, 0], max(momentum * at[9, 1], axial * at[9, 2]))
+        else:
+            drifts[i] = math.nan

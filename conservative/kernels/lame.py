@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import entry, kernel, small
-from .protocol import Result, Workspace, find_ends, loosen
+from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .twofold import minus, over, plus, scale, times, two
 from .vector import add, cross, product
@@ -80,13 +80,13 @@ def series(g2, g3, B, t):
     """p, p' and for each of three B the regular solution f of f'' = (2 p + B) f and f', at a short time t (twofold)."""
     c = np.zeros((TERMS, 2))
     T = times(t, t)
-    c[2] = over(g2, two(20.0))
-    c[3] = over(g3, two(28.0))
+    c[2, 0], c[2, 1] = over(g2, two(20.0))
+    c[3, 0], c[3, 1] = over(g3, two(28.0))
     for k in range(4, TERMS):
         total = (0.0, 0.0)
         for i in range(2, k - 1):
             total = plus(total, times((c[i, 0], c[i, 1]), (c[k - i, 0], c[k - i, 1])))
-        c[k] = over(scale(3.0, total), two((2.0 * k + 1.0) * (k - 3.0)))
+        c[k, 0], c[k, 1] = over(scale(3.0, total), two((2.0 * k + 1.0) * (k - 3.0)))
     p, dp = (0.0, 0.0), (0.0, 0.0)
     for k in range(TERMS - 1, 0, -1):
         ck = (c[k, 0], c[k, 1])
@@ -103,12 +103,12 @@ def series(g2, g3, B, t):
             total = times(b, (a[j - 1, 0], a[j - 1, 1]))
             for k in range(2, j + 1):
                 total = plus(total, scale(2.0, times((c[k, 0], c[k, 1]), (a[j - k, 0], a[j - k, 1]))))
-            a[j] = over(total, two((2.0 * j + 2.0) * (2.0 * j + 1.0) - 2.0))
+            a[j, 0], a[j, 1] = over(total, two((2.0 * j + 2.0) * (2.0 * j + 1.0) - 2.0))
         y, dy = (0.0, 0.0), (0.0, 0.0)
         for j in range(TERMS - 1, -1, -1):
             aj = (a[j, 0], a[j, 1])
             y, dy = plus(times(y, T), aj), plus(times(dy, T), scale(2.0 * j + 2.0, aj))
-        f[n, 0], f[n, 1] = times(y, T), times(dy, t)
+        (f[n, 0, 0], f[n, 0, 1]), (f[n, 1, 0], f[n, 1, 1]) = times(y, T), times(dy, t)
     return p, dp, f
 
 
@@ -133,7 +133,8 @@ def constants(g2, g3, B, h):
             D = times(third, minus(times(y, plus(plus(p, p2), b)), slope))
             b_ = times(third, minus(dy, times(y, S)))
             C = over(minus(times(A, D), two(1.0)), b_)
-            f[n, 0], f[n, 1] = plus(times(A, y), times(b_, dy)), plus(times(C, y), times(D, dy))
+            f[n, 0, 0], f[n, 0, 1] = plus(times(A, y), times(b_, dy))
+            f[n, 1, 0], f[n, 1, 1] = plus(times(C, y), times(D, dy))
         p, dp = p2, dp2
     return p[0] + p[1], dp[0] + dp[1], f[:, :, 0] + f[:, :, 1]
 
@@ -286,8 +287,7 @@ def march(model, coefficients, workspace):
     gamma = unit_vertical(q)
     parts, c = divide_step(model, coefficients.h)
     w0, w1 = L0[0] / J, L0[1] / J
-    q_out[0, :] = q
-    L_out[0, :] = L0
+    record(0, q, L0, q_out, L_out)
     row = 0
     done, block = 0, -(-pause // parts)
     while done < n_steps:
@@ -297,8 +297,7 @@ def march(model, coefficients, workspace):
                 q, gamma, w0, w1 = advance(c, q, gamma, w0, w1)
             if step % every == 0 or step == n_steps:
                 row += 1
-                q_out[row, :] = q
-                L_out[row, 0], L_out[row, 1], L_out[row, 2] = J * w0, J * w1, L0[2]
+                record(row, q, (J * w0, J * w1, L0[2]), q_out, L_out)
         done = last
         if done < n_steps:
             call_handlers()

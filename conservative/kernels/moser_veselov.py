@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import entry, kernel, small
+from . import brief, entry, kernel, small
 from .elliptic import find_means, jacobi, sine_and_cosine
-from .protocol import Result, Workspace, find_ends, loosen
+from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .vector import choose, fill_like, fuse, product
 
@@ -112,7 +112,7 @@ class State(NamedTuple):
     z_im: Any
 
 
-@kernel
+@brief
 def polhode(J1, J2, J3, L1, L2, L3):
     """Return the polhode for J2 intermediate, L3 >= 0 and L^2 - 2 E J2 not below 0 for J3 > J1, not above for J3 < J1.
 
@@ -154,7 +154,7 @@ def intermediate(p, C, D, r1, r3):
     return choose(same, r1, r2)
 
 
-@kernel
+@brief
 def exact_step(p, h):
     """The step without truncation error, calibrated on the one that is symmetric about s = 0.
 
@@ -259,7 +259,7 @@ def calibration_series(p, tau):
     return css[: TERMS - 2 : 2], cdd[: TERMS - 2 : 2]
 
 
-@kernel
+@brief
 def preprocessed_step(p, h, order):
     """The DMV step of an even order, its inertia from the first order/2 terms of the exact one (Hairer & Vilmart 2006).
 
@@ -293,7 +293,7 @@ def preprocessed_step(p, h, order):
     return Step(S, C, D, r0, r1, intermediate(p, C, D, r1, r3), r3)
 
 
-@kernel
+@brief
 def normalise(step):
     """The same step with r0^2 + r1^2 + r3^2 = 1, so that products of many steps stay in range."""
     size = math.sqrt(step.r0 * step.r0 + step.r1 * step.r1 + step.r3 * step.r3)
@@ -388,8 +388,7 @@ def own_quaternion(k, at):
 @kernel
 def store(row, p, k, at, left, q_out, L_out):
     """Write a state: its momentum and its quaternion, turned in the world by what is constant."""
-    q_out[row, :] = product(left, own_quaternion(k, at))
-    L_out[row, 0], L_out[row, 1], L_out[row, 2] = p.A1 * at.c, p.A2 * at.s, p.A3 * at.d
+    record(row, product(left, own_quaternion(k, at)), (p.A1 * at.c, p.A2 * at.s, p.A3 * at.d), q_out, L_out)
 
 
 @kernel

@@ -20,7 +20,7 @@ import numpy as np
 from . import entry, kernel, small
 from .fields import at_time, body_torque, energy
 from .lanes import FOUR, join, lane_of, load, save, splat
-from .protocol import Result, Workspace, find_ends, loosen
+from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .vector import add, cross, dot, fuse, in_body, product, scale, subtract, times
 
@@ -194,10 +194,11 @@ def march(model, coefficients, workspace):
     weights, columns, starts, nodes, h = coefficients
     n_steps, every, pause, q_out, L_out = workspace
     weights = weights.copy()
-    weights[: starts[-2]] *= h
+    for i in range(starts[-2]):  # not one product of a slice: numba compiles the text of its error for that
+        weights[i] *= h
     stages = len(starts) - 2
     slopes = np.empty(2 * FOUR * stages)
-    q_out[0, :], L_out[0, :] = q, L
+    record(0, q, L, q_out, L_out)
     kept = values(J_inverse, field, axis, turn, q, L)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done = 0
@@ -214,7 +215,7 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or step == n_steps:
                 until_sample = every
                 row += 1
-                q_out[row, :], L_out[row, :] = q, L
+                record(row, q, L, q_out, L_out)
         done = last
         if done < n_steps:
             call_handlers()

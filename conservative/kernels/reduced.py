@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 from . import entry, kernel, small
 from .fields import body_torque, finite_torque
-from .protocol import Result, Workspace, find_ends, loosen
+from .protocol import Result, Workspace, find_ends, loosen, record
 from .signals import call_handlers, end_of_block
 from .vector import accumulate, add, apply, choose, cross, dot, every, fuse, inverse, invert, scale, subtract, times, turn
 
@@ -249,8 +249,7 @@ def march(model, coefficients, workspace):
     n_steps, every, pause, q_out, L_out = workspace
     lengths = coefficients.lengths
     tolerance = coefficients.tolerance ** (2.0 / 3.0)  # of the size of a correction, cubed, as its square
-    q_out[0, :] = model.q
-    L_out[0, :] = model.L
+    record(0, model.q, model.L, q_out, L_out)
     state = (model.q, (0.0, 0.0, 0.0, 0.0), model.L, (0.0, 0.0, 0.0))
     at, row, corrections, history = (1, 0), 0, 0, no_history()
     block = -(-pause // len(lengths))
@@ -323,8 +322,7 @@ def take_steps(lengths, n_steps, last, every, J, J_inverse, field, tolerance, at
         if until_sample == 0 or step == n_steps:
             until_sample = every
             row += 1
-            q_out[row, :] = q
-            L_out[row, :] = L
+            record(row, q, L, q_out, L_out)
     return (last + 1, 0), row, corrections, size, (q, q_carry, L, L_carry), (known, past)
 
 

@@ -22,16 +22,15 @@ import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from ..arithmetic import add, choose, cross, dot, root, scale, subtract, times
+from ..arithmetic import root
 from ..potentials.turning import Turned
-from . import entry, kernel, small, vector
+from . import entry, kernel, small
 from .lanes import REGISTER, load_rows, save_columns, save_rows
-from .protocol import Result, Workspace, find_ends, loosen
+from .protocol import Result, Workspace, find_ends, loosen, record
 from .series import Series, sum_to_order
 from .signals import call_handlers, end_of_block
 from .traced import trace
-from .vector import choose as choose_lanes
-from .vector import some
+from .vector import add, choose, cross, dot, product, scale, some, subtract, times
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Why a step fails."""
@@ -262,7 +261,7 @@ def project(field, body, g, a, w, active):
     corrections = 1
     while corrections < MOST_CORRECTIONS and some(needed):
         g1, a1, w1, left1, needed1 = correct(field, body, g, a, w)
-        g, a, w, left = choose_lanes(needed, (g1, a1, w1, left1), (g, a, w, left))
+        g, a, w, left = choose(needed, (g1, a1, w1, left1), (g, a, w, left))
         needed = needed & needed1
         corrections += 1
     return g, a, w, corrections, left
@@ -271,7 +270,7 @@ def project(field, body, g, a, w, active):
 @small
 def quaternion(g, a):
     """The quaternion, of any length, of the matrix with third row g and first row a."""
-    b = vector.cross(g, a)
+    b = cross(g, a)
     trace = a[0] + b[1] + g[2]
     if trace > 0.0:
         return (1.0 + trace, g[1] - b[2], a[2] - g[0], b[0] - a[1])
@@ -282,13 +281,6 @@ def quaternion(g, a):
     return (b[0] - a[1], a[2] + g[0], b[2] + g[1], 1.0 - a[0] - b[1] + g[2])
 
 
-@small
-def record(q_out, L_out, row, q, L):
-    """Store a sample. Number by number: a tuple assigned to a slice takes seconds to compile."""
-    q_out[row, 0], q_out[row, 1], q_out[row, 2], q_out[row, 3] = q[0], q[1], q[2], q[3]
-    L_out[row, 0], L_out[row, 1], L_out[row, 2] = L[0], L[1], L[2]
-
-
 @partial(kernel, inline="always")
 def march(model, coefficients, workspace):
     """Take the steps (`protocol`). A step fails where it cannot be projected; the size is the relative defect that is left."""
@@ -297,7 +289,7 @@ def march(model, coefficients, workspace):
     n_steps, every, pause, q_out, L_out = workspace
     body, K, w = begin(model)
     constants, _, _, scales = body
-    record(q_out, L_out, 0, model.q, model.L)
+    record(0, model.q, model.L, q_out, L_out)
     row, corrections, until_sample, defect = 0, 0, every, 0.0
     done, parts, computed, part = 0, 0, 0, h
     while done < n_steps and defect < LEFT:
@@ -328,7 +320,7 @@ def march(model, coefficients, workspace):
             if until_sample == 0 or done == n_steps:
                 until_sample = every
                 row += 1
-                record(q_out, L_out, row, vector.product(left, quaternion(g, a)), vector.times(model.J, w))
+                record(row, product(left, quaternion(g, a)), times(model.J, w), q_out, L_out)
         if done < n_steps:
             call_handlers()
     return Result(done, parts * order, corrections, computed * order, defect, False)
@@ -407,7 +399,7 @@ def enter_many(order, like, columns, motions, turns, done, until, n_steps, every
             while step < end:
                 (g, a, w), _, _ = take_step(bodies.field, body[0], order, bodies.h, K, g, a, w)
                 g, a, w, _, left = project(bodies.field, body, g, a, w, failed < 0.5)
-                failed = choose_lanes(left < LEFT, failed, failed + 1.0)
+                failed = choose(left < LEFT, failed, failed + 1.0)
                 step += 1
             if step == sampled:
                 turn = load_rows(turns.reshape(-1), 2 * n * min(row, len(turns) - 1) + at, n, 2, REGISTER)

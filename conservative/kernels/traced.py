@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import cache, update_wrapper
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,8 @@ else:
     from numba.core import cgutils, types
     from numba.core.datamodel import register_default
     from numba.core.registry import cpu_target
-    from numba.extending import intrinsic, models
+    from numba.core.typing.templates import infer, infer_global, make_intrinsic_template
+    from numba.extending import models
 
     DOUBLE, BIT, INTEGER, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
 
@@ -259,7 +260,7 @@ else:
         return type_of(function(*(unpack(builder, *each) for each in zip(kinds, whole.args, strict=True))))
 
     def trace(function: Callable[..., Any]) -> Any:
-        """Return the function as an intrinsic of numba."""
+        """Return the function itself, after making it known to numba; in Python it stays what it is."""
 
         def traced(typing: Any, *kinds: Any) -> Any:
             # A value that may be None by its type is not None here: numba's cast checks it.
@@ -278,7 +279,10 @@ else:
         traced.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
             [context, *(each.replace(annotation=each.empty) for each in parameters)]
         )
-        return intrinsic(update_wrapper(traced, function, ("__module__", "__name__", "__qualname__", "__doc__"), ()))
+        template = make_intrinsic_template(function, traced, function.__name__)
+        infer(template)
+        infer_global(function, types.Function(template))
+        return function
 
 
 def join(a: Any, b: Any, c: Any, d: Any) -> Any:

@@ -21,7 +21,7 @@ from ..grid import SAMPLE_BYTES, Grid, most_samples
 from ..method import Method
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
-from ..trajectory import Trajectory, accept_samples
+from ..trajectory import Trajectory, cut_at_failure
 from .coefficients.explicit import DORMAND_PRINCE_8
 from .principal_axes import PrincipalStart, invariant_scales, principal_start
 from .units import bound_rate, convert_scene, find_units
@@ -123,7 +123,7 @@ def sample_between(found: Trajectory, method: Method, grid: Grid, t: Array) -> T
     R_WB, w_WB_B, done = move(found.scene, found.t[row], gaps, found.R_WB[row], found.w_WB_B[row])
     failure = found.failure if done == n else Diverged(float(found.t[row[done]]), "it turns too fast to be followed")
     samples = replace(found, t=t[:done].copy(), R_WB=R_WB[:done], w_WB_B=w_WB_B[:done], failure=failure)
-    return accept_samples(samples, method.conserves, method.bounds(found.scene, grid))
+    return cut_at_failure(samples, method.conserves, method.bounds(found.scene, grid))
 
 
 def move(scene: Scene, t: Array, gaps: Array, R_WB: Array, w_WB_B: Array) -> tuple[Array, Array, int]:

@@ -27,11 +27,6 @@ def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float 
 
     `orthonormality` is None where it is kept no better than the invariants.
     """
-    rounding = ROUNDING * sys.float_info.epsilon * (10 + grid.n_steps) * scene.derive(condition)
+    rounding = ROUNDING * sys.float_info.epsilon * (10 + grid.n_steps) * scene.body.condition
     drift = min(LOOSEST, rounding + SOLVER * tol * grid.n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)
-
-
-def condition(scene: Scene) -> float:
-    """Return the ratio of the largest moment of the body to its smallest, dimensionless."""
-    return float(scene.body.moments.max() / scene.body.moments.min())

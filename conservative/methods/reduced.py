@@ -34,6 +34,9 @@ from .principal_axes import PrincipalStart, principal_start
 from .run_kernel import prepare_run
 from .units import in_own_units
 
+_MOMENTA = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
+_MOMENTA_AND_ENERGY = _MOMENTA | {"energy"}
+
 
 @dataclass(frozen=True)
 class Reduced(Method):
@@ -98,8 +101,7 @@ class Reduced(Method):
 
     @property
     def conserves(self) -> frozenset[str]:
-        kept = frozenset({"momentum", "vertical momentum", "momentum along the field's axis"})
-        return kept | {"energy"} if self.frame == "body" else kept
+        return _MOMENTA_AND_ENERGY if self.frame == "body" else _MOMENTA
 
     def bounds(self, scene: Scene, grid: Grid) -> Bounds:
         return bounds_of(scene, grid, self.tol)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from time import monotonic
 from typing import Any
@@ -99,7 +99,7 @@ class Trials:
         estimate = Estimate(error, work, moved)
         if len(self.known) >= MOST_ESTIMATES:
             self.known.clear()
-        self.known[method, grid] = estimate
+        self.known[method, replace(grid)] = estimate  # a copy, without the times that a grid caches
         return estimate, fine
 
 

@@ -75,30 +75,21 @@ def _convert_potential(potential: Any, energy: float, time: float) -> Any:
 
 def find_units(scene: Scene, dt: float) -> Units:
     """Return the units, powers of two of kg m^2 and s, in which a scene is of order one and a step dt, s, not far below."""
-    if not _has_units(scene.potential):
+    potential = scene.potential
+    if potential is not None and not (hasattr(potential, "in_units") and hasattr(static_part(potential), "in_units")):
         return SI
-    moment, rate = scene.derive(find_exponents)
+    moment, rate = scene.magnitudes
     step = math.frexp(dt)[1]
     time = step if rate is None else min(-rate, step - SHORTEST)
-    moment, time = (COARSE * int(exponent / COARSE) for exponent in (moment, time))
-    return Units(2.0**moment, 2.0**time) if moment or time else SI
-
-
-def _has_units(potential: Any) -> bool:
-    """Return whether a potential or None, and the one that turns with it, can be converted to other units."""
-    return potential is None or (hasattr(potential, "in_units") and hasattr(static_part(potential), "in_units"))
-
-
-def find_exponents(scene: Scene) -> tuple[int, int | None]:
-    """Return exponents: of the largest moment, kg m^2, and of the rate that all energy makes of it, 1/s, if there is any."""
-    moment = math.frexp(float(scene.body.moments.max()))[1]
-    energy = scene.kinetic_energy0 + (0.0 if scene.potential is None else scene.potential.scale())
-    return moment, (math.frexp(energy)[1] - moment) // 2 if energy > 0 else None
+    if abs(moment) < COARSE and abs(time) < COARSE:
+        return SI
+    moment, time = COARSE * int(moment / COARSE), COARSE * int(time / COARSE)
+    return Units(2.0**moment, 2.0**time)
 
 
 def convert_scene(scene: Scene, units: Units) -> Scene:
     """Return the scene in other units."""
-    return scene if units == SI else units.convert(scene)
+    return scene if units is SI else units.convert(scene)
 
 
 def bound_rate(scene: Scene) -> float:
@@ -114,7 +105,7 @@ def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
     @wraps(prepare)
     def prepare_in_units(method: AnyMethod, scene: Scene, grid: Grid) -> Run:
         units = find_units(scene, grid.dt)
-        if units == SI:
+        if units is SI:
             return prepare(method, scene, grid)
         steps = Grid(grid.dt / units.time, grid.n_steps, grid.every)
         run = prepare(method, scene.derive(convert_scene, units), steps)

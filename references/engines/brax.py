@@ -21,9 +21,10 @@ x64: https://docs.jax.dev/en/latest/notebooks/Common_Gotchas_in_JAX.html#double-
 
 import importlib
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
+
+from .shared import compile_jax, write_mjcf
 
 ENGINE = {
     "package": "brax",
@@ -40,58 +41,34 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
-
-    The variable JAX_ENABLE_X64 of the process sets the precision. Compiled code is kept in the home of the environment.
-    """
+    """Return a run, compiled as a whole. The variable JAX_ENABLE_X64 of the process sets the precision."""
     import jax
     from brax.io import mjcf
 
-    jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
-    system = mjcf.loads(_model(given)).replace(mj_model=None)  # static data, which would cause another compilation
-    number = system.gravity.dtype
-    place = np.array([0, 0, 0, *given.q0], number), np.array([0, 0, 0, *given.w0], number)
-    counts = np.diff(given.steps).astype(np.int32)
-    march = _march(given.pipeline)
-    jax.block_until_ready(march(system, place, counts))
+    # Brax requires a shape. This one has no mass and no contacts.
+    shape = '<geom type="sphere" size="0.1" mass="0" contype="0" conaffinity="0"/>'
+    model = write_mjcf(given, f'<option gravity="0 0 0" timestep="{given.dt!r}"/>', shape)
+    system = mjcf.loads(model).replace(mj_model=None)  # static data, which would cause another compilation
+    place = [np.array([0, 0, 0, *values], system.gravity.dtype) for values in (given.q0, given.w0)]
+    pipeline, step = _pipeline(given.pipeline)
+    start = jax.jit(pipeline.init)(system, *place)
+    march, counts = compile_jax(step, _read), np.diff(given.steps).astype(np.int32)
+    jax.block_until_ready(march(system, start, counts))
 
     def run():
-        q, w = march(system, place, counts)
-        return {"q": np.asarray(q, float), "w_W": np.asarray(w, float)}
+        samples = zip(_read(start), march(system, start, counts), strict=True)
+        q, w = (np.vstack([first, rest]).astype(float) for first, rest in samples)
+        return {"q": q, "w_W": w}
 
     return run
 
 
 @lru_cache(maxsize=8)
-def _march(name):
-    """Return a function that computes all samples, compiled once per number of samples: steps and inertia are data."""
-    import jax
-
+def _pipeline(name):
+    """Return a pipeline, and its step without actions: always the same function, so that it is compiled once."""
     pipeline, no_action = importlib.import_module(f"brax.{name}.pipeline"), np.zeros(0)
-
-    def march(system, place, counts):
-        def advance(state, n_steps):
-            state = jax.lax.fori_loop(0, n_steps, lambda _, state: pipeline.step(system, state, no_action), state)
-            return state, (state.x.rot[0], state.xd.ang[0])
-
-        start = pipeline.init(system, *place)
-        samples = jax.lax.scan(advance, start, counts)[1]
-        return jax.tree.map(lambda first, rest: jax.numpy.concatenate([first, rest]), (start.x.rot, start.xd.ang), samples)
-
-    return jax.jit(march)
+    return pipeline, lambda system, state: pipeline.step(system, state, no_action)
 
 
-def _model(given):
-    """Return the body as MJCF, with the shape that Brax requires, which has no mass and no contacts."""
-    moments = " ".join(map(repr, given.moments.tolist()))
-    return f"""
-        <mujoco>
-          <option gravity="0 0 0" timestep="{given.dt!r}"/>
-          <worldbody>
-            <body>
-              <freejoint/>
-              <inertial mass="{given.mass!r}" pos="0 0 0" diaginertia="{moments}"/>
-              <geom type="sphere" size="0.1" mass="0" contype="0" conaffinity="0"/>
-            </body>
-          </worldbody>
-        </mujoco>"""
+def _read(state):
+    return state.x.rot[0], state.xd.ang[0]

@@ -9,6 +9,8 @@ World, whose integrator is semi-implicit Euler; FreeJoint, BallJoint: https://da
 
 import numpy as np
 
+from .shared import sample
+
 ENGINE = {
     "package": "dartpy",
     "module": "dartpy",
@@ -33,13 +35,10 @@ def prepare(given):
         world.reset()
         joint.setPositions(start[0])
         joint.setVelocities(start[1])
-        R, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                world.step()
-            R[sample] = body.getWorldTransform().rotation()
-            w[sample] = body.getAngularVelocity(inertial, body)
-        return {"R": R, "w": w}
+        return sample(given, world.step, read)
+
+    def read():
+        return {"R": body.getWorldTransform().rotation(), "w": body.getAngularVelocity(inertial, body)}
 
     return run
 

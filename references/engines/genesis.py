@@ -25,6 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .shared import sample, write_mjcf
+
 AS_INSTALLED = "approximate_implicitfast,precision=f32,as_installed=true"
 ENGINE = {
     "package": "genesis-world",
@@ -47,7 +49,10 @@ def prepare(given):
     if not getattr(gs, "_initialized", False):  # once per process
         gs.init(backend=gs.cpu, precision=given.precision[1:], logging_level="error")
     scene = _scene(gs, given)
-    body = scene.add_entity(gs.morphs.MJCF(file=str(_write_model(given))))
+    file = Path("body.xml").resolve()
+    # Genesis requires a shape. This one has no contacts.
+    file.write_text(write_mjcf(given, shape='<geom type="sphere" size="0.1" contype="0" conaffinity="0"/>'), encoding="utf-8")
+    body = scene.add_entity(gs.morphs.MJCF(file=str(file)))
     scene.build()
     place, rates = np.array([0, 0, 0, *given.q0]), np.array([0, 0, 0, *given.w0])
     step = partial(scene.step, update_visualizer=False)
@@ -57,12 +62,10 @@ def prepare(given):
         scene.reset()
         body.set_qpos(place)
         body.set_dofs_velocity(rates)
-        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                step()
-            q[sample], w[sample] = body.get_quat().numpy().ravel(), body.get_ang().numpy().ravel()
-        return {"q": q, "w_W": w}
+        return sample(given, step, read)
+
+    def read():
+        return {"q": body.get_quat().numpy().ravel(), "w_W": body.get_ang().numpy().ravel()}
 
     return run
 
@@ -77,23 +80,3 @@ def _scene(gs, given):
         ),
         show_viewer=False,
     )
-
-
-def _write_model(given):
-    """Write an MJCF file with the shape that Genesis requires, which has no contacts; return its path."""
-    moments = " ".join(map(repr, given.moments.tolist()))
-    path = Path("body.xml").resolve()
-    path.write_text(
-        f"""
-        <mujoco>
-          <worldbody>
-            <body>
-              <freejoint/>
-              <inertial mass="{given.mass!r}" pos="0 0 0" diaginertia="{moments}"/>
-              <geom type="sphere" size="0.1" contype="0" conaffinity="0"/>
-            </body>
-          </worldbody>
-        </mujoco>""",
-        encoding="utf-8",
-    )
-    return path

@@ -18,10 +18,9 @@ Precision: https://github.com/gbionics/jaxsim/blob/main/src/jaxsim/__init__.py
 Models and their joints: https://jaxsim.readthedocs.io/en/latest/modules/api.html
 """
 
-from functools import lru_cache
-from pathlib import Path
-
 import numpy as np
+
+from .shared import compile_jax
 
 ENGINE = {
     "package": "jaxsim",
@@ -38,14 +37,10 @@ ENGINE = {
 
 
 def prepare(given):
-    """Return a run, compiled as a whole: `lax.scan` over samples, `fori_loop` over the steps between them.
-
-    The variable JAX_ENABLE_X64 of the process sets the precision. Compiled code is kept in the home of the environment.
-    """
+    """Return a run, compiled as a whole. The variable JAX_ENABLE_X64 of the process sets the precision."""
     import jax
     import jaxsim.api as js
 
-    jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "jax"))
     integrator = js.model.IntegratorType[given.integrator]
     options = {"is_urdf": False, "time_step": given.dt, "gravity": 0.0, "integrator": integrator}
     model = js.model.JaxSimModel.build_from_model_description(_description(given), **options)
@@ -55,8 +50,7 @@ def prepare(given):
         base_angular_velocity=jax.numpy.array(given.w0_W),
         velocity_representation=js.common.VelRepr.Mixed,  # angular velocity in the world
     )
-    counts = np.diff(given.steps).astype(np.int32)
-    march = _march()
+    march, counts = compile_jax(_step, _read), np.diff(given.steps).astype(np.int32)
     jax.block_until_ready(march(model, start, counts))
 
     def run():
@@ -66,20 +60,14 @@ def prepare(given):
     return run
 
 
-@lru_cache(maxsize=1)
-def _march():
-    """Return a function that computes the samples after the first, compiled once per integrator, step and number of samples."""
-    import jax
+def _step(model, data):
     import jaxsim.api as js
 
-    def march(model, data, counts):
-        def advance(data, n_steps):
-            data = jax.lax.fori_loop(0, n_steps, lambda _, data: js.model.step(model, data), data)
-            return data, (data.base_quaternion, data.base_velocity[3:])
+    return js.model.step(model, data)
 
-        return jax.lax.scan(advance, data, counts)[1]
 
-    return jax.jit(march)
+def _read(data):
+    return data.base_quaternion, data.base_velocity[3:]
 
 
 def _description(given):

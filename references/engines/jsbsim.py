@@ -20,7 +20,7 @@ FGPropagate, the integrators; FGInertial, FGMassBalance: https://jsbsim-team.git
 import tempfile
 from pathlib import Path
 
-import numpy as np
+from .shared import sample
 
 INTEGRATORS = {  # FGPropagate::eIntegrateType
     **{"RectEuler": 1, "Trapezoidal": 2, "AB2": 3, "AB3": 4, "AB4": 5, "Buss1": 6, "Buss2": 7, "LocalLinearization": 8},
@@ -60,14 +60,13 @@ def prepare(given):
 
     def run():
         flight.run_ic()
-        T, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                flight.run()
-            T[sample] = attitude.get_Tec2b()
-            w[sample] = [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]
+        samples = sample(given, flight.run, read)
+        T = samples["T"]
         # The planet-fixed frame is inertial here. Its attitude in the world follows from the initial attitude.
-        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": w}
+        return {"R": given.R0 @ T[0] @ T.swapaxes(1, 2), "w": samples["w"]}
+
+    def read():
+        return {"T": attitude.get_Tec2b(), "w": [flight[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]}
 
     return run
 

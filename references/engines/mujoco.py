@@ -1,132 +1,198 @@
-"""MuJoCo's five integrators on one body, in this process. Other versions run in environments: `mujoco@3.6.0:RK4`."""
+"""MuJoCo with one of its integrators, in its own loop.
 
-from __future__ import annotations
+The loop is `mujoco.rollout` if samples are close, and `mj_step(m, d, nstep)` from sample to sample otherwise. The body's
+principal axes are MuJoCo's body axes. A free body has a free joint at its centre of mass, as in the models of MuJoCo's users. A
+body in a field has a ball joint at its fixed point. Switched off: every part of a step that such a body does not need.
 
-from collections.abc import Iterator
+Parameters
+----------
+integrator
+    "Euler", "RK4", "implicit", "implicitfast" or "discrete", which versions before 3.13 do not have.
+threads
+    Threads of `mujoco.rollout` if many bodies run at once, each with its own model.
+
+References
+----------
+Integrators and flags: https://mujoco.readthedocs.io/en/stable/XMLreference.html#option
+Programming, `mj_step`, rollout: https://mujoco.readthedocs.io/en/stable/python.html
+"""
+
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from threading import Lock
-from types import SimpleNamespace
-from typing import Any, ClassVar
 
-from conservative.batch import Batch
-from conservative.card import Card, Maker
-from conservative.check import choice, positive_integer
-from conservative.errors import Unsupported
-from conservative.grid import Grid
-from conservative.method import Method, Role, Run
-from conservative.methods.many import Block, RunMany
-from conservative.methods.units import in_own_units
-from conservative.scene import Scene
-from conservative.trajectory import Trajectory
+import numpy as np
 
-from ..engine import load, principal_axes, unsupported_reason, version
-from ..environments.plain_numbers import EngineSamples, ManySamples, describe, take_axes
-from .mujoco_versions import INTEGRATORS, prepare_many_with, prepare_with
+INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+ENGINE = {
+    "package": "mujoco",
+    "module": "mujoco",
+    "oldest": "3.6",
+    "settings": {"integrator": "RK4", "threads": 1},
+    "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
+    "gravity": True,
+    "card": {
+        "variants": INTEGRATORS,
+        "report": ("Euler", ""),
+        "suite": ("Euler", "RK4"),
+        "many": ("RK4", "RK4,threads=2", "Euler", "implicit", "implicitfast", "discrete"),
+        "pictures": ("Euler", "RK4", "implicit"),
+        "as_installed": ("Euler",),
+        "colour": "vermilion",
+    },
+}
+
+# Parts of a step that one body without contacts, actuators, springs or sensors does not need. Bits that a version does not have
+# are skipped. Autoreset would restart a diverged run.
+SWITCHED_OFF = (
+    *("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT", "SPRING", "DAMPER", "PASSIVE", "CLAMPCTRL", "WARMSTART"),
+    *("FILTERPARENT", "ACTUATION", "REFSAFE", "SENSOR", "MIDPHASE", "EULERDAMP", "AUTORESET", "NATIVECCD", "ISLAND"),
+    "MULTICCD",
+)
+# Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
+ROLLOUT_UP_TO = 8
+# Numbers that a rollout of many bodies stores at a time: 32 MiB.
+ROOM = 1 << 22
 
 
-@dataclass(frozen=True)
-class MuJoCo(Method):
-    """MuJoCo with one of its integrators, in its own loop.
+def prepare(given):
+    """Return a run of one body."""
+    import mujoco as mj
 
-    The loop is `mujoco.rollout` where samples are close and `mj_step(m, d, nstep)` from sample to sample where they are not.
-    The body's principal axes are MuJoCo's body axes; everything the motion does not need is switched off. A free body has a
-    free joint at its centre of mass, as MuJoCo's users have it; a body in a field has a ball joint at its fixed point.
+    model = _model(mj, given)
+    data = mj.MjData(model)
+    start = _start(mj, model, data, given)
+    march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
+    evaluations = given.n_steps * (4 if given.integrator == "RK4" else 1)
 
-    Parameters
-    ----------
-    integrator
-        "Euler", "RK4", "implicit", "implicitfast" or "discrete".
-    threads
-        Threads of `mujoco.rollout` where many bodies run at once, each with a model of its own.
+    def run():
+        with _quiet(mj):
+            q, w, reason = march(mj, model, data, start, given)
+        return {"q": q, "w": w, "reason": reason, "evaluations": evaluations}
 
-    Raises
-    ------
-    BadInput
-        The integrator is unknown, or threads is not an integer of 1 or more.
-    MissingEngine
-        MuJoCo is not installed.
+    return run
+
+
+def prepare_many(bodies):
+    """Return a run of many bodies by `mujoco.rollout`, with a model and a state for each."""
+    import mujoco as mj
+    from mujoco.rollout import Rollout
+
+    given, models = bodies[0], [_model(mj, body) for body in bodies]
+    datas = [mj.MjData(models[0]) for _ in range(given.threads)]
+    start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies, strict=True)])
+    room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
+
+    def run():
+        states = [start]
+        with _quiet(mj), Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
+            for n_steps in np.diff(given.steps).tolist():
+                states.append(_roll_on(pool, (models, datas), states[-1], n_steps, room))
+        states = np.stack(states, axis=1)
+        # A rollout that fails keeps its state and its time.
+        states[states[..., 0] < given.steps * given.dt * (1 - 1e-9)] = np.nan
+        nq = 1 + models[0].nq
+        return {"q": states[..., nq - 4 : nq], "w": states[..., nq + models[0].nv - 3 : nq + models[0].nv]}
+
+    return run
+
+
+def _roll_on(pool, engine, state, n_steps, room):
+    """Return the states (n, size) after more steps, in parts, because a rollout stores every step."""
+    while n_steps:
+        part = np.ascontiguousarray(room[:, :n_steps])
+        pool.rollout(*engine, state, nstep=part.shape[1], state=part)
+        state, n_steps = part[:, -1].copy(), n_steps - part.shape[1]
+    return state
+
+
+def _model(mj, given):
+    spec = mj.MjSpec()
+    spec.option.timestep = given.dt
+    spec.option.integrator = _integrator(mj, given.integrator)
+    spec.option.gravity = (0, 0, -given.gravity)
+    off = (*SWITCHED_OFF, "GRAVITY") if given.gravity == 0 else SWITCHED_OFF
+    spec.option.disableflags = sum(int(getattr(mj.mjtDisableBit, f"mjDSBL_{name}", 0)) for name in off)
+    body = spec.worldbody.add_body(name="body", explicitinertial=True, mass=given.mass, ipos=given.com)
+    # MuJoCo refuses moments of a planar body that exceed the sum of the others by a rounding unit.
+    moments = given.moments_com
+    body.inertia = np.minimum(moments, np.roll(moments, 1) + np.roll(moments, 2))
+    body.iquat = given.q_com  # scalar first
+    body.add_joint(type=mj.mjtJoint.mjJNT_FREE if given.free else mj.mjtJoint.mjJNT_BALL)
+    return spec.compile()
+
+
+def _integrator(mj, name):
+    integrator = getattr(mj.mjtIntegrator, f"mjINT_{name.upper()}", None)
+    if integrator is None:
+        has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
+        raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {name}, but {', '.join(has)}")
+    return integrator
+
+
+def _start(mj, model, data, given):
+    """Return MuJoCo's state vector (time, qpos, qvel) at the start.
+
+    qpos ends with the quaternion, scalar first, body to world; qvel ends with the angular velocity in body axes, for the free
+    joint as for the ball joint (the free joint's translation, ahead of them, is zero).
     """
+    mj.mj_resetData(model, data)
+    data.qpos[-4:], data.qvel[-3:] = given.q0, given.w0
+    state = np.empty(mj.mj_stateSize(model, mj.mjtState.mjSTATE_FULLPHYSICS))
+    mj.mj_getState(model, data, state, mj.mjtState.mjSTATE_FULLPHYSICS)
+    return state
 
-    integrator: str = "RK4"
-    threads: int = 1
 
-    family: ClassVar[str] = "mujoco"
-    role: ClassVar[Role] = Role.ENGINE
-    card: ClassVar[Card] = Card(
-        variants=INTEGRATORS,
-        report=("Euler", ""),
-        suite=("Euler", "RK4"),
-        many=("RK4", "RK4,threads=2", "Euler", "implicit", "implicitfast", "discrete"),
-        pictures=("Euler", "RK4", "implicit"),
-        as_installed=("Euler",),
-        colour="vermilion",
-    )
+def _roll_out(mj, model, data, start, given):
+    """Return quaternions, rates and a reason, from one call that stores every step."""
+    from mujoco.rollout import rollout
 
-    def __post_init__(self) -> None:
-        choice("integrator", self.integrator, INTEGRATORS)
-        positive_integer("threads", self.threads)
-        version("mujoco", "MuJoCo")
+    mj.mj_resetData(model, data)
+    states = np.empty((1, given.n_steps, len(start)))
+    rollout(model, data, start[None], nstep=given.n_steps, state=states)
+    states = np.concatenate([start[None], states[0]])
+    reason = _warning(mj, data)
+    if reason:
+        # After a failure the rollout repeats the last state, including its time.
+        states[1:][np.diff(states[:, 0]) <= 0] = np.nan
+    states = states[given.steps]
+    nq = 1 + model.nq
+    return states[:, nq - 4 : nq], states[:, nq + model.nv - 3 : nq + model.nv], reason
 
-    @property
-    def maker(self) -> Maker:
-        return Maker("mujoco", version("mujoco", "MuJoCo"))
 
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"integrator": self.integrator} | ({} if self.threads == 1 else {"threads": f"threads={self.threads}"})
+def _step_to_samples(mj, model, data, start, given):
+    """Return quaternions, rates and a reason, stepping from sample to sample inside the engine."""
+    mj.mj_resetData(model, data)
+    mj.mj_setState(model, data, start, mj.mjtState.mjSTATE_FULLPHYSICS)
+    q, w = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
+    q[0], w[0] = data.qpos[-4:], data.qvel[-3:]
+    for sample, n_steps in enumerate(np.diff(given.steps), start=1):
+        mj.mj_step(model, data, int(n_steps))
+        reason = _warning(mj, data)
+        if reason:
+            return q, w, reason
+        q[sample], w[sample] = data.qpos[-4:], data.qvel[-3:]
+    return q, w, ""
 
-    @property
-    def order(self) -> int:
-        return 4 if self.integrator == "RK4" else 1
 
-    def unsupported(self, scene: Scene) -> str | None:
-        return unsupported_reason(scene)
-
-    @in_own_units
-    def prepare(self, scene: Scene, grid: Grid) -> Run:
-        """Compile MuJoCo's model. Raises `Unsupported` for an integrator that this version does not have."""
-        mj = load("mujoco", "mujoco", "MuJoCo")
-        axes = principal_axes(scene)
-        samples = EngineSamples(axes, grid, self.label)
-        try:
-            march = prepare_with(mj, SimpleNamespace(integrator=self.integrator, **describe(axes, grid)))
-        except NotImplementedError as error:  # an integrator that another version has
-            raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
-
-        def run() -> Trajectory:
-            with _quiet(mj):
-                found = march()
-            return samples.trajectory(found)
-
-        return run
-
-    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
-        mj = load("mujoco", "mujoco", "MuJoCo")
-        axes = take_axes(bodies, grid, self.unsupported)
-        if axes is None or not hasattr(mj.mjtIntegrator, f"mjINT_{self.integrator.upper()}"):
-            return None
-        samples = ManySamples(axes, grid)
-        march = prepare_many_with(mj, [SimpleNamespace(**asdict(self), **describe(each, grid)) for each in axes])
-
-        def run() -> Block:
-            with _quiet(mj):
-                return samples.trajectory(march())
-
-        return run
+def _warning(mj, data):
+    """Return MuJoCo's warning of a bad state; "" if there is none."""
+    for kind in ("BADQPOS", "BADQVEL", "BADQACC"):
+        if data.warning[int(getattr(mj.mjtWarning, f"mjWARN_{kind}"))].number:
+            return f"MuJoCo warned of {kind}"
+    return ""
 
 
 class _Quiet:
-    """Keeps MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead.
+    """Prevents MuJoCo from writing its warnings to a file in the working directory; they are read from the data instead.
 
-    The first of the runs that overlap puts the user's own handler aside, the last one puts it back.
+    The first of several runs at the same time replaces the user's own handler, the last one restores it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self):
         self._lock, self._runs, self._before = Lock(), 0, None
 
     @contextmanager
-    def __call__(self, mj: Any) -> Iterator[None]:
+    def __call__(self, mj):
         with self._lock:
             if self._runs == 0:
                 self._before = mj.get_mju_user_warning()

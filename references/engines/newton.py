@@ -27,6 +27,8 @@ from functools import partial
 
 import numpy as np
 
+from .shared import record_warp
+
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
     **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
@@ -82,7 +84,7 @@ def prepare(given):
     steps = [partial(step, *states), partial(step, *reversed(states))]
     for each in steps:
         each()
-    steps = steps if given.solver == NOT_RECORDED else [_record(warp, each) for each in steps]
+    steps = steps if given.solver == NOT_RECORDED else [record_warp(each) for each in steps]
     return partial(_march, steps, [_views(state) for state in states], renew, given.steps)
 
 
@@ -108,16 +110,6 @@ def _march(steps, views, renew, counts):
 def _views(state):
     """Return views of the engine's own arrays: position and quaternion, scalar last; velocities in the world."""
     return state.body_q.numpy()[0], state.body_qd.numpy()[0]
-
-
-def _record(warp, step):
-    """Return a function that replays a step; the step itself if this version of Warp does not record on the CPU."""
-    try:
-        with warp.ScopedCapture() as capture:
-            step()
-    except RuntimeError:
-        return step
-    return partial(warp.capture_launch, capture.graph)
 
 
 def _model(newton, warp, given):

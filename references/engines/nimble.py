@@ -9,6 +9,8 @@ World, joints: https://nimblephysics.org/docs/
 
 import numpy as np
 
+from .shared import sample
+
 ENGINE = {
     "package": "nimblephysics",
     "module": "nimblephysics",
@@ -33,13 +35,10 @@ def prepare(given):
     def run():
         skeleton.setPositions(place)
         skeleton.setVelocities(rates)  # in body axes
-        R, w = np.empty((len(given.steps), 3, 3)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                world.step()
-            R[sample] = body.getWorldTransform().rotation()
-            w[sample] = body.getAngularVelocity()
-        return {"R": R, "w_W": w}
+        return sample(given, world.step, read)
+
+    def read():
+        return {"R": body.getWorldTransform().rotation(), "w_W": body.getAngularVelocity()}
 
     return run
 

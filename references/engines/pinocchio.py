@@ -1,156 +1,99 @@
-"""Pinocchio: its forward dynamics and its manifold, in a loop written here because it has none of its own."""
+"""Pinocchio's `aba` and `integrate`, stepped from Python.
 
-from __future__ import annotations
+Pinocchio is a library of algorithms without a time loop, so this loop is Python's, and calls of the library take most of the
+time of a step. The body is on a spherical joint at its fixed point, or at its centre of mass if it is free.
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, ClassVar
+Parameters
+----------
+scheme
+    "Euler": semi-implicit, v += dt aba(q, v), then q = integrate(q, dt v). "RK4": Munthe-Kaas's Runge-Kutta method of
+    order 4 on the rotation group (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
+
+References
+----------
+aba, integrate: https://docs.ros.org/en/kinetic/api/pinocchio/html/
+"""
 
 import numpy as np
 
-from conservative.attitude import Array, from_quaternion
-from conservative.batch import Batch
-from conservative.card import Card, Maker
-from conservative.check import choice
-from conservative.grid import Grid
-from conservative.method import Method, Role, Run
-from conservative.methods.many import Block, RunMany
-from conservative.methods.units import in_own_units
-from conservative.scene import Scene
-from conservative.trajectory import Counters, Trajectory
-
-from ..engine import EngineAxes, load, mass_model, principal_axes, unsupported_reason, version
-from ..environments.plain_numbers import ManySamples, take_axes
-
-SCHEMES = ("Euler", "RK4")
-
-Step = Callable[[Array, Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True)
-class Pinocchio(Method):
-    """Pinocchio's `aba` and `integrate`, stepped from Python.
-
-    Pinocchio is a library of algorithms without a time loop, so this loop is Python's, and calling into the library is most of
-    what a step costs. The body hangs on a spherical joint at its fixed point (at the centre of mass for a free body).
-
-    Parameters
-    ----------
-    scheme
-        "Euler": semi-implicit, v += dt aba(q, v), then q = integrate(q, dt v). "RK4": Munthe-Kaas's Runge-Kutta method of
-        order 4 on the rotation group (Munthe-Kaas 1998, with the two commutators of Munthe-Kaas & Owren 1999).
-
-    Raises
-    ------
-    BadInput
-        The scheme is unknown.
-    MissingEngine
-        Pinocchio is not installed.
-    """
-
-    scheme: str = "RK4"
-
-    family: ClassVar[str] = "pinocchio"
-    role: ClassVar[Role] = Role.ENGINE
-    card: ClassVar[Card] = Card(
-        variants=SCHEMES, report=("",), suite=("RK4",), many=("RK4",), pictures=("Euler",), colour="purple"
-    )
-
-    def __post_init__(self) -> None:
-        choice("scheme", self.scheme, SCHEMES)
-        version("pin", "Pinocchio")
-
-    @property
-    def maker(self) -> Maker:
-        return Maker("pin", version("pin", "Pinocchio"))
-
-    @property
-    def setting_parts(self) -> dict[str, str]:
-        return {"scheme": f"aba+{self.scheme}"}
-
-    @property
-    def order(self) -> int:
-        return 4 if self.scheme == "RK4" else 1
-
-    def unsupported(self, scene: Scene) -> str | None:
-        return unsupported_reason(scene)
-
-    @in_own_units
-    def prepare(self, scene: Scene, grid: Grid) -> Run:
-        pin = load("pinocchio", "pin", "Pinocchio")
-        axes = principal_axes(scene)
-        model = _model(pin, axes)
-        step = (_rk4 if self.scheme == "RK4" else _euler)(pin, model, grid.dt)
-        # Pinocchio: scalar last, body to world; velocities in the joint's own (body) axes.
-        q_start, v_start = np.roll(axes.q0, -1), axes.w0
-
-        def run() -> Trajectory:
-            q, v = _march(step, q_start, v_start, grid)
-            evaluations = grid.n_steps * (4 if self.scheme == "RK4" else 1)
-            R_WF = from_quaternion(np.roll(q, 1, axis=1))
-            return axes.trajectory(grid, self.label, R_WF, v, Counters(grid.n_steps, evaluations=evaluations))
-
-        return run
-
-    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
-        """Return one loop over all bodies, each with a model of its own: Pinocchio has no function for many."""
-        pin, axes = load("pinocchio", "pin", "Pinocchio"), take_axes(bodies, grid, self.unsupported)
-        if axes is None:
-            return None
-        samples = ManySamples(axes, grid)
-        make = _rk4 if self.scheme == "RK4" else _euler
-        starts = [(make(pin, _model(pin, each), grid.dt), np.roll(each.q0, -1), each.w0) for each in axes]
-
-        def run() -> Block:
-            q, w = (np.stack(part) for part in zip(*(_march(*start, grid) for start in starts), strict=True))
-            return samples.trajectory({"q": np.roll(q, 1, axis=-1), "w": w})
-
-        return run
+ENGINE = {
+    "package": "pin",
+    "module": "pinocchio",
+    "settings": {"scheme": "RK4"},
+    "orders": {"Euler": 1, "RK4": 4},
+    "prefix": "aba+",
+    "gravity": True,
+    "card": {
+        "variants": ("Euler", "RK4"),
+        "report": ("",),
+        "suite": ("RK4",),
+        "many": ("RK4",),
+        "pictures": ("Euler",),
+        "colour": "purple",
+    },
+}
 
 
-def _model(pin: Any, axes: EngineAxes) -> Any:
-    mass = mass_model(axes)
-    assert mass is not None  # `unsupported` has seen to it
-    model = pin.Model()
-    joint = model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "body")
-    # Inertia about the centre of mass, in the joint's axes.
-    model.appendBodyToJoint(joint, pin.Inertia(mass.mass, mass.com, mass.body.inertia), pin.SE3.Identity())
-    model.gravity.linear = np.array([0.0, 0.0, -mass.gravity])
-    return model
+def prepare(given):
+    """Return a run of one body."""
+    import pinocchio as pin
+
+    step = _stepper(pin, given)
+    evaluations = given.n_steps * (4 if given.scheme == "RK4" else 1)
+
+    def run():
+        q, w = _march(step, given)
+        return {"q": q, "w": w, "evaluations": evaluations}
+
+    return run
 
 
-def _march(step: Step, q: Array, v: Array, grid: Grid) -> tuple[Array, Array]:
-    """Return samples of quaternions (n, 4), scalar last, and rates (n, 3); those of a run that ended early are nan."""
-    qs, vs = np.full((grid.n_samples, 4), np.nan), np.full((grid.n_samples, 3), np.nan)
+def prepare_many(bodies):
+    """Return one loop over all bodies, each with its own model: Pinocchio has no function for many bodies."""
+    import pinocchio as pin
+
+    steps = [_stepper(pin, body) for body in bodies]
+
+    def run():
+        q, w = zip(*(_march(step, body) for step, body in zip(steps, bodies, strict=True)), strict=True)
+        return {"q": np.stack(q), "w": np.stack(w)}
+
+    return run
+
+
+def _march(step, given):
+    """Return samples of quaternions (n, 4), scalar first, and rates (n, 3); nan after the end of a run that diverges."""
+    q, v = np.roll(given.q0, -1), given.w0  # Pinocchio has the scalar last; velocities are in body axes
+    qs, vs = np.full((len(given.steps), 4), np.nan), np.full((len(given.steps), 3), np.nan)
     qs[0], vs[0] = q, v
-    with np.errstate(all="ignore"):  # a diverging run is reported by its status
-        for sample, n_steps in enumerate(np.diff(grid.steps).astype(int), start=1):
+    with np.errstate(all="ignore"):
+        for sample, n_steps in enumerate(np.diff(given.steps), start=1):
             for _ in range(n_steps):
                 q, v = step(q, v)
             if not np.isfinite(v).all():
                 break
             qs[sample], vs[sample] = q, v
-    return qs, vs
+    return np.roll(qs, 1, axis=1), vs
 
 
-def _euler(pin: Any, model: Any, dt: float) -> Step:
-    aba, integrate, data, tau = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv)
+def _stepper(pin, given):
+    """Return a function that makes a step from a quaternion and rates.
 
-    def step(q: Array, v: Array) -> tuple[Array, Array]:
+    RK4 is k_i = dt (v, aba) at q exp(u_i), with u_3 and the last u corrected by a commutator. The signs are correct for a group
+    that acts from the right, q' = q v, with v in body axes.
+    """
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "body")
+    # The inertia about the centre of mass, in the axes of the joint.
+    model.appendBodyToJoint(joint, pin.Inertia(given.mass, given.com, given.inertia_com), pin.SE3.Identity())
+    model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
+    aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
+
+    def euler(q, v):
         v = v + dt * aba(model, data, q, v, tau)
         return integrate(model, q, dt * v), v
 
-    return step
-
-
-def _rk4(pin: Any, model: Any, dt: float) -> Step:
-    """Return the step k_i = dt (v, aba) at q exp(u_i), with u_3 and the last u corrected by a commutator.
-
-    The signs are those of a group acting from the right, q' = q v, with v in body axes.
-    """
-    aba, integrate, data, tau = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv)
-
-    def step(q: Array, v: Array) -> tuple[Array, Array]:
+    def rk4(q, v):
         k1, a1 = dt * v, dt * aba(model, data, q, v, tau)
         v2 = v + a1 / 2
         k2, a2 = dt * v2, dt * aba(model, data, integrate(model, q, k1 / 2), v2, tau)
@@ -161,10 +104,10 @@ def _rk4(pin: Any, model: Any, dt: float) -> Step:
         u = (k1 + 2 * (k2 + k3) + k4 + _cross(k1, k4) / 2) / 6
         return integrate(model, q, u), v + (a1 + 2 * (a2 + a3) + a4) / 6
 
-    return step
+    return rk4 if given.scheme == "RK4" else euler
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a, b):
     """Return a x b for single vectors; `numpy.cross` costs more than `aba`."""
     a1, a2, a3 = a.tolist()
     b1, b2, b3 = b.tolist()

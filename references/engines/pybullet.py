@@ -19,6 +19,8 @@ https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartgui
 
 import numpy as np
 
+from .shared import sample
+
 ENGINE = {
     "package": "pybullet",
     "module": "pybullet",
@@ -47,13 +49,13 @@ def prepare(given):
         bullet.setGravity(0, 0, -given.gravity)
         bullet.setPhysicsEngineParameter(fixedTimeStep=given.dt, numSubSteps=0)
         body = build(bullet, given)
-        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                bullet.stepSimulation()
-            (x, y, z, s), w[sample] = look(bullet, body)
-            q[sample] = s, x, y, z
-        return {"q": q, "w_W": w} if given.free else _to_axes(q, w, given)
+
+        def read():
+            (x, y, z, s), w = look(bullet, body)
+            return {"q": (s, x, y, z), "w_W": w}
+
+        samples = sample(given, bullet.stepSimulation, read)
+        return samples if given.free else _to_axes(samples["q"], samples["w_W"], given)
 
     return run
 

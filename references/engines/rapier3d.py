@@ -20,6 +20,8 @@ Joints: https://rapier.rs/docs/user_guides/python/joints
 
 import numpy as np
 
+from .shared import sample
+
 ENGINE = {
     "package": "rapier3d",
     "module": "rapier3d",
@@ -61,14 +63,13 @@ def prepare(given):
 
     def run():
         world, body = build()
-        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        q[0], w[0] = given.q0, given.w0_W
-        for sample, n_steps in enumerate(np.diff(given.steps).tolist(), start=1):
-            for _ in range(n_steps):
-                world.step()
+
+        def read():
             turn, rate = body.rotation, body.angvel
-            q[sample] = turn.w, turn.i, turn.j, turn.k
-            w[sample] = rate.x, rate.y, rate.z
-        return {"q": q, "w_W": w}
+            return {"q": (turn.w, turn.i, turn.j, turn.k), "w_W": (rate.x, rate.y, rate.z)}
+
+        samples = sample(given, world.step, read)
+        samples["q"][0], samples["w_W"][0] = given.q0, given.w0_W  # in double precision
+        return samples
 
     return run

@@ -17,6 +17,8 @@ SAPIEN: https://sapien-sim.github.io/docs/
 
 import numpy as np
 
+from .shared import sample
+
 ENGINE = {
     "package": "sapien",
     "module": "sapien",
@@ -62,12 +64,7 @@ def prepare(given):
         body.set_linear_velocity(drift)
         body.set_angular_velocity(spin)
         body.wake_up()
-        q, w = np.empty((len(given.steps), 4)), np.empty((len(given.steps), 3))
-        for sample, n_steps in enumerate(np.diff(given.steps, prepend=0).tolist()):
-            for _ in range(n_steps):
-                system.step()
-            q[sample], w[sample] = body.get_pose().q, body.get_angular_velocity()
-        return {"q": q, "w_W": w}
+        return sample(given, system.step, lambda: {"q": body.get_pose().q, "w_W": body.get_angular_velocity()})
 
     run.owner = scene  # of the body
     return run

@@ -58,7 +58,7 @@ class Distribution:
 
 def distribution_of(engine: str) -> Distribution:
     """Return the package of an engine. Raise as `conservative.registry.engine`."""
-    distribution: Distribution = registry.engine(engine).distribution
+    distribution: Distribution = registry.engine(engine).data
     return distribution
 
 
@@ -151,7 +151,8 @@ def worker_of(environment: Environment, precision: str = "f64") -> Worker:
     """
     key = environment.folder, precision, os.getpid()
     if key not in _workers:
-        jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64"))}
+        cache = environment.folder / "home" / ".cache" / "jax"
+        jax = {"JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": str(int(precision == "f64")), "JAX_COMPILATION_CACHE_DIR": str(cache)}
         _workers.setdefault(key, environment.start_worker(jax))  # another thread may have been faster
     return _workers[key]
 

@@ -7,6 +7,8 @@ dictionary. An adapter may also define
     prepare_many(bodies)    the same for a list of bodies, in one run
     run.renew()             called before each measured call, and not measured
     run.dispose()           called when the run is not needed any more
+
+and may import files of its own folder, `from .shared import sample`.
 """
 
 from __future__ import annotations
@@ -14,14 +16,13 @@ from __future__ import annotations
 import faulthandler
 import gc
 import importlib
-import importlib.util
 import json
 import math
 import os
 import struct
 import sys
 from time import perf_counter
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # importing typing costs time at every start
@@ -142,13 +143,15 @@ class Runs:
     def _load(self, adapter: str) -> Any:
         """Return the module of an adapter, given by its path, or by its name if it can be imported."""
         if adapter not in self._adapters:
+            name = adapter
             if os.path.isabs(adapter):  # noqa: PTH117  # importing pathlib costs time at every start
-                spec = importlib.util.spec_from_file_location(f"adapter_{len(self._adapters)}", adapter)
-                module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
-                spec.loader.exec_module(module)  # type: ignore[union-attr]
-            else:
-                module = importlib.import_module(adapter)
-            self._adapters[adapter] = module
+                folder, file = os.path.split(adapter)
+                # A package of the folder, so that `from .shared import ...` works in adapters.
+                package = ModuleType(f"adapters_{len(self._adapters)}")
+                package.__path__ = [folder]
+                sys.modules[package.__name__] = package
+                name = f"{package.__name__}.{file[:-3]}"
+            self._adapters[adapter] = importlib.import_module(name)
         return self._adapters[adapter]
 
     def run(self, run: int) -> Message:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.measures.errors import SMALL, DriftClass, classify
 from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
-from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Fit, Observation, Spread, ratio
+from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Spread, ratio
 from conservative.outcome import Outcome, OutcomeKind
 
 from ..document.cells import DASH, number, outcome_cell, outcome_text
@@ -21,6 +22,8 @@ PERCENT = 0.01
 WHOLE = 0.25
 """An order within this distance of a whole number is written as that number."""
 _GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
+_FITTED = ("slope", "stderr", "reason")
+"""Fields of an order in the JSON."""
 _WORDS = (
     "Orders are over shorter and shorter steps; everything else is at the step of the scene. A time ratio is relative to "
     "the first version, from rounds that interleave all versions; in parentheses, the variation between repeats."
@@ -161,8 +164,7 @@ def _ratio(line: EngineLine, seen: Observation) -> Spread | None:
 def _record(line: EngineLine, seen: Observation) -> dict[str, Any]:
     return {
         **{name: getattr(seen, name) for name in ("scene", "setting", "version", "label", "dt", "outcome")},
-        "attitude_order": seen.attitude_order,
-        "rates_order": seen.rates_order,
+        **{name: {key: vars(getattr(seen, name))[key] for key in _FITTED} for name in ("attitude_order", "rates_order")},
         "attitude_error_rad": seen.error,
         "drifts": seen.drifts,
         "step_times_s": (line.times or {}).get(seen.version, ()),
@@ -205,7 +207,7 @@ def _phrase(change: Change, at: str) -> str:
     match change.was, change.now:
         case Outcome() as was, Outcome() as now:
             return _outcome_change(was, now, at)
-        case Fit() as was, Fit() as now:
+        case Order() as was, Order() as now:
             return _order_change(was, now, change.aspect.value)
         case Spread(), Spread(value, low, high) if change.aspect is Aspect.TIME:
             return f"a step takes {number(value)} times as long ({number(low)} to {number(high)})"
@@ -229,7 +231,7 @@ def _outcome_change(was: Outcome, now: Outcome, at: str) -> str:
     return f"the outcome {at} went from {outcome_text(was)} to {text}"
 
 
-def _order_change(was: Fit, now: Fit, name: str) -> str:
+def _order_change(was: Order, now: Order, name: str) -> str:
     if math.isnan(now.slope):
         return f"no {name} can be fitted any more, which was {order_text(was.slope)} ({now.reason})"
     if math.isnan(was.slope):

@@ -18,8 +18,9 @@ import psutil
 import pytest
 
 from conservative import registry
-from conservative.benchmarks.studies.case import Case, Failure, attempt
+from conservative.benchmarks.studies.case import Case, attempt
 from conservative.grid import grid_for
+from conservative.outcome import Outcome
 from conservative.references.environments.environment import worker_of
 
 from ..environments import ROOT, programs, variables
@@ -155,10 +156,10 @@ def test_a_worker_killed_at_random_moments_costs_one_run():
 def check_results(expected, found):
     """Return the crashes; every other result is the expected one, bit for bit."""
     assert len(found) == len(expected)
-    crashes = [each for each in found if isinstance(each, Failure)]
-    assert all(each.outcome.reason.startswith("signal 9") for each in crashes)
+    crashes = [each for each in found if isinstance(each, Outcome)]
+    assert all(each.reason.startswith("signal 9") for each in crashes)
     for before, after in zip(expected, found, strict=True):
-        assert isinstance(after, Failure) or (after.trajectory.R_WB == before.trajectory.R_WB).all()
+        assert isinstance(after, Outcome) or (after.trajectory.R_WB == before.trajectory.R_WB).all()
     return crashes
 
 

@@ -9,7 +9,6 @@ import sys
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Barrier
 from typing import ClassVar
@@ -52,15 +51,6 @@ def random_scene(name, rng, potential=None):
     return cv.Scene(name, cv.RigidBody(second.sum() - second), start, rng.normal(size=3), 2.0, potential)
 
 
-def quartic():
-    hook = np.array([0.0, 0.1, 0.4])
-
-    def energy(R):
-        return float(sum(x**4 for x in (R @ hook).tolist()))
-
-    return cv.FunctionPotential(energy, lambda R: np.outer(4 * (R @ hook) ** 3, hook))
-
-
 def list_methods():
     for family in registry.list_families().values():
         try:
@@ -79,7 +69,10 @@ def list_runs(method, scenes):
 
 def draw_runs(methods, number, rng):
     """Return runs in random order; within a role every method is as likely as any other."""
-    shared = quartic()
+    hook = np.array([0.0, 0.1, 0.4])
+    shared = cv.FunctionPotential(
+        lambda R: float(sum(x**4 for x in (R @ hook).tolist())), lambda R: np.outer(4 * (R @ hook) ** 3, hook)
+    )
     scenes = [registry.scene(name) for name in SCENES]
     scenes += [random_scene(f"random {k}", rng) for k in range(4)]
     scenes += [random_scene(f"functions {k}", rng, shared) for k in range(2)]
@@ -92,16 +85,6 @@ def draw_runs(methods, number, rng):
         chances = np.where(functions, SHARE_OF_FUNCTIONS, 1.0)
         found += [runs[k] for k in rng.choice(len(runs), n, p=chances / chances.sum())]
     return [found[k] for k in rng.permutation(len(found))]
-
-
-@contextmanager
-def frequent_switches():
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before)
 
 
 def attack(methods, number):
@@ -123,8 +106,13 @@ def attack(methods, number):
                 wrong.append(f"{run.method.name} on {run.scene.name}: {found}")
         return wrong
 
-    with frequent_switches(), ThreadPoolExecutor(THREADS) as pool:
-        return [line for part in pool.map(compare, range(THREADS)) for line in part]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    try:
+        with ThreadPoolExecutor(THREADS) as pool:
+            return [line for part in pool.map(compare, range(THREADS)) for line in part]
+    finally:
+        sys.setswitchinterval(before)
 
 
 def test_runs_in_threads_are_the_same():
@@ -136,7 +124,7 @@ SHARED = np.empty(3)
 
 @dataclass(frozen=True)
 class Still(cv.Method):
-    """The initial state as the final one, by way of a buffer: one that all runs share, or one of each."""
+    """Return the initial state through a buffer that all runs share, or that each run has for itself."""
 
     shared: bool
     family: ClassVar[str] = "still"

@@ -1,4 +1,4 @@
-"""Engines of another package, written for the tests: one fast and good, one in plain Python and slow, and some that do harm."""
+"""Engines of another package, written for the tests: one fast, one in plain Python and slow, and some that hang or crash."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from conservative.trajectory import Counters
 
 @dataclass(frozen=True)
 class Foreign(cv.Method):
-    """What the engines here share: they are for free bodies, and of order 4."""
+    """Base class of the engines here: for free bodies, of order 4."""
 
     role: ClassVar[cv.Role] = cv.Role.ENGINE
 
@@ -33,7 +33,7 @@ class Foreign(cv.Method):
 
 @dataclass(frozen=True)
 class Fast(Foreign):
-    """The closed form under another name, which nothing beats: some foreign engine may be the best."""
+    """The closed form under another name, because a foreign engine may be the best."""
 
     family: ClassVar[str] = "foreign_fast"
 
@@ -41,15 +41,17 @@ class Fast(Foreign):
         run = Exact().prepare(scene, grid)
 
         def relabel() -> cv.Trajectory:
-            found = run()
-            return cv.Trajectory(scene, found.t, found.R_WB, found.w_WB_B, self.label, found.counters, found.failure)
+            trajectory = run()
+            return cv.Trajectory(
+                scene, trajectory.t, trajectory.R_WB, trajectory.w_WB_B, self.label, trajectory.counters, trajectory.failure
+            )
 
         return relabel
 
 
 @dataclass(frozen=True)
 class Slow(Foreign):
-    """The classical method of Runge and Kutta in plain Python, which sleeps `pause` s in each step besides."""
+    """The classical method of Runge and Kutta in plain Python, which also sleeps `pause` s in each step."""
 
     pause: float = 0.0
     family: ClassVar[str] = "foreign_slow"
@@ -80,7 +82,7 @@ class Slow(Foreign):
 
 @dataclass(frozen=True)
 class Harmful(Foreign):
-    """What does harm in the way that `how` says."""
+    """An engine that hangs or ends its process, as `how` requires."""
 
     how: str = "hang"
     family: ClassVar[str] = "foreign_harm"

@@ -1,4 +1,4 @@
-"""A scene with nothing special about it, its truth, and a method that fails as asked."""
+"""A generic scene, its reference solution, and a method that fails as requested."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -34,7 +34,7 @@ class Broken(cv.Method):
         return "it cannot do anything" if self.how == "unsupported" else None
 
     def samples(self, scene, grid, off):
-        """The start all the time, and something else in the last sample."""
+        """Return the initial state at all times, changed by `off` in the last sample."""
         R, w = (np.repeat(start[None], grid.n_samples, axis=0) for start in (scene.R_WB0, scene.w_WB_B0))
         R[-1] += off
         return cv.Trajectory(scene, grid.t, R, w, self.label)

@@ -1,11 +1,11 @@
-"""What an error costs on a line of settings: no lucky setting counts, nothing is extrapolated."""
+"""The cost of an error on a line of settings: isolated good settings are ignored, and nothing is extrapolated."""
 
 import math
 
 import numpy as np
 import pytest
 
-from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within
+from conservative.benchmarks.contest import SMALLEST, Cheapest, Contest, Ratios, cost, credit, first_within, list_deciding
 
 ERRORS, TIMES = [1e-1, 1e-3, 1e-5], [1.0, 2.0, 4.0]
 
@@ -58,6 +58,11 @@ def test_a_line_without_settings_has_no_cost():
     assert first_within([], 1e-3) is None
 
 
+@pytest.mark.parametrize(("error", "deciding"), [(1.0, [0]), (1e-3, [1, 2]), (1e-6, [3, 4]), (1e-9, [])])
+def test_the_settings_that_decide_are_the_first_that_is_credited_and_the_one_before(error, deciding):
+    assert list_deciding([1e-1, 1e-2, 1e-7, 1e-4, 1e-8], error) == deciding
+
+
 def ratios(*values):
     return Ratios(
         tuple(Contest(str(i), 1e-6, Cheapest(1.0, "ours"), Cheapest(value, "theirs")) for i, value in enumerate(values))
@@ -65,14 +70,14 @@ def ratios(*values):
 
 
 def test_the_interval_of_the_mean_is_that_of_the_logarithms():
-    found = ratios(2.0, 4.0, 8.0)
+    result = ratios(2.0, 4.0, 8.0)
     half = 4.302652729911275 * math.log(2) / math.sqrt(3)  # Student's t of two degrees of freedom, 97.5 %
-    assert found.mean == pytest.approx(4.0)
-    assert found.interval == pytest.approx((4.0 * math.exp(-half), 4.0 * math.exp(half)))
+    assert result.mean == pytest.approx(4.0)
+    assert result.interval == pytest.approx((4.0 * math.exp(-half), 4.0 * math.exp(half)))
     assert all(map(math.isnan, ratios(2.0).interval))
 
 
 def test_the_interval_holds_the_mean_as_often_as_it_should():
     rng = np.random.default_rng(7)
-    found = [ratios(*np.exp(rng.normal(0.5, 0.3, 10))).interval for _ in range(400)]
-    assert 0.92 < np.mean([low <= math.exp(0.5) <= high for low, high in found]) < 0.98  # measured 0.935
+    result = [ratios(*np.exp(rng.normal(0.5, 0.3, 10))).interval for _ in range(400)]
+    assert 0.92 < np.mean([low <= math.exp(0.5) <= high for low, high in result]) < 0.98  # measured 0.935

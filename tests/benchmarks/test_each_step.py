@@ -1,4 +1,4 @@
-"""The study of samples at each step: the coarsest setting that is good enough, timed with all samples and with the end."""
+"""The study of samples at each step: the coarsest sufficient setting, timed with all samples and with the final state only."""
 
 from functools import cache
 
@@ -50,8 +50,8 @@ def test_both_times_are_of_the_setting_that_is_good_enough():
 
 def test_errors_are_of_all_samples():
     row = of(Measure.ATTITUDE_MAX, "gauss")[-1]
-    exact, found = truth(SCENE, GRID).trajectory, cv.Gauss().solve(SCENE, GRID)
-    assert (row.dt, row.value) == (GRID.dt, angle_between(exact.R_WB, found.R_WB).max())
+    exact, trajectory = truth(SCENE, GRID).trajectory, cv.Gauss().solve(SCENE, GRID)
+    assert (row.dt, row.value) == (GRID.dt, angle_between(exact.R_WB, trajectory.R_WB).max())
 
 
 @pytest.mark.parametrize("times", [1, 7])

@@ -1,4 +1,4 @@
-"""The studies of engines: what they find on the brick, and that one engine's failure is a row of its own and no more."""
+"""The studies of engines on the brick; the failure of an engine affects only its own rows."""
 
 import math
 from functools import cache
@@ -12,9 +12,7 @@ from conservative.benchmarks.measures.convergence_order import grows_with_shorte
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import engines_over_steps, studies
 from conservative.benchmarks.studies.engine_selection import select_engines
-from conservative.benchmarks.studies.engines_at_one_step import keep_few
 from conservative.benchmarks.studies.study import Study
-from conservative.grid import Grid
 from conservative.outcome import OutcomeKind
 
 from .generic_study import Broken, truth
@@ -35,39 +33,42 @@ def studied(name, methods, scene=BRICK, **options):
     return list(studies.rows(Study(name, (scene,), methods, quick=True, **exact, **options)))
 
 
-def value(found, method, measure, quantity=""):
-    (row,) = [row for row in found if (row.method, row.measure, row.quantity) == (method, measure, quantity)]
+def value(measured, method, measure, quantity=""):
+    (row,) = [row for row in measured if (row.method, row.measure, row.quantity) == (method, measure, quantity)]
     return row
 
 
 def test_an_engine_is_measured_at_the_step_of_the_scene():
-    found = rows("engines_at_one_step")
-    assert {row.dt for row in found} == {0.01}
+    measured = rows("engines_at_one_step")
+    assert {row.dt for row in measured} == {0.01}
     name = "pinocchio"
     assert (
-        0.5 < value(found, name, Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
+        0.5 < value(measured, name, Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
     )  # as a plain script that calls an RK4 of it finds
-    assert value(found, name, Measure.DRIFT_MAX, "energy").detail == "lost"
-    assert value(found, name, Measure.TIME_PER_STEP).value > 0
-    assert (value(found, name, Measure.PRECISION).value, value(found, name, Measure.ORDER_EXPECTED).value) == (64, 4)
+    assert value(measured, name, Measure.DRIFT_MAX, "energy").detail == "lost"
+    assert value(measured, name, Measure.TIME_PER_STEP).value > 0
+    assert (value(measured, name, Measure.PRECISION).value, value(measured, name, Measure.ORDER_EXPECTED).value) == (64, 4)
     euler = "mujoco:integrator=Euler"
-    assert 0.5 < value(found, euler, Measure.DRIFT_MAX, "energy").value / 0.22 < 2
-    assert value(found, euler, Measure.DRIFT_MAX, "energy").detail == "gained"
+    assert 0.5 < value(measured, euler, Measure.DRIFT_MAX, "energy").value / 0.22 < 2
+    assert value(measured, euler, Measure.DRIFT_MAX, "energy").detail == "gained"
     for method in (name, euler):
-        assert (value(found, method, Measure.TURNS_OVER).value, value(found, method, Measure.TURNS_OVER_TRUE).value) == (2, 2)
+        assert (value(measured, method, Measure.TURNS_OVER).value, value(measured, method, Measure.TURNS_OVER_TRUE).value) == (
+            2,
+            2,
+        )
 
 
 def test_a_body_in_a_field_has_no_turns_over():
-    found = rows("engines_at_one_step", ("pinocchio:RK4",), TOP)
-    assert not {row.measure for row in found} & {Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE}
-    assert {row.quantity for row in found} >= {"energy", "vertical momentum"}
+    measured = rows("engines_at_one_step", ("pinocchio:RK4",), TOP)
+    assert not {row.measure for row in measured} & {Measure.TURNS_OVER, Measure.TURNS_OVER_TRUE}
+    assert {row.quantity for row in measured} >= {"energy", "vertical momentum"}
 
 
 def test_orders_and_times_over_steps():
-    found = rows("engines_over_steps")
-    assert abs(value(found, "pinocchio", Measure.ORDER).value - 4) < 0.5
-    times = [row for row in found if row.measure is Measure.TIME]
-    errors = {(row.method, row.dt): row.value for row in found if row.measure is Measure.ATTITUDE_MAX}
+    measured = rows("engines_over_steps")
+    assert abs(value(measured, "pinocchio", Measure.ORDER).value - 4) < 0.5
+    times = [row for row in measured if row.measure is Measure.TIME]
+    errors = {(row.method, row.dt): row.value for row in measured if row.measure is Measure.ATTITUDE_MAX}
     assert times
     assert all(row.value > 0 and errors[row.method, row.dt] <= engines_over_steps.TIMED for row in times)
     assert any(error > engines_over_steps.TIMED for error in errors.values())  # what is another motion is not timed
@@ -76,16 +77,16 @@ def test_orders_and_times_over_steps():
 @pytest.mark.parametrize("name", studies.ENGINES)
 def test_a_failing_engine_costs_its_own_rows_only(name):
     broken = (Broken("raises"), Broken("unsupported"))
-    found = studied(name, (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5))
+    measured = studied(name, (broken[0], registry.method("pinocchio"), broken[1]), cv.scenes.brick_flip(t_end=0.5))
     for method, kind in zip(broken, (OutcomeKind.CRASHED, OutcomeKind.UNSUPPORTED), strict=True):
-        errors = [row for row in found if row.method == method.name and row.measure is Measure.ATTITUDE_MAX]
+        errors = [row for row in measured if row.method == method.name and row.measure is Measure.ATTITUDE_MAX]
         assert {row.outcome.kind for row in errors} == {kind}
-    times = [row for row in found if row.method == "pinocchio" and row.measure is Measure.TIME]
+    times = [row for row in measured if row.method == "pinocchio" and row.measure is Measure.TIME]
     assert times
     assert all(row.value > 0 and row.outcome.ok for row in times)
 
 
-def test_an_error_that_grows_is_told_from_one_that_has_reached_its_floor():
+def test_a_growing_error_differs_from_one_at_its_floor():
     v_shaped = np.array([1.1, 0.6, 0.2, 0.24, 0.5, 0.9, 1.3, 2.5])
     assert grows_with_shorter_steps(STEPS, v_shaped)
     assert not grows_with_shorter_steps(STEPS, STEPS**2)
@@ -94,22 +95,23 @@ def test_an_error_that_grows_is_told_from_one_that_has_reached_its_floor():
 
 
 def test_a_slow_run_is_timed_over_its_first_steps_only():
-    grid = Grid(0.01, 600)
-    assert [keep_few(grid, share) for share in (5.0, 0.1, 1e-9)] == [Grid(0.01, 600, 50), Grid(0.01, 60, 5), Grid(0.01, 1, 1)]
+    for limit, steps in ((60.0, 600), (1e-9, 1)):
+        measured = studied("engines_at_one_step", (registry.method("pinocchio"),), time_limit=limit)
+        assert value(measured, "pinocchio", Measure.TIME).detail.endswith(f" s, {steps} steps")
 
 
 def test_runs_that_are_longer_than_planned_for_are_not_run_again_for_their_time():
-    found = studied("engines_over_steps", (registry.method("pinocchio"),), time_limit=1e-9)
-    times = [row for row in found if row.measure is Measure.TIME]
+    measured = studied("engines_over_steps", (registry.method("pinocchio"),), time_limit=1e-9)
+    times = [row for row in measured if row.measure is Measure.TIME]
     assert times
     assert {row.detail for row in times} == {"a single run"}
     assert all(row.value > 0 for row in times)
 
 
-def test_an_engine_that_is_dear_to_prepare_has_fewer_steps_and_says_so(monkeypatch):
+def test_an_engine_with_expensive_preparation_has_fewer_steps(monkeypatch):
     monkeypatch.setattr(engines_over_steps, "PREPARATIONS", -1.0)
-    found = studied("engines_over_steps", (registry.method("pinocchio"),))
-    errors = [row for row in found if row.measure is Measure.ATTITUDE_MAX]
+    measured = studied("engines_over_steps", (registry.method("pinocchio"),))
+    errors = [row for row in measured if row.measure is Measure.ATTITUDE_MAX]
     assert [row.outcome.kind for row in errors] == [OutcomeKind.OK] + [OutcomeKind.SKIPPED] * (len(errors) - 1)
     assert len(errors) > 2
 
@@ -120,8 +122,8 @@ def test_a_real_engine_in_its_environment():
 
     install("exudyn")
     methods = select_engines(["exudyn"])
-    found = studied("engines_at_one_step", methods) + studied("engines_over_steps", methods)
-    assert 0.5 < value(found, "exudyn", Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
-    assert abs(value(found, "exudyn", Measure.ORDER).value - 4) < 0.3
-    assert value(found, "exudyn", Measure.TIME_PER_STEP).value > 0
-    assert {row.version for row in found} == {methods[0].environment.version}
+    measured = studied("engines_at_one_step", methods) + studied("engines_over_steps", methods)
+    assert 0.5 < value(measured, "exudyn", Measure.ATTITUDE_FINAL).value / 1.3e-6 < 2
+    assert abs(value(measured, "exudyn", Measure.ORDER).value - 4) < 0.3
+    assert value(measured, "exudyn", Measure.TIME_PER_STEP).value > 0
+    assert {row.version for row in measured} == {methods[0].environment.version}

@@ -1,4 +1,4 @@
-"""Engines of other packages beside ours: a recommendation survives them, and no test here looks at who is installed."""
+"""Engines of other packages: a recommendation survives them, and no test depends on the installed ones."""
 
 import os
 import subprocess
@@ -25,7 +25,7 @@ DEPENDENT = (
     "tests/benchmarks/test_selection.py",
     "tests/conservative/test_registry.py",
 )
-"""Tests that look at everything that is registered: all that would notice another engine, and are quick."""
+"""Quick tests that use all registered methods, and so would notice another engine."""
 
 
 def question(*methods):
@@ -34,9 +34,9 @@ def question(*methods):
 
 @pytest.mark.slow
 def test_a_recommendation_survives_engines_that_hang_or_end_their_process():
-    found = recommend(question(Harmful("hang"), Harmful("abort"), Slow(), Fast()))
-    by_line = {advice.line: advice for advice in found.advice}
-    assert found.ours.reached
+    answer = recommend(question(Harmful("hang"), Harmful("abort"), Slow(), Fast()))
+    by_line = {advice.line: advice for advice in answer.advice}
+    assert answer.ours.reached
     assert by_line["foreign_fast"].reached
     assert by_line["foreign_slow"].probes[0].outcome.ok
     for how, kind in (("hang", OutcomeKind.TIMEOUT), ("abort", OutcomeKind.CRASHED)):

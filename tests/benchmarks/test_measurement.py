@@ -49,10 +49,10 @@ def test_columns_and_their_types_do_not_depend_on_the_rows():
 
 
 def test_a_row_in_the_table():
-    found = frame([ROW]).iloc[0]
-    shown = found[["role", "quantity", "measure", "unit", "value", "outcome", "reason", "detail"]].tolist()
+    record = frame([ROW]).iloc[0]
+    shown = record[["role", "quantity", "measure", "unit", "value", "outcome", "reason", "detail"]].tolist()
     assert shown == ["ours", "energy", "drift max", "1", 1e-15, "ok", "", ""]
-    assert found[["step", "time", "residual"]].isna().all()
+    assert record[["step", "time", "residual"]].isna().all()
 
 
 @pytest.mark.parametrize("row", [ROW, FAILED])
@@ -95,10 +95,8 @@ def test_the_table_of_samples_has_a_row_for_each():
     assert full.index.tolist() == list(range(2 * len(LINE.t)))
 
 
-def test_a_value_without_its_value_is_still_one_of_its_measure():
-    blank = Value(Measure.DRIFT_MAX, 1.0, "energy").blank
-    assert (blank.measure, blank.quantity, blank.key) == (Measure.DRIFT_MAX, "energy", "energy drift max")
-    assert blank.value != blank.value
+def test_the_name_of_a_value_has_the_quantity_of_a_drift():
+    assert Value(Measure.DRIFT_MAX, 1.0, "energy").key == "energy drift max"
     assert [(each.key, each.value == each.value) for each in blanks(Measure.ORDER, Measure.TIME)] == [
         ("observed order", False),
         ("time per simulated second", False),

@@ -1,4 +1,4 @@
-"""The observed order of convergence, which errors its fit uses, and the line through them."""
+"""The observed order of convergence, the errors in its fit, and the line through them."""
 
 import math
 
@@ -24,19 +24,13 @@ def test_exact_powers_give_their_order_from_all_points(p):
     assert math.isnan(order.floor)
 
 
-@pytest.mark.parametrize("p", [1, 2, 4])
+@pytest.mark.parametrize("p", [1, 2, 3.8, 4])
 @pytest.mark.parametrize("seed", range(20))
 def test_noise_is_averaged_over_the_points_and_shows_in_the_standard_error(p, seed):
     order = observed_order(STEPS, noisy(STEPS**p, 0.1, seed))
     assert abs(order.slope - p) < 0.08  # measured up to 0.060 over 200 draws with 10 % noise
     assert 0.003 < order.stderr < 0.05  # measured 0.004 to 0.032 over 200 draws
     assert len(order.used) >= 6  # measured 7 to 9
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_false_order_is_seen(seed):
-    order = observed_order(STEPS, noisy(STEPS**3.8, 0.02, seed))
-    assert abs(order.slope - 3.8) < 0.03  # measured up to 0.011 over 200 draws: 4 is out of reach
 
 
 @pytest.mark.parametrize("p", [2, 4, 8])
@@ -54,8 +48,8 @@ def test_points_on_and_near_the_floor_are_left_out(p, seed):
 
 def test_a_floor_alone_seldom_looks_like_an_order():
     draws = [1e-15 * np.abs(np.random.default_rng(seed).standard_normal(9)) for seed in range(500)]
-    found = [observed_order(STEPS, errors) for errors in draws]
-    assert sum(not order.reason for order in found) < 30  # measured 16: three random numbers can fall like an order
+    fitted = [observed_order(STEPS, errors) for errors in draws]
+    assert sum(not order.reason for order in fitted) < 30  # measured 16: three random numbers can fall like an order
 
 
 def test_round_off_that_grows_as_steps_shrink_is_a_floor():
@@ -103,7 +97,7 @@ def test_order_of_the_input_and_failed_runs_do_not_matter():
     ],
     ids=["two points", "two that ran", "all floor", "constant", "zero", "one above the floor"],
 )
-def test_too_little_gives_no_order_but_a_reason(errors):
+def test_too_few_points_have_no_order_but_a_reason(errors):
     order = observed_order(STEPS[: len(errors)], errors)
     assert math.isnan(order.slope)
     assert math.isnan(order.stderr)
@@ -129,7 +123,7 @@ def test_bad_input(steps, errors, argument):
 
 
 def decide(errors):
-    """Return the points in the fit, numbered from the coarsest, and after a stroke the one that is the floor."""
+    """Return the points in the fit, numbered from the coarsest, and after a slash the point at the floor."""
     order = observed_order(STEPS[: len(errors)], errors)
     floor = "" if np.isnan(order.floor) else f"/{int(np.argmin(np.abs(errors - order.floor)))}"
     return ("".join(map(str, order.used)) or "none") + floor
@@ -172,26 +166,26 @@ def test_a_coarsest_pair_that_is_off_by_a_twentieth_is_left_out(slopes, decision
 
 @pytest.mark.parametrize(("part", "last"), [(0.9, 4), (1.1, 7)])
 def test_an_error_shrinks_while_its_slope_is_above_a_third_of_the_steepest(part, last):
-    found = observed_order(STEPS[:8], errors_of(2, 2, 2, 2, *3 * [part * SHRINKING * 2]))
-    assert np.isnan(found.floor) == (last == 7)
+    fitted = observed_order(STEPS[:8], errors_of(2, 2, 2, 2, *3 * [part * SHRINKING * 2]))
+    assert np.isnan(fitted.floor) == (last == 7)
     if last == 4:
-        assert found.floor == pytest.approx(errors_of(2, 2, 2, 2)[-1])
+        assert fitted.floor == pytest.approx(errors_of(2, 2, 2, 2)[-1])
 
 
 def test_one_lucky_zero_is_not_the_steepest_slope():
     errors = errors_of(2, 2, 2, 2, 2, 2, 2)
     errors[-1] = 0.0
-    found = observed_order(STEPS[:8], errors)
-    assert found.slope == pytest.approx(2, abs=1e-9)
-    assert 7 not in found.used
-    assert len(found.used) >= 3
+    fitted = observed_order(STEPS[:8], errors)
+    assert fitted.slope == pytest.approx(2, abs=1e-9)
+    assert 7 not in fitted.used
+    assert len(fitted.used) >= 3
 
 
 @pytest.mark.parametrize(("error", "used"), [(1.1e-6, {0, 1, 2, 3}), (0.9e-6, {0, 1, 2})])
 def test_points_within_ten_of_the_floor_are_left_out(error, used):
-    found = observed_order(STEPS[:8], np.array([1e-3, 1e-4, 1e-5, error, 1e-7, 1e-7, 1e-7, 1e-7]))
-    assert found.floor == pytest.approx(1e-7)
-    assert set(found.used) == used
+    fitted = observed_order(STEPS[:8], np.array([1e-3, 1e-4, 1e-5, error, 1e-7, 1e-7, 1e-7, 1e-7]))
+    assert fitted.floor == pytest.approx(1e-7)
+    assert set(fitted.used) == used
 
 
 X = np.linspace(-2.0, 3.0, 40)
@@ -199,9 +193,9 @@ X = np.linspace(-2.0, 3.0, 40)
 
 def test_a_line_through_noise_is_that_of_scipy():
     y = 0.3 * X - 1 + 0.1 * np.random.default_rng(1).normal(size=len(X))
-    found, expected = fit_line(X, y), linregress(X, y)
-    assert (found.slope, found.stderr) == pytest.approx((expected.slope, expected.stderr), rel=1e-12)
-    assert 0.08 < found.scatter < 0.12  # 0.1 was put in
+    fitted, expected = fit_line(X, y), linregress(X, y)
+    assert (fitted.slope, fitted.stderr) == pytest.approx((expected.slope, expected.stderr), rel=1e-12)
+    assert 0.08 < fitted.scatter < 0.12  # 0.1 was put in
 
 
 def test_the_scatter_of_points_nearly_on_a_line_keeps_its_digits():

@@ -20,7 +20,7 @@ model name\t: another
 
 @pytest.fixture
 def linux(tmp_path, monkeypatch):
-    """A machine whose kernel says this of itself."""
+    """A machine with these files in /proc."""
     (tmp_path / "cpuinfo").write_text(CPU)
     (tmp_path / "meminfo").write_text("MemTotal:       16000000 kB\nMemFree: 1 kB\n")
     read = origin.first_values
@@ -28,12 +28,12 @@ def linux(tmp_path, monkeypatch):
     return machine()
 
 
-def test_a_machine_is_that_of_its_first_processor(linux):
+def test_a_machine_is_described_by_its_first_processor(linux):
     assert (linux.processor, linux.model, linux.memory) == ("AMD EPYC", "cpu family 25 model 1", "16000000 kB")
     assert set(linux.as_dict()) == {"processor", "architecture", "cores", "memory", "system"}
 
 
-def test_the_title_has_what_round_off_depends_on(linux):
+def test_the_title_contains_what_affects_round_off(linux):
     known = replace(linux, architecture="x86_64")
     assert known.title.startswith("AMD EPYC cpu family 25 model 1, x86_64, numba ")
     assert replace(known, model="cpu family 25 model 2").title != known.title
@@ -41,12 +41,12 @@ def test_the_title_has_what_round_off_depends_on(linux):
     assert replace(known, model="").title.startswith("AMD EPYC, x86_64, numba ")
 
 
-def test_elsewhere_the_system_is_asked(tmp_path, monkeypatch):
+def test_other_systems_are_described_by_python(tmp_path, monkeypatch):
     monkeypatch.setattr(origin, "first_values", lambda path: {})
-    found = machine()
-    assert isinstance(found, Machine)
-    assert found.processor
-    assert (found.model, found.memory) == ("", "unknown")
+    described = machine()
+    assert isinstance(described, Machine)
+    assert described.processor
+    assert (described.model, described.memory) == ("", "unknown")
     assert origin.first_values(str(tmp_path / "nothing")) == {}
 
 

@@ -1,4 +1,4 @@
-"""The study of random bodies: which settings are measured, at which instants, and which of them are timed."""
+"""The study of random bodies: measured settings, instants of the errors, and timed settings."""
 
 from dataclasses import replace
 
@@ -32,13 +32,13 @@ def rows():
 
 
 def made_up(name, error, spent):
-    """A point of a line, with no run behind it."""
+    """Return a point of a line without a run."""
     return TimedSetting(Case("random", SCENE, method(name), Grid(0.1, 12)), None, error, spent)
 
 
 def line_of(value, quick=False):
-    """The settings of a method on one body."""
-    return random.cases(quick, Case("random", BODY, value, Grid(BODY.t_end / SAMPLES, SAMPLES)))
+    """Return the settings of a method on one body."""
+    return random.list_cases(Case("random", BODY, value, Grid(BODY.t_end / SAMPLES, SAMPLES)), quick)
 
 
 def test_bodies_are_the_first_ones_whatever_their_number():
@@ -96,7 +96,7 @@ def test_a_tolerance_that_an_engine_does_not_take_is_left_out():
     assert min(scipy) == 1e-13
 
 
-def test_what_a_family_stands_for():
+def test_the_settings_of_each_family():
     assert cv.Lame not in {type(each) for each in selection.methods(settings=random.settings)}  # exact, for symmetric bodies
     chosen = random.select(selection.methods())
     ours = {each.name for each in chosen if each.role == Role.OURS}
@@ -106,32 +106,32 @@ def test_what_a_family_stands_for():
     assert {each.name for each in chosen if each.family in ("mujoco", "pinocchio")} == {"mujoco", "pinocchio"}
 
 
-def test_only_what_may_decide_is_timed():
+def test_only_settings_that_may_decide_are_timed():
     cheap = [made_up("projected", error, time) for error, time in ((1e-1, 1.0), (1e-5, 2.0), (1e-13, 4.0))]
-    dear = [made_up("gauss", error, random.MARGIN * 8 * time) for error, time in ((1e-1, 1.0), (1e-5, 2.0), (1e-13, 4.0))]
-    other = [made_up("heyoka", 1e-13, 1e3)]  # another side, however dear
-    assert random.worth_timing([cheap, dear, other]) == [*cheap, *other]
-    near = [replace(point, spent=point.spent / 24) for point in dear]
+    expensive = [made_up("gauss", error, random.MARGIN * 8 * time) for error, time in ((1e-1, 1.0), (1e-5, 2.0), (1e-13, 4.0))]
+    other = [made_up("heyoka", 1e-13, 1e3)]  # another side, however expensive
+    assert random.worth_timing([cheap, expensive, other]) == [*cheap, *other]
+    near = [replace(point, spent=point.spent / 24) for point in expensive]
     assert set(map(id, random.worth_timing([cheap, near, other]))) == set(map(id, [*cheap, *near, *other]))
 
 
-def test_a_lucky_point_is_timed_only_with_what_it_is_credited_with():
+def test_an_isolated_good_point_is_timed_by_its_credited_error():
     line = [made_up("projected", error, time) for error, time in ((1e-13, 1.0), (1e-1, 2.0), (1e-13, 4.0), (1e-14, 8.0))]
     assert random.worth_timing([line]) == line[1:3]
 
 
 def test_the_run_that_is_timed_is_longer_in_the_same_steps():
     quick, slow = made_up("projected", 1e-3, 1e-9), made_up("projected", 1e-3, 1.0)
-    assert random.longer(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
-    assert random.longer(slow).grid == Grid(0.1, 12, 12)
+    assert random.lengthen(quick).grid == Grid(0.1, 12 * DURATIONS, 12 * DURATIONS)
+    assert random.lengthen(slow).grid == Grid(0.1, 12, 12)
 
 
 @pytest.mark.parametrize(
     ("how", "kind"), [("raises", OutcomeKind.CRASHED), ("diverges", OutcomeKind.DIVERGED), ("is skewed", None)]
 )
 def test_a_run_that_is_timed_has_to_end_and_may_drift(how, kind):
-    found = random.prepare_unchecked(Case("random", SCENE, Broken(how), Grid(0.1, 12, 12)))
-    assert (found.kind if isinstance(found, Outcome) else None) == kind
+    result = random.prepare_unchecked(Case("random", SCENE, Broken(how), Grid(0.1, 12, 12)))
+    assert (result.kind if isinstance(result, Outcome) else None) == kind
 
 
 def test_a_bug_of_ours_is_no_outcome():
@@ -145,5 +145,5 @@ def test_a_bug_of_ours_is_no_outcome():
 def test_truth_agrees_with_another_one():
     scene = random_body("attraction", 3, 0)
     grid = Grid(scene.t_end / SAMPLES, SAMPLES)
-    found, other = random.precise(scene, grid).trajectory, method("scipy:rtol=1e-12").solve(scene, grid)
-    assert angle_between(found.R_WB, other.R_WB).max() < 1e-9  # measured 4e-12
+    result, other = random.precise(scene, grid).trajectory, method("scipy:rtol=1e-12").solve(scene, grid)
+    assert angle_between(result.R_WB, other.R_WB).max() < 1e-9  # measured 4e-12

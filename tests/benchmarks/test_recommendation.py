@@ -1,4 +1,4 @@
-"""The recommendation: its honesty against independent runs, and the laws by which it extrapolates."""
+"""The recommendation against independent runs, and its laws of extrapolation."""
 
 import math
 from dataclasses import replace
@@ -25,18 +25,18 @@ def free_body(t_end=20.0):
 
 
 def true_error(scene, probe, duration, truth):
-    """Largest attitude error of a run over the whole duration, sampled about twice a second."""
+    """Return the largest attitude error of a run over the whole duration, sampled about twice a second."""
     each = max(1, round(0.5 / probe.dt))
     grid = Grid(probe.dt, each * math.ceil(duration / probe.dt / each), each)
-    found = probe.method.prepare(scene, grid)()
-    return float(angle_between(truth.prepare(scene, grid)().R_WB, found.R_WB).max())
+    answer = probe.method.prepare(scene, grid)()
+    return float(angle_between(truth.prepare(scene, grid)().R_WB, answer.R_WB).max())
 
 
 def largest_excess(scene, error, duration, names, truth=None):
-    """How far the worst of the settings that are said to reach an error is above it, as a factor."""
-    found = recommend(ask(scene, error, duration, names))
-    reached = [advice for advice in found.advice if advice.reached]
-    assert found.ours in reached
+    """Return the largest true error of the recommended settings, divided by the requested error."""
+    answer = recommend(ask(scene, error, duration, names))
+    reached = [advice for advice in answer.advice if advice.reached]
+    assert answer.ours in reached
     return max(true_error(scene, advice.best, duration, truth or Exact()) for advice in reached) / error
 
 
@@ -75,14 +75,14 @@ def test_all_integrators_of_an_engine_are_listed(of_mujoco):
     assert euler.best.holds < 20
 
 
-def test_ours_is_cheaper_and_keeps_what_it_should(of_mujoco):
+def test_ours_is_cheaper_and_conserves_the_invariants(of_mujoco):
     ours = of_mujoco.ours
     assert of_mujoco.winners["cheapest"] is ours
     assert max(drift.expected for drift in ours.best.drifts) < 1e-13  # measured 1e-15
     assert not any(drift.secular for drift in ours.best.drifts)
 
 
-def test_the_best_general_integrator_and_the_best_engine_stand_beside_a_closed_form(of_mujoco):
+def test_the_best_general_integrator_and_the_best_engine_are_listed_with_a_closed_form(of_mujoco):
     lines = {kind: advice.line for kind, advice in of_mujoco.winners.items()}
     assert lines == {"cheapest": "moser_veselov", "cheapest_general": "taylor:order=12", "cheapest_engine": "mujoco"}
     general = of_mujoco.winners["cheapest_general"]
@@ -97,7 +97,7 @@ def test_every_engine_has_a_line_for_each_setting_that_is_no_tolerance():
 
 
 def test_an_engine_that_is_missing_is_named_or_an_error(monkeypatch):
-    from conservative.references.engines.mujoco import MuJoCo
+    from conservative.references.engines.catalogue import MuJoCo
 
     def missing(self):
         raise cv.MissingEngine("MuJoCo", "mujoco")
@@ -145,7 +145,7 @@ def test_bounded_error_is_taken_as_linear_and_steady_drift_as_quadratic():
     assert drifting.extrapolate(100.0) > 1e-2
 
 
-def test_what_is_measured_is_not_extrapolated():
+def test_a_measured_error_is_not_extrapolated():
     law = fit_law(T, 1e-8 * T, 0.0, math.inf)
     assert law.extrapolate(10.0) == pytest.approx(1e-7)
     assert math.isinf(law.extrapolate(11.0))
@@ -159,7 +159,7 @@ def test_a_law_carried_to_a_finer_setting_is_extrapolated():
     assert not by_step.is_measured(10.0)
 
 
-def test_amplification_tells_exponential_growth_from_linear():
+def test_amplification_distinguishes_exponential_from_linear_growth():
     linear = amplification_of(T, T, 1e-9, "")
     assert not linear.unstable
     assert linear.excess(1.0, 10.0) == pytest.approx(1.0)
@@ -171,9 +171,9 @@ def test_amplification_tells_exponential_growth_from_linear():
 
 
 def test_an_unstable_motion_is_called_so():
-    found = recommend(ask(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
-    assert found.conditions.amplification.unstable
-    assert found.conditions.amplification.steepness > growth.FASTER_THAN_LINEAR
+    answer = recommend(ask(registry.scene("unstable_spin"), 1e-6, 10.0, ("heyoka",)))
+    assert answer.conditions.amplification.unstable
+    assert answer.conditions.amplification.steepness > growth.FASTER_THAN_LINEAR
 
 
 def test_steps_are_round_numbers(of_mujoco):

@@ -1,4 +1,4 @@
-"""Scenes, methods and engines by name: what a name stands for, and engines that are not installed."""
+"""Scenes, methods and engines by name, and engines that are not installed."""
 
 import re
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from conservative import BadInput, MissingEngine, Reduced, registry
 from conservative.benchmarks.studies import engine_selection, selection
 from conservative.benchmarks.studies.case import Case, attempt, names_of
 from conservative.benchmarks.studies.engine_selection import is_as_installed, list_installed, select_engines
-from conservative.benchmarks.studies.selection import Missing, at_tolerance, identifier, methods, series, tolerance_setting
+from conservative.benchmarks.studies.selection import Missing, at_tolerance, methods, series, tolerance_setting
+from conservative.benchmarks.suite.points import Point
 from conservative.card import Maker
 from conservative.grid import Grid, grid_for
 from conservative.method import Method, Role
@@ -23,8 +24,8 @@ BRICK = registry.scene("brick_flip")
 
 
 def test_scenes_by_name_with_parameters():
-    found = selection.scenes(("lagrange_top", "brick_flip:disturbance=0.001"))
-    assert [scene.name for scene in found] == ["lagrange_top", "brick_flip_0.001"]
+    selected = selection.scenes(("lagrange_top", "brick_flip:disturbance=0.001"))
+    assert [scene.name for scene in selected] == ["lagrange_top", "brick_flip_0.001"]
     assert [scene.name for scene in selection.scenes()] == ["brick_flip", "lagrange_top"]
 
 
@@ -33,10 +34,10 @@ def test_a_family_stands_for_its_variants_and_a_name_with_settings_for_one():
     assert methods(["mujoco:Euler"]) == (registry.method("mujoco:Euler"),)
 
 
-def test_ours_come_first_and_nothing_comes_twice():
-    found = methods(["scipy", "reduced:order=2", "scipy:rtol=1e-9", "convected"])
-    assert [method.role for method in found] == ["ours", "ours", "engine", "engine"]
-    assert len(set(found)) == len(found)
+def test_ours_come_first_and_duplicates_are_removed():
+    selected = methods(["scipy", "reduced:order=2", "scipy:rtol=1e-9", "convected"])
+    assert [method.role for method in selected] == ["ours", "ours", "engine", "engine"]
+    assert len(set(selected)) == len(selected)
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def test_a_missing_engine_is_an_error_unless_skipped():
         methods(["reduced", "mujoco"])
     ours, missing = methods(["reduced:order=2", "mujoco"], skip_missing=True)
     assert ours == Reduced()
-    assert missing == Missing("mujoco", "MuJoCo", "mujoco")
+    assert missing == Missing("mujoco", error=MissingEngine("MuJoCo", "mujoco"))
     assert (missing.name, missing.label, missing.role, missing.order) == ("mujoco", "mujoco", "engine", None)
     with pytest.raises(MissingEngine, match="pip install mujoco"):
         missing.prepare(BRICK, Grid(0.01, 1))
@@ -70,7 +71,7 @@ def test_tolerances_belong_to_adaptive_methods_only():
     assert at_tolerance(scipy, "rtol", 1e-5) == registry.method("scipy:rtol=1e-5")
 
 
-def test_a_line_of_a_picture_is_a_method_whatever_its_tolerance():
+def test_tolerances_of_a_method_are_one_line():
     assert series(registry.method("scipy:rtol=1e-9")) == series(registry.method("scipy:rtol=1e-5")) == "scipy"
     assert series(registry.method("scipy:RK45,rtol=1e-5")) == "scipy:integrator=RK45"
     assert series(Reduced(tol=1e-9)) == "reduced:tol=1e-09"
@@ -87,13 +88,13 @@ def test_a_line_of_a_picture_is_a_method_whatever_its_tolerance():
     ],
 )
 def test_ids_of_benchmarks(name, expected):
-    assert identifier(BRICK, registry.method(name), 0.01) == expected
+    assert Point(BRICK, registry.method(name)).id == expected
 
 
 def test_ids_are_different_and_have_no_odd_characters():
-    found = [identifier(scene, method, 0.01) for scene in selection.scenes() for method in methods()]
-    assert len(set(found)) == len(found)
-    assert all(re.fullmatch(r"[\w.+-]+", text) for text in found)
+    selected = [Point(scene, method).id for scene in selection.scenes() for method in methods()]
+    assert len(set(selected)) == len(selected)
+    assert all(re.fullmatch(r"[\w.+-]+", text) for text in selected)
 
 
 @pytest.fixture(autouse=True)
@@ -101,25 +102,25 @@ def nothing_in_environments(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
-def test_an_engine_beside_us_stands_for_all_its_settings():
-    found = select_engines(["pinocchio"])
-    assert [method.name for method in found] == ["pinocchio:scheme=Euler", "pinocchio"]
+def test_an_engine_in_this_environment_has_all_its_settings():
+    selected = select_engines(["pinocchio"])
+    assert [method.name for method in selected] == ["pinocchio:scheme=Euler", "pinocchio"]
 
 
-def test_all_are_those_beside_us_where_no_environment_is_there():
+def test_all_engines_without_other_environments_are_those_in_this_one():
     families = {method.family for method in select_engines(["all"])}
     assert {"mujoco", "pinocchio", "heyoka", "scipy"} <= families
     assert not families & {"reduced", "exact", "exudyn"}
 
 
-def test_all_take_the_newest_environment_and_none_of_what_is_beside_us(monkeypatch, tmp_path):
+def test_all_engines_include_the_newest_environment_of_each(monkeypatch, tmp_path):
     here = select_engines(["mujoco"])[0].label.partition("/")[0].partition("==")[2]
     made = [("exudyn", "1.9"), ("exudyn", "1.10"), ("mujoco", here), ("unregistered", "1.0")]
     environments = tuple(Environment(*each, tmp_path, "3.11", ()) for each in made)
     monkeypatch.setattr(engine_selection, "list_environments", lambda: environments)
-    found = list_installed()
-    assert found[-1] == "exudyn==1.10"
-    assert sum(name.startswith("mujoco") for name in found) == 1
+    selected = list_installed()
+    assert selected[-1] == "exudyn==1.10"
+    assert sum(name.startswith("mujoco") for name in selected) == 1
     monkeypatch.setattr(engine_selection, "list_environments", lambda: (Environment("mujoco", "0.1", tmp_path, "3.11", ()),))
     assert list_installed()[-1] == "mujoco==0.1"
 
@@ -130,12 +131,12 @@ def test_an_engine_without_an_environment_is_an_error_with_the_line_that_install
         select_engines([name])
 
 
-def test_a_missing_engine_is_a_row_where_it_is_asked_for():
-    (found,) = select_engines(["exudyn==1.2.3"], skip_missing=True)
-    assert isinstance(found, Missing)
-    assert found.label == "exudyn==1.2.3"
-    case = Case("engines_at_one_step", SCENE, found, grid_for(SCENE, 0.02))
-    outcome = attempt(case, skip_missing=True).outcome
+def test_a_missing_engine_is_a_row_if_requested():
+    (selected,) = select_engines(["exudyn==1.2.3"], skip_missing=True)
+    assert isinstance(selected, Missing)
+    assert selected.label == "exudyn==1.2.3"
+    case = Case("engines_at_one_step", SCENE, selected, grid_for(SCENE, 0.02))
+    outcome = attempt(case, skip_missing=True)
     assert outcome.kind is OutcomeKind.MISSING
     assert outcome.reason.endswith("conservative engines install exudyn==1.2.3")
     with pytest.raises(MissingEnvironment):
@@ -148,9 +149,9 @@ def test_a_name_that_is_no_engine_is_bad_input(name):
         select_engines([name])
 
 
-def test_no_setting_is_as_installed_where_the_engine_does_not_say_so():
+def test_an_engine_without_the_declaration_has_no_setting_as_installed():
     assert not any(is_as_installed(method) for method in select_engines(["scipy"]))
-    assert not is_as_installed(Missing("mujoco", "MuJoCo", "mujoco"))
+    assert not is_as_installed(Missing("mujoco", error=MissingEngine("MuJoCo", "mujoco")))
 
 
 @dataclass(frozen=True)
@@ -188,21 +189,21 @@ class Adaptive(Method):
 )
 def test_the_columns_of_a_method(method, parts, of_series):
     value = registry.method(method)
-    found = names_of(value)
+    selected = names_of(value)
     expected = tuple(value.maker.version if part == "VERSION" else part for part in parts)
-    assert (found["family"], found["version"], found["setting"]) == expected
-    assert found["engine"] == ("" if value.role != Role.ENGINE else found["family"])
-    assert found["series_setting"] == of_series
-    assert (found["method"], found["label"]) == (value.name, value.label)
+    assert (selected["family"], selected["version"], selected["setting"]) == expected
+    assert selected["engine"] == ("" if value.role != Role.ENGINE else selected["family"])
+    assert selected["series_setting"] == of_series
+    assert (selected["method"], selected["label"]) == (value.name, value.label)
 
 
 def test_a_method_of_another_package_has_its_version_and_its_name_once():
-    found = names_of(Adaptive(stol=4, tol=1e-9))
-    assert (found["family"], found["version"], found["setting"]) == ("adaptive", "1.0", "stol=4,tol=1e-09")
-    assert (found["series"], found["series_setting"]) == ("adaptive:stol=4", "stol=4")
+    selected = names_of(Adaptive(stol=4, tol=1e-9))
+    assert (selected["family"], selected["version"], selected["setting"]) == ("adaptive", "1.0", "stol=4,tol=1e-09")
+    assert (selected["series"], selected["series_setting"]) == ("adaptive:stol=4", "stol=4")
 
 
-def test_a_method_whose_engine_is_missing_is_called_as_it_was_asked_for():
-    found = names_of(Missing("mujoco:RK4", "MuJoCo", "mujoco"))
-    assert (found["family"], found["version"], found["setting"]) == ("mujoco", "", "RK4")
-    assert found["label"] == "mujoco:RK4"
+def test_a_method_with_a_missing_engine_has_the_name_that_was_given():
+    selected = names_of(Missing("mujoco:RK4", error=MissingEngine("MuJoCo", "mujoco")))
+    assert (selected["family"], selected["version"], selected["setting"]) == ("mujoco", "", "RK4")
+    assert selected["label"] == "mujoco:RK4"

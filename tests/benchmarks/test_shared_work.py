@@ -1,4 +1,4 @@
-"""What the studies share: instants, motions, truths, and what is prepared of a scene."""
+"""Work shared by studies: instants, reference solutions, and the conversion of a scene."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,7 +9,7 @@ import pytest
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.studies import step_ladder, studies
-from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, Truths
+from conservative.benchmarks.studies.study import MOST_TRUTHS, Study, remember_truths
 from conservative.grid import Grid
 from conservative.method import Role
 from conservative.references.exact.method import Exact
@@ -18,31 +18,31 @@ from conservative.registry import method
 from .generic_study import SCENE, Broken, truth
 
 
-def test_a_motion_is_found_once_by_the_studies_that_share_it():
+def test_studies_share_their_reference_solutions():
     asked = []
 
     def find(scene, grid):
         asked.append((scene, grid))
         return truth(scene, grid)
 
-    truths = Truths(find)
+    truths = remember_truths(find)
     for name in ("convergence", "work_precision"):
         assert list(studies.rows(Study(name, (SCENE,), (cv.Reduced(), method("mujoco:Euler")), quick=True, truth=truths)))
     assert asked == [(SCENE, step_ladder.samples(SCENE, cv.Reduced()))]
-    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=Truths(find))))
+    list(studies.rows(Study("convergence", (SCENE,), (cv.Reduced(),), quick=True, truth=remember_truths(find))))
     assert len(asked) == 2
 
 
 def test_the_studies_of_a_report_share_their_truths():
-    found = studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))
-    assert [study.name for study in found] == list(studies.MAIN)
-    assert len({id(study.truth) for study in found}) == 1
-    assert studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))[0].truth is not found[0].truth
+    result = studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))
+    assert [study.name for study in result] == list(studies.MAIN)
+    assert len({id(study.truth) for study in result}) == 1
+    assert studies.cross_studies(studies.MAIN, (SCENE,), (cv.Reduced(),))[0].truth is not result[0].truth
 
 
 def test_truths_keep_a_bounded_number_of_motions():
     asked = []
-    truths = Truths(lambda scene, grid: asked.append(grid))
+    truths = remember_truths(lambda scene, grid: asked.append(grid))
     grids = [Grid(0.01, n) for n in range(1, MOST_TRUTHS + 2)]
     for grid in [*grids, grids[-1], grids[0]]:
         truths(SCENE, grid)
@@ -54,7 +54,7 @@ def test_preparation_converts_a_scene_that_other_studies_converted():
 
     @dataclass(frozen=True)
     class Converting(Broken):
-        """A method that keeps what it makes of a scene with the scene."""
+        """A method that stores its conversion of a scene with the scene."""
 
         def prepare(self, scene, grid):
             scene.derive(converted.append)
@@ -67,7 +67,7 @@ def test_preparation_converts_a_scene_that_other_studies_converted():
 
 @dataclass(frozen=True)
 class Closed(cv.Method):
-    """The exact motion in the steps of a method of some order, of one with exact steps where that is None."""
+    """The exact motion under the name of a method of some order; None: a method with exact steps."""
 
     steps: int | None
     family: ClassVar[str] = "closed"
@@ -84,7 +84,7 @@ class Closed(cv.Method):
 
 @dataclass(frozen=True)
 class Adaptive(Closed):
-    """The same with a tolerance in place of a step."""
+    """The same with a tolerance instead of a step."""
 
     steps: None = None
     tol: float = 1e-9
@@ -103,8 +103,8 @@ def test_every_line_has_the_same_instants(name, monkeypatch):
         return measure(trajectory, exact)
 
     monkeypatch.setattr(errors, "measure_errors", record)
-    found = list(studies.rows(Study(name, (SCENE,), METHODS, quick=True, truth=truth)))
-    read = {row.series for row in found if row.measure.text.startswith("attitude") and row.outcome.ok}
+    result = list(studies.rows(Study(name, (SCENE,), METHODS, quick=True, truth=truth)))
+    read = {row.series for row in result if row.measure.text.startswith("attitude") and row.outcome.ok}
     assert len(read) == (3 if name == "convergence" else len(METHODS))  # that one is of methods with an order alone
     expected = np.linspace(0.0, SCENE.t_end, step_ladder.SAMPLES + 1)
     assert len(seen) >= 3 * len(read) - 1

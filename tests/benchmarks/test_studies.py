@@ -1,18 +1,17 @@
 import math
 from functools import cache
 
-import numpy as np
 import pytest
 
 import conservative as cv
 from conservative.benchmarks.measures import errors
 from conservative.benchmarks.measures.measure import Measure, key
-from conservative.benchmarks.studies import step_ladder, studies
-from conservative.benchmarks.studies.paper import APPROXIMATE, agreement
+from conservative.benchmarks.studies import studies
+from conservative.benchmarks.studies.paper import APPROXIMATE, agreement_row
 from conservative.benchmarks.studies.selection import Missing
 from conservative.benchmarks.studies.speed import MEASURES
 from conservative.benchmarks.studies.study import Study
-from conservative.grid import Grid, grid_for
+from conservative.grid import grid_for
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 from conservative.references.truth import Truth
@@ -20,7 +19,7 @@ from conservative.registry import method
 
 from .generic_study import SCENE, Broken, truth
 
-ABSENT = Missing("mujoco", "MuJoCo", "mujoco")
+ABSENT = Missing("mujoco", error=cv.MissingEngine("MuJoCo", "mujoco"))
 KINDS = {
     "unsupported": OutcomeKind.UNSUPPORTED,
     "refuses": OutcomeKind.UNSUPPORTED,
@@ -32,9 +31,9 @@ KINDS = {
 }
 BROKEN = tuple(Broken(how) for how in KINDS)
 FACTS = (Measure.PRECISION, Measure.ORDER_EXPECTED)
-"""What is known of a method however its runs end."""
+"""Properties of a method that do not depend on its runs."""
 CROSSING = [name for name in studies.MAKERS if name not in ("sphere_curves", "paper_figures", "throughput")]
-"""Studies with a row for every method, whatever comes of it. That of throughput has a test of its own: it draws its bodies."""
+"""Studies with a row for every method, also for failures. The study of throughput has its own tests."""
 
 
 def rows(name, *methods, quick=True, **settings):
@@ -45,29 +44,29 @@ def rows(name, *methods, quick=True, **settings):
 @cache
 def table(name):
     """Rows of a study of three orders, by (method, dt, measure)."""
-    found = rows(name, cv.Reduced(), cv.Convected(tol=1e-12), method("scipy:rtol=1e-9"))
-    assert all(row.study == name and row.scene == "generic" for row in found)
-    return {(row.method, row.dt, key(row.measure, row.quantity)): row for row in found}
+    measured = rows(name, cv.Reduced(), cv.Convected(tol=1e-12), method("scipy:rtol=1e-9"))
+    assert all(row.study == name and row.scene == "generic" for row in measured)
+    return {(row.method, row.dt, key(row.measure, row.quantity)): row for row in measured}
 
 
 def test_paper_measures_every_method_at_three_steps():
-    found = table("paper")
-    assert {dt for name, dt, _ in found if name == "reduced"} == {0.02, 0.01, 0.005}
-    assert {dt for name, dt, _ in found if name.startswith("scipy")} == {0.02}  # its accuracy does not depend on dt
+    measured = table("paper")
+    assert {dt for name, dt, _ in measured if name == "reduced"} == {0.02, 0.01, 0.005}
+    assert {dt for name, dt, _ in measured if name.startswith("scipy")} == {0.02}  # its accuracy does not depend on dt
     for dt in (0.02, 0.01, 0.005):
-        assert {measure for name, at, measure in found if (name, at) == ("reduced", dt)} > {
+        assert {measure for name, at, measure in measured if (name, at) == ("reduced", dt)} > {
             value.key for value in errors.blanks(SCENE)
         }
-        assert found["reduced", dt, "energy drift max"].value < 1e-14  # measured 8e-16
-        assert found["reduced", dt, "steps"].value == round(2.0 / dt)
-    assert all(row.outcome.ok for row in found.values())
+        assert measured["reduced", dt, "energy drift max"].value < 1e-14  # measured 8e-16
+        assert measured["reduced", dt, "steps"].value == round(2.0 / dt)
+    assert all(row.outcome.ok for row in measured.values())
 
 
-def test_paper_says_how_well_the_truths_agree():
+def test_paper_has_the_agreement_of_the_reference_solutions():
     row = table("paper")["", 0.02, "truth agreement"]
     assert (row.value, row.role, row.label) == (2e-15, Role.TRUTH, "exact and other")
     assert row.detail == ""
-    rough = agreement(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
+    rough = agreement_row(Study("paper", (SCENE,), (method("reduced"),)), SCENE, 0.02, Truth(None, 1e-9, ("a", "b"), 1.0, True))
     assert rough.detail == APPROXIMATE
 
 
@@ -79,37 +78,37 @@ def test_paper_errors_are_those_of_the_run():
 
 
 def test_convergence_finds_the_order_of_each_method():
-    found = {(name, measure): row for (name, dt, measure), row in table("convergence").items() if math.isnan(dt)}
+    measured = {(name, measure): row for (name, dt, measure), row in table("convergence").items() if math.isnan(dt)}
     for name in ("reduced", "convected:tol=1e-12"):
         for measure in ("observed order", "observed order rates"):
-            assert abs(found[name, measure].value - 2) < 0.02  # measured 0.001 and 0.004
-            assert found[name, f"{measure} stderr"].value < 0.02  # measured 4e-4 and 2e-3
-            assert "points" in found[name, measure].detail
-    without = found["scipy:rtol=1e-09", "observed order"]
+            assert abs(measured[name, measure].value - 2) < 0.02  # measured 0.001 and 0.004
+            assert measured[name, f"{measure} stderr"].value < 0.02  # measured 4e-4 and 2e-3
+            assert "points" in measured[name, measure].detail
+    without = measured["scipy:rtol=1e-09", "observed order"]
     assert without.outcome.kind is OutcomeKind.UNSUPPORTED
     assert math.isnan(without.value)
 
 
 def test_speed_has_times_per_step_and_per_second():
-    found = table("speed")
-    for name in {name for name, _, _ in found}:
-        times = {measure: row for (who, _, measure), row in found.items() if who == name}
+    measured = table("speed")
+    for name in {name for name, _, _ in measured}:
+        times = {measure: row for (who, _, measure), row in measured.items() if who == name}
         assert set(times) == {measure.text for measure in MEASURES}
         assert times["time per simulated second"].value > 0
         assert times["time per step"].value <= times["time per step median"].value
-    row = found["reduced", 0.02, "time per simulated second"]
-    assert row.value == pytest.approx(found["reduced", 0.02, "time per step"].value / 0.02, rel=1e-9)
+    row = measured["reduced", 0.02, "time per simulated second"]
+    assert row.value == pytest.approx(measured["reduced", 0.02, "time per step"].value / 0.02, rel=1e-9)
     assert "rounds" in row.detail
 
 
 def test_work_precision_pairs_error_and_time():
-    found = table("work_precision")
-    points = {(name, dt) for name, dt, _ in found}
+    measured = table("work_precision")
+    points = {(name, dt) for name, dt, _ in measured}
     assert len({point for point in points if point[0] == "reduced"}) == 4  # every second of eight steps
     assert len({point for point in points if point[0].startswith("scipy")}) >= 4
     timed = set()
     for point in points:
-        error, time = (found[*point, measure] for measure in ("attitude error final", "time per simulated second"))
+        error, time = (measured[*point, measure] for measure in ("attitude error final", "time per simulated second"))
         assert (error.outcome, error.series) == (time.outcome, time.series)
         if error.outcome.ok:
             assert error.value > 0
@@ -119,19 +118,19 @@ def test_work_precision_pairs_error_and_time():
             assert error.outcome.kind is OutcomeKind.SKIPPED
             assert math.isnan(error.value)
             assert math.isnan(time.value)
-    assert timed == {row.series for row in found.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
+    assert timed == {row.series for row in measured.values()} == {"reduced", "convected:tol=1e-12", "scipy"}
 
 
 @pytest.mark.parametrize("name", CROSSING)
 def test_nothing_is_dropped_silently(name):
-    found = rows(name, *BROKEN, ABSENT, skip_missing=True)
+    measured = rows(name, *BROKEN, ABSENT, skip_missing=True)
     for broken in BROKEN:
-        mine = [row for row in found if row.method == broken.name]
+        mine = [row for row in measured if row.method == broken.name]
         assert mine
         assert KINDS[broken.how] in {row.outcome.kind for row in mine}
         assert {row.outcome.kind for row in mine} <= {KINDS[broken.how], OutcomeKind.NO_ORDER}
         assert all(math.isnan(row.value) for row in mine if row.measure not in FACTS)
-    missing = [row for row in found if row.method == "mujoco"]
+    missing = [row for row in measured if row.method == "mujoco"]
     assert missing
     assert all(row.outcome.kind is OutcomeKind.MISSING and math.isnan(row.value) for row in missing)
 
@@ -170,13 +169,3 @@ def test_bad_studies(change, argument):
     with pytest.raises(cv.BadInput) as caught:
         studies.findings(Study(**{**good, **change}))
     assert caught.value.argument == argument
-
-
-@pytest.mark.parametrize("name", ["reduced", "mujoco:Euler", "gauss:stages=4"])
-def test_steps_of_all_sizes_have_the_same_samples(name):
-    chosen = method(name)
-    grids = step_ladder.steps(SCENE, chosen)
-    expected = step_ladder.samples(SCENE, chosen).t
-    assert all(np.allclose(grid.t, expected, rtol=1e-14, atol=0) for grid in grids)  # measured 2e-16
-    assert [grid.dt for grid in grids] == sorted({grid.dt for grid in grids}, reverse=True)
-    assert isinstance(grids[0], Grid)

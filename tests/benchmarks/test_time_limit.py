@@ -1,4 +1,4 @@
-"""Studies beside engines that are slow, hang, lie or end their process: limits of time, and what they end."""
+"""Time limits of studies with engines that are slow, hang or end their process."""
 
 import math
 import threading
@@ -11,16 +11,15 @@ import conservative as cv
 from conservative import registry
 from conservative.attitude import rotation_about
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.studies import convergence, studies, study
-from conservative.benchmarks.studies.case import Case, Failure, Success, attempt
-from conservative.benchmarks.studies.convergence import FEWEST_POINTS, fits
+from conservative.benchmarks.studies import line, studies, study
+from conservative.benchmarks.studies.case import Case, Success, attempt
+from conservative.benchmarks.studies.line import FEWEST_POINTS, LINE_LIMIT, attempt_each
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
-from conservative.benchmarks.studies.work_precision import points
+from conservative.benchmarks.studies.work_precision import list_cases
 from conservative.grid import Grid, grid_for
-from conservative.outcome import OutcomeKind
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.engine import PACE_STEPS, STEP_LIMIT, limit_reason
-from conservative.references.engines.scipy import SciPy
 from conservative.references.worker.client import close_workers
 
 from .foreign_engines import Fast, Harmful, Slow
@@ -38,24 +37,24 @@ def rows(name, *methods, **settings):
 
 
 def copy_of(scene):
-    """The same scene as another object, as what was ended on one is not tried on it again."""
+    """Return the same scene as another object: runs that timed out are not repeated on the same object."""
     return scene.rename(scene.name)
 
 
 @pytest.mark.parametrize("scene", [SCENE, SPRUNG], ids=lambda scene: scene.name)
 @pytest.mark.parametrize("name", ["scipy", "mujoco:RK4", "heyoka", "pinocchio"])
-def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
+def test_a_run_in_a_worker_is_the_same_bit_for_bit(scene, name):
     case = Case("any", scene, registry.method(name), grid_for(scene, 0.05))
     here, there = attempt(case), attempt_apart(60.0, case)
-    if isinstance(here, Failure):
+    if isinstance(here, Outcome):
         assert here == there
         return
     again = there.run()
-    for found in (there.trajectory, again):
-        assert found.scene is scene
-        assert (found.label, found.counters) == (here.trajectory.label, here.trajectory.counters)
+    for measured in (there.trajectory, again):
+        assert measured.scene is scene
+        assert (measured.label, measured.counters) == (here.trajectory.label, here.trajectory.counters)
         for part in ("t", "R_WB", "w_WB_B"):
-            assert np.array_equal(getattr(found, part), getattr(here.trajectory, part))
+            assert np.array_equal(getattr(measured, part), getattr(here.trajectory, part))
 
 
 @pytest.mark.parametrize(
@@ -67,27 +66,27 @@ def test_a_run_elsewhere_is_the_same_bit_for_bit(scene, name):
     ],
 )
 @pytest.mark.parametrize("attempt_so", [attempt_within, attempt_here])
-def test_what_an_engine_does_to_its_process_is_an_outcome(how, limit, kind, reason, attempt_so):
+def test_a_hanging_or_crashing_engine_is_an_outcome(how, limit, kind, reason, attempt_so):
     close_workers()
     before = threading.enumerate()
     done = attempt_so(limit, Case("any", copy_of(SCENE), Harmful(how), grid_for(SCENE, 0.05)))
-    assert (done.outcome.kind, done.outcome.reason) == (kind, reason)
+    assert (done.kind, done.reason) == (kind, reason)
     assert threading.enumerate() == before
     assert psutil.Process().children(recursive=True) == []
 
 
-def test_nobody_waits_for_the_same_twice():
+def test_a_run_that_timed_out_is_not_repeated():
     case = Case("any", copy_of(SCENE), Harmful("hang"), grid_for(SCENE, 0.05))
-    assert attempt_within(0.2, case).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.1, case).outcome.reason == "a run of 40 steps was ended after 0.2 s"
-    assert attempt_within(0.3, case).outcome.reason == "after 0.3 s"
+    assert attempt_within(0.2, case).reason == "after 0.2 s"
+    assert attempt_within(0.1, case).reason == "a run of 40 steps was ended after 0.2 s"
+    assert attempt_within(0.3, case).reason == "after 0.3 s"
 
 
 def test_a_shorter_motion_is_tried_though_a_longer_one_of_fewer_samples_was_ended():
     scene = copy_of(SCENE)
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(2.0, 1))).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.1, 10))).outcome.reason == "after 0.2 s"
-    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.05, 20))).outcome.reason.startswith("a run of 10")
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(2.0, 1))).reason == "after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.1, 10))).reason == "after 0.2 s"
+    assert attempt_within(0.2, Case("any", scene, Harmful("hang"), Grid(0.05, 20))).reason.startswith("a run of 10")
 
 
 def test_the_limit_is_an_option_of_all_studies():
@@ -112,45 +111,47 @@ def test_an_engine_that_hangs_does_not_hold_up_a_study(name, monkeypatch):
     monkeypatch.setattr(study, "HANG_LIMIT", 0.5)
     monkeypatch.setattr(studies.stability, "FIRST_LIMIT", 0.5)
     scene = copy_of(SCENE)
-    found = list(studies.rows(Study(name, (scene,), (Harmful("hang"), cv.Reduced()), quick=True, truth=truth, time_limit=0.05)))
-    mine = [row for row in found if row.method == Harmful("hang").name]
+    measured = list(
+        studies.rows(Study(name, (scene,), (Harmful("hang"), cv.Reduced()), quick=True, truth=truth, time_limit=0.05))
+    )
+    mine = [row for row in measured if row.method == Harmful("hang").name]
     assert {row.outcome.kind for row in mine} <= {OutcomeKind.TIMEOUT, OutcomeKind.SKIPPED, OutcomeKind.NO_ORDER}
     assert all(math.isnan(row.value) for row in mine)
     assert any(row.outcome.kind is OutcomeKind.TIMEOUT for row in mine) or name == "sphere_curves"
-    assert any(row.outcome.ok for row in found if row.method == "reduced") or name == "sphere_curves"
+    assert any(row.outcome.ok for row in measured if row.method == "reduced") or name == "sphere_curves"
 
 
 @pytest.fixture
 def on_an_idle_machine(monkeypatch):
-    """Runs of `Slow` that are taken to last as long as they sleep, however busy the machine is."""
-    monkeypatch.setattr(convergence, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
+    """Count only the pauses of `Slow` as its wall time, because the machine may be busy."""
+    monkeypatch.setattr(line, "cost_of_run", lambda study, case, done, first: case.grid.n_steps * case.method.pause)
 
 
 def test_a_slow_engine_has_a_line_of_fewer_points(on_an_idle_machine):
     slow = Slow(pause=0.002)
-    found = rows("work_precision", slow, time_limit=0.08)  # 12, 24, 48 and 96 steps, of up to 1536
-    timed = [row for row in found if row.measure is Measure.TIME and row.outcome.ok]
+    measured = rows("work_precision", slow, time_limit=0.08)  # 12, 24, 48 and 96 steps, of up to 1536
+    timed = [row for row in measured if row.measure is Measure.TIME and row.outcome.ok]
     assert len(timed) >= 3
     assert all(row.value > 0.002 / row.dt for row in timed)
-    errors = [row.value for row in found if row.measure is Measure.ATTITUDE_MAX and row.outcome.ok]
+    errors = [row.value for row in measured if row.measure is Measure.ATTITUDE_MAX and row.outcome.ok]
     assert len(errors) == len(timed)
     assert errors[-1] < errors[0] / 50
-    left = [row for row in found if not row.outcome.ok]
+    left = [row for row in measured if not row.outcome.ok]
     assert left
     assert {row.outcome.kind for row in left} == {OutcomeKind.SKIPPED}
     assert all("more than 0.08 s" in row.outcome.reason for row in left)
 
 
 def test_a_slow_engine_has_an_order(on_an_idle_machine):
-    found = {
+    measured = {
         row.measure: row for row in rows("convergence", Slow(pause=0.001), time_limit=0.05) if row.measure is Measure.ORDER
     }
-    assert found[Measure.ORDER].value == pytest.approx(4, abs=0.5)
+    assert measured[Measure.ORDER].value == pytest.approx(4, abs=0.5)
 
 
 def test_a_slow_engine_is_timed_over_fewer_steps():
-    found = rows("speed", Slow(pause=0.01), cv.Reduced(), quick=True, time_limit=0.1)
-    mine = {row.measure: row for row in found if row.method.startswith("foreign_slow")}
+    measured = rows("speed", Slow(pause=0.01), cv.Reduced(), quick=True, time_limit=0.1)
+    mine = {row.measure: row for row in measured if row.method.startswith("foreign_slow")}
     assert all(row.outcome.ok and row.value > 0 for row in mine.values())
     assert mine[Measure.TIME_PER_STEP].value >= 0.01
     steps = int(mine[Measure.TIME].detail.split()[-2])
@@ -173,20 +174,24 @@ def test_the_limits_of_a_study():
     assert (given.longest_run, given.hang_limit) == (10.0, 100.0)
 
 
-def test_a_run_ends_early_where_it_would_take_ten_times_the_limit_alone():
+def test_a_run_ends_early_only_beyond_ten_times_the_limit():
     assert limit_reason(PACE_STEPS, PACE_STEPS / (9 * STEP_LIMIT)) == ""
     assert "out of reach" in limit_reason(PACE_STEPS, PACE_STEPS / (11 * STEP_LIMIT))
 
 
-@pytest.mark.parametrize("made", range(2 * FEWEST_POINTS))
-def test_a_slow_method_gets_the_fewest_points_and_no_more(made):
+@pytest.mark.parametrize(("spent", "points"), [(0.9, 9), (1.1, FEWEST_POINTS), (0.4 * LINE_LIMIT, 2)])
+def test_a_slow_method_gets_the_fewest_points_within_the_limit_of_a_line(spent, points, monkeypatch):
+    """Runs that take `spent` time budgets each."""
     study = Study("any", (SCENE,), (cv.Reduced(),), truth=truth)
-    slow = 1.1 * study.longest_run
-    assert fits(study, [1e-3] * made, slow) == (made < FEWEST_POINTS)
+    monkeypatch.setattr(line, "cost_of_run", lambda *_, **__: spent * study.longest_run)
+    cases = [Case("any", SCENE, cv.Reduced(), Grid(0.01, 10))] * 9
+    assert sum(isinstance(done, Success) for _, done in attempt_each(study, cases)) == points
 
 
-def test_a_line_of_tolerances_goes_from_cheap_to_dear():
-    study = Study("any", (SCENE,), (SciPy(),), truth=truth)
-    tolerances = [case.method.rtol for case in points(study, SCENE, SciPy())]
-    assert tolerances == sorted(tolerances, reverse=True)
-    assert len(set(tolerances)) == len(tolerances) > 3
+@pytest.mark.parametrize("name", ["scipy", "reduced", "mujoco:Euler", "gauss:stages=4"])
+def test_a_line_goes_from_coarse_to_fine(name):
+    method = registry.method(name)
+    cases = list_cases(Study("any", (SCENE,), (method,), truth=truth), SCENE, method)
+    settings = [getattr(case.method, "rtol", case.grid.dt) for case in cases]
+    assert settings == sorted(settings, reverse=True)
+    assert len(set(settings)) == len(settings) > 3

@@ -1,4 +1,4 @@
-"""One body in each field, the torque of a potential, and the largest drift of a run."""
+"""Bodies and scenes that many tests use, the torque of a potential, and the largest drift of a run."""
 
 import numpy as np
 
@@ -6,7 +6,14 @@ import conservative as cv
 from conservative.attitude import rotation_about
 
 TURN = rotation_about((3, -1, 2), 1.3)
-BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
+
+
+def body_in_axes(turn, *moments):
+    """Return a body with principal moments, kg m^2, about the columns of a matrix: its tensor is full."""
+    return cv.RigidBody(turn @ np.diag(moments) @ turn.T)
+
+
+BODY = body_in_axes(TURN, 1.0, 1.4, 2.0)
 START = rotation_about((1, 0.2, -1), 0.7)
 HOOK = (0.2, 0.1, 0.4)
 FIELDS = {
@@ -25,23 +32,17 @@ def in_field(name, body=BODY, w=(0.3, -2.0, 1.0)):
 
 
 def free(moments, w, turn=TURN):
-    return cv.Scene(f"{moments}, {w}", cv.RigidBody(turn @ np.diag(moments) @ turn.T), START, turn @ np.array(w), 1.0)
+    return cv.Scene(f"{moments}, {w}", body_in_axes(turn, *moments), START, turn @ np.array(w), 1.0)
 
 
 def top(moments=(1.0, 1.0, 0.3), w=(0.4, -0.7, 9.0), weight=5.0, turn=TURN):
-    body = cv.RigidBody(turn @ np.diag(moments) @ turn.T)
-    return cv.Scene(
-        f"top {moments}, {w}, {weight}, {turn[0, 0]:.2f}",
-        body,
-        START,
-        turn @ np.array(w),
-        1.0,
-        cv.UniformGravity(weight, turn[:, 2]),
-    )
+    field = cv.UniformGravity(weight, turn[:, 2])
+    name = f"top {moments}, {w}, {weight}, {turn[0, 0]:.2f}"
+    return cv.Scene(name, body_in_axes(turn, *moments), START, turn @ np.array(w), 1.0, field)
 
 
 def torque(scene, R):
-    """Torque in body axes of the potential of a scene, N m: minus the derivative along turns about each axis."""
+    """Return the torque of a potential in body axes, N m: minus the derivative of the energy for turns about each axis."""
     if scene.potential is None:
         return np.zeros(3)
     across = R.T @ np.asarray(scene.potential.gradient(R))
@@ -49,5 +50,5 @@ def torque(scene, R):
 
 
 def drift(trajectory):
-    """The largest drift of any invariant of the scene, relative to its scale."""
+    """Return the largest drift of any invariant, relative to its scale."""
     return max(float(np.abs(trajectory.drift(invariant)).max()) for invariant in trajectory.scene.invariants)

@@ -19,15 +19,15 @@ import conservative as cv
 from conservative import kernels
 from conservative.attitude import rotation_about
 from conservative.batch import Batch
+from conservative.drifts import find_reference
 from conservative.grid import Grid
-from conservative.integration.drifts import find_drifts
 from conservative.method import Method
 from conservative.methods.many import Block
 
 HOOK = np.array([0.0, 0.1, 0.4])
 TURN = rotation_about((3, -1, 2), 1.3)
 BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
-OTHER = ("conservative.kernels", "conservative.kernels.signals")
+OTHER = ("conservative.kernels", "conservative.kernels.parts", "conservative.kernels.signals")
 """Modules that short runs in plain Python do not call: how kernels are compiled, and what long runs reach."""
 
 
@@ -101,8 +101,7 @@ def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
         run = method.prepare_many(bodies, grid)
         block = run and run()
         if block:
-            find_drifts(bodies, grid.t, block.R_WB, block.w_WB_B)
-            kernels.drifts_of_many.are_rotations(bodies.R_WB0, 1e-9)
+            find_reference(bodies).measure(grid, grid.t, block.R_WB, block.w_WB_B)
     return block
 
 

@@ -1,3 +1,5 @@
+"""Conversions and distances of attitudes against SciPy and definitions."""
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,7 +19,7 @@ def test_hat_is_the_cross_product(a, b):
 
 
 @given(vectors)
-def test_cayley_is_the_rational_map_it_claims_to_be(v):
+def test_cayley_is_its_rational_map(v):
     half = attitude.hat(v) / 2
     expected = np.linalg.solve(np.eye(3) - half, np.eye(3) + half)
     np.testing.assert_allclose(attitude.cayley(v), expected, atol=1e-14)  # measured 2e-15
@@ -52,7 +54,7 @@ def test_small_and_large_angles_are_measured_to_round_off(angle):
     assert attitude.angle_between(R, turned) == pytest.approx(angle, abs=tolerance, rel=1e-12)
 
 
-def test_angle_of_what_is_not_a_number_is_not_a_number():
+def test_the_angle_to_nan_is_nan():
     assert np.isnan(attitude.angle_between(np.eye(3), np.full((3, 3), np.nan)))
 
 

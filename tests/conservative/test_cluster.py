@@ -1,4 +1,4 @@
-"""A real Dask cluster, two workers of which one is killed: the same numbers as without one; what is not there is said."""
+"""A Dask cluster of two workers, one of them killed, gives the same numbers; a missing scheduler is reported."""
 
 import json
 import os
@@ -19,15 +19,15 @@ from conservative.integration.cluster import open_client, require_versions
 distributed = pytest.importorskip("distributed")
 
 N, KILLED = 24, 9
-"""Bodies, one a block, and of how many of them the results are there when a worker is killed."""
+"""Number of bodies (one per block), and number of results when a worker is killed."""
 RETRIES = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"}
-"""How long a scheduler tries to reach a worker that has died: 30 s by default."""
+"""Time limit of a scheduler to reach a dead worker: 30 s by default."""
 LIMIT = 60.0
-"""Time, s, in which processes start, on however busy a machine."""
+"""Time limit for processes to start on a busy machine, s."""
 
 
 def start(stack, folder, program, *arguments):
-    """Start a program of Dask, which ends with the stack."""
+    """Start a program of Dask that ends with the stack."""
     command = [sys.executable, "-m", f"distributed.cli.dask_{program}", "--no-dashboard", *arguments]
     log = stack.enter_context((folder / program).open("ab"))
     process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=os.environ | RETRIES)
@@ -46,7 +46,7 @@ def start_scheduler(stack, folder):
 
 
 def run(**options):
-    """Run tops of one block each, of which the fourth fails."""
+    """Run tops, one per block; the fourth fails."""
     w = np.random.default_rng(14).normal(size=(N, 3)) * 3
     w[3] = 1e9
     weight = {"weight": np.linspace(1.0, 2.0, N)}
@@ -87,7 +87,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_nothing_comes_twice(tmp_path,
             cluster.ClusterExecutor(client).submit(sum, ()).result()
 
 
-def test_a_scheduler_that_is_not_there_is_said_in_one_line(capfd):
+def test_a_missing_scheduler_is_reported_in_one_line(capfd):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         nowhere = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -101,7 +101,7 @@ def test_a_scheduler_that_is_not_there_is_said_in_one_line(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_what_is_no_client_is_refused():
+def test_other_values_for_a_client_are_refused():
     for wrong in ("tcp://127.0.0.1:8786", 3):
         with pytest.raises(cv.BadInput, match=r"client: got .*; expected a dask\.distributed\.Client"):
             cv.integrate_many(cv.scenes.brick_flip(), client=wrong)

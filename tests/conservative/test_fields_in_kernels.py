@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from conservative import LinearSpring
+from conservative.kernels import brief
 from conservative.kernels import fields as kernel_fields
-from conservative.kernels import kernel
 
 from .one_body import FIELDS, TURN, in_field, torque
 
@@ -14,10 +14,10 @@ from .one_body import FIELDS, TURN, in_field, torque
 class fields:  # noqa: N801
     """The functions of fields in machine code, as kernels call them."""
 
-    energy = staticmethod(kernel(lambda field, q: kernel_fields.energy(field, q)))
-    body_torque = staticmethod(kernel(lambda field, q: kernel_fields.body_torque(field, q)))
-    finite_torque = staticmethod(kernel(lambda field, q, a: kernel_fields.finite_torque(field, q, a)))
-    finite_derivative = staticmethod(kernel_fields.finite_derivative)
+    energy = staticmethod(brief(lambda field, q: kernel_fields.energy(field, q)))
+    body_torque = staticmethod(brief(lambda field, q: kernel_fields.body_torque(field, q)))
+    finite_torque = staticmethod(brief(lambda field, q, a: kernel_fields.finite_torque(field, q, a)))
+    finite_derivative = staticmethod(brief(lambda field, q0, q1: kernel_fields.finite_derivative(field, q0, q1)))
 
 
 FIELDS_WITH_REST = {**FIELDS, "spring at 0": LinearSpring(3.0, (0.2, 0.1, 0.4), (0.5, 0.2, 0.3))}

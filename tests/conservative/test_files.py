@@ -1,4 +1,4 @@
-"""The one writer of files: whole or as before, whatever ends the writing; on a disk that is really full."""
+"""Files are written whole or not at all: exceptions, kills, and a disk that is full."""
 
 import os
 import stat
@@ -74,7 +74,7 @@ def test_an_exception_leaves_what_was_there(error, tmp_path):
 
 
 @pytest.mark.parametrize("place", [".", "missing/run.csv", "a\0b"])
-def test_a_place_that_cannot_be_written_is_named_before_any_work(place, tmp_path):
+def test_an_unwritable_place_is_named_before_any_work(place, tmp_path):
     with pytest.raises(BadInput, match=r"csv: got .*; expected a file"), files.text_file(tmp_path / place, "csv"):
         pytest.fail("work was begun")
     assert names(tmp_path) == []
@@ -90,18 +90,10 @@ def test_permissions_stay_and_are_ordinary_at_first(tmp_path):
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
 
-def test_a_file_takes_the_place_of_the_one_before_and_is_not_written_over_it(tmp_path):
-    path = tmp_path / "kept.txt"
-    path.write_text("before")
-    with path.open() as reader:  # as somebody who reads it at that moment
-        files.write_text(path, "after", "out")
-        assert reader.read() == "before"
-    assert path.read_text() == "after"
-
-
 def test_contents_are_on_the_disk_before_they_take_their_place(tmp_path, monkeypatch):
     target, seen, synchronise = tmp_path / "samples.csv", [], os.fsync
     target.write_text("before")
+    reader = target.open()
 
     def record(handle):
         seen.append((os.fstat(handle).st_size, target.read_text()))
@@ -110,6 +102,9 @@ def test_contents_are_on_the_disk_before_they_take_their_place(tmp_path, monkeyp
     monkeypatch.setattr(os, "fsync", record)
     files.write_text(target, "contents", "csv")
     assert seen[0] == (len("contents"), "before")
+    with reader:  # opened before: the file is replaced, not overwritten
+        assert reader.read() == "before"
+    assert target.read_text() == "contents"
 
 
 def test_a_link_stays_one(tmp_path):
@@ -121,7 +116,7 @@ def test_a_link_stays_one(tmp_path):
     assert names(tmp_path) == ["link", "real"]
 
 
-def test_what_is_no_file_is_written_as_it_is():
+def test_devices_and_pipes_are_written_directly():
     files.write_text(Path(os.devnull), "anything", "csv")
     assert not Path(os.devnull).is_file()
     reading, writing = os.pipe()
@@ -138,14 +133,14 @@ def test_a_full_device_is_named():
 
 
 def holding(start, target):
-    """Return a process that is in the middle of writing a file."""
+    """Return a process that is writing a file."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     process = start([sys.executable, "-c", HOLDING, target], stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout.readline() == "writing\n"
     return process
 
 
-def test_what_a_kill_left_goes_with_the_next_writing_and_what_lives_stays(tmp_path, start):
+def test_the_next_writing_removes_files_of_killed_writers_only(tmp_path, start):
     target = tmp_path / "run.csv"
     with holding(start, target) as dead:
         dead.kill()
@@ -161,7 +156,7 @@ def test_what_a_kill_left_goes_with_the_next_writing_and_what_lives_stays(tmp_pa
     assert target.read_text() == "again"
 
 
-def test_what_others_have_beside_stays(tmp_path):
+def test_files_of_others_stay(tmp_path):
     foreign = [".run.csv-notes", "run.csv-0123456789ab", ".other.csv-0123456789ab", ".run.csv-0123456789ab.txt"]
     for name in foreign:
         (tmp_path / name).write_text("mine")
@@ -169,14 +164,14 @@ def test_what_others_have_beside_stays(tmp_path):
     assert names(tmp_path) == sorted([*foreign, "run.csv"])
 
 
-def test_a_temporary_that_is_taken_for_a_leftover_before_it_is_locked_is_made_again(tmp_path, monkeypatch):
+def test_a_temporary_file_removed_by_another_writer_is_made_again(tmp_path, monkeypatch):
     made = []
 
     def make(path):
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
         made.append(path)
         if len(made) == 1:
-            path.unlink()  # what another writer does at that moment
+            path.unlink()  # as another writer may do before it is locked
         return handle
 
     with files.temporary(tmp_path / "run.csv", make) as (fresh, _):

@@ -1,4 +1,4 @@
-"""Values are frozen: `dataclasses.replace` works, arrays are read-only, and what is derived from a scene is kept with it."""
+"""Values are frozen: `dataclasses.replace` works, arrays are read-only, and derived values are stored with their scene."""
 
 import gc
 import weakref
@@ -81,7 +81,7 @@ def test_arrays_that_a_value_made_are_read_only(name):
     assert not any(array.flags.writeable for array in arrays if isinstance(array, np.ndarray))
 
 
-def test_a_value_keeps_no_array_of_the_callers():
+def test_a_value_copies_arrays_of_the_caller():
     rates = np.array([0.0, 1.0, 2.0])
     scene = cv.Scene("own", BODY, np.eye(3), rates, 3.0)
     rates[0] = 7.0
@@ -89,7 +89,7 @@ def test_a_value_keeps_no_array_of_the_callers():
     assert rates.flags.writeable
 
 
-def test_what_is_replaced_is_checked_and_converted():
+def test_replaced_fields_are_checked_and_converted():
     assert replace(VALUES["spring"], point_B=[1, 2, 3]).point_B.tolist() == [1.0, 2.0, 3.0]
     assert replace(VALUES["scene"], t_end=7).t_end == 7.0
     with pytest.raises(cv.BadInput, match="t_end"):

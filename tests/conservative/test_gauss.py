@@ -8,20 +8,19 @@ import conservative as cv
 from conservative.attitude import angle_between, from_quaternion, orthonormality, rotation_about, to_quaternion
 from conservative.methods.coefficients.gauss_legendre import MOST_STAGES, tableau
 
-from .one_body import drift
+from .one_body import body_in_axes, drift
 
 
 def generic(kind: str, seed: int = 0) -> cv.Scene:
-    """A body in axes of its own: free, asymmetric in gravity, or symmetric with its centre of mass on either side."""
+    """Return a scene with a full tensor: free, asymmetric in gravity, or symmetric with its centre of mass on either side."""
     random = np.random.default_rng(seed)
     turn = rotation_about(random.normal(size=3), random.uniform(0.5, 3))
     moments = (1.1, 1.1, 0.6) if kind.startswith("symmetric") else (0.9, 1.7, 1.2)
-    com = {"free": None, "asymmetric": random.normal(size=3), "symmetric+": 0.5 * turn[:, 2], "symmetric-": -0.5 * turn[:, 2]}[
-        kind
-    ]
+    points = {"asymmetric": random.normal(size=3), "symmetric+": 0.5 * turn[:, 2], "symmetric-": -0.5 * turn[:, 2]}
+    com = points.get(kind)
     return cv.Scene(
         kind,
-        cv.RigidBody(turn @ np.diag(moments) @ turn.T),
+        body_in_axes(turn, *moments),
         rotation_about(random.normal(size=3), random.uniform(0.5, 3)),
         3 * random.normal(size=3),
         2.0,
@@ -33,7 +32,7 @@ KINDS = ("free", "asymmetric", "symmetric+", "symmetric-")
 
 
 def state_by_scipy(scene: cv.Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Attitude and rates at the end by DOP853 on quaternion and momentum: shares nothing with the methods under test."""
+    """Return the final attitude and rates by DOP853 on quaternion and momentum, independent of the methods under test."""
     body, potential = scene.body, scene.potential
 
     def rates(_: float, y: np.ndarray) -> np.ndarray:
@@ -91,15 +90,12 @@ def test_both_frames_give_the_same_motion(kind: str) -> None:
     slow = cv.integrate(scene, 0.04, cv.Gauss(8, frame="non_spinning"))
     assert angle_between(body.R_WB, slow.R_WB).max() < 1e-13  # measured 1.4e-14
     assert np.abs(body.w_WB_B - slow.w_WB_B).max() < 1e-13  # measured 2e-14
-    assert (
-        cv.integrate(scene, 0.04, cv.Gauss(8)).label
-        == slow.label
-        == f"conservative=={cv.VERSION}/gauss:stages=8,frame=non_spinning"
-    )
+    label = f"conservative=={cv.VERSION}/gauss:stages=8,frame=non_spinning"
+    assert cv.integrate(scene, 0.04, cv.Gauss(8)).label == slow.label == label
 
 
 def test_sweeps_converge_over_long_steps() -> None:
-    """h |w| = 2.5, where a plain iteration from the last state diverges for few stages and crawls for many."""
+    # h |w| = 2.5: a plain iteration from the last state diverges for few stages and converges slowly for many.
     for stages in (2, 3, 4, 6, 8):
         trajectory = cv.integrate(cv.scenes.brick_flip(disturbance=0.5), 0.25, cv.Gauss(stages), t_end=50.0)
         assert trajectory.ok

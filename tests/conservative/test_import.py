@@ -1,3 +1,5 @@
+"""Importing the package is cheap, and its public names exist."""
+
 import ast
 import pickle
 import subprocess
@@ -21,8 +23,17 @@ def test_importing_the_package_imports_nothing_else():
     assert found == "['conservative', 'conservative.version'] False"
 
 
-def test_all_public_names_import_no_compiler_no_engine_and_no_tables():
-    assert printed(f"from conservative import *; import sys; print([m for m in {FORBIDDEN!r} if m in sys.modules])") == "[]"
+CARD = """
+import conservative as cv, numpy as np
+s = cv.scenes.brick_flip()
+t = cv.Trajectory(s, np.zeros(1), s.R_WB0[None], s.w_WB_B0[None], "x")
+repr(t), t._repr_html_()
+"""
+
+
+@pytest.mark.parametrize("code", ["from conservative import *\n", CARD], ids=["public names", "card"])
+def test_public_names_and_cards_import_no_compiler_no_engine_and_no_tables(code):
+    assert printed(f"{code}import sys; print([m for m in {FORBIDDEN!r} if m in sys.modules])") == "[]"
 
 
 @pytest.mark.parametrize("name", conservative.__all__)
@@ -32,8 +43,8 @@ def test_a_public_name_is_there(name):
     assert getattr(conservative, name) is found
 
 
-def test_type_checkers_see_what_the_interpreter_sees():
-    """To type checkers a name in a stub is public only as `import X as X`."""
+def test_type_checkers_see_the_public_names():
+    # A name in a stub is public to type checkers only as `import X as X`.
     stub = Path(conservative.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     typed = {alias.asname for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom) for alias in node.names}
     assert typed == set(conservative.__all__)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import MPContext
+from numba import njit
 
 import conservative as cv
 from conservative.attitude import angle_between
@@ -31,12 +32,17 @@ CARRY = (1e-9, -2e-9, 3e-9)
 TIGHT = 1e-24
 
 
+def compiled(function: Any) -> Any:
+    """A function that only kernels call, compiled for Python."""
+    return njit(lambda *arguments: function(*arguments))
+
+
 def gain_of_steps(start: np.ndarray, carry: tuple[float, ...]) -> np.ndarray:
     """What a step of the loop adds to a momentum that is `start` less `carry`."""
     lengths, q_out, L_out = np.array([H]), np.empty((2, 4)), np.empty((2, 3))
     state = (Q, (0.0, 0.0, 0.0, 0.0), tuple(start.tolist()), carry)
     history = reduced.no_history()
-    found = reduced.take_steps(lengths, 1, 1, 1, J, INVERSE, None, TIGHT, (1, 0), 0, state, history, q_out, L_out)
+    found = compiled(reduced.take_steps)(lengths, 1, 1, 1, J, INVERSE, None, TIGHT, (1, 0), 0, state, history, q_out, L_out)
     _, _, after, left = found[4]
     return np.array(after) - left - (start - carry)
 
@@ -102,17 +108,17 @@ def test_weights_of_gauss_have_a_low_part_and_it_is_added() -> None:
 def test_a_step_of_gauss_adds_both_parts_of_the_weights() -> None:
     b, low = np.array([0.25, 0.5, 0.25, 0.0]), np.array([0.0, 0.125, 0.0, 0.0])
     F = np.concatenate([np.full(24, np.nan), np.repeat([1.0, 2, 3, 4, 5, 6], 4)])
-    dL, dg = gauss.weigh(b, low, F, 24)
+    dL, dg = compiled(gauss.weigh)(b, low, F, 24)
     assert (*dL, *dg) == tuple(1.125 * k for k in (1, 2, 3, 4, 5, 6))
 
 
 def test_gauss_takes_round_off_of_its_invariants_off_and_leaves_the_rest_alone() -> None:
     inverse, c, none, loose = (1.0, 0.5, 0.4), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (1.0, 1.0, 0.0)
     L, g = (0.6, 0.5, -0.4), (2 / 3, 1 / 3, -2 / 3)
-    kept = gauss.values(inverse, c, L, g)
-    assert gauss.remove_round_off(inverse, c, loose, kept, 1.0, L, none, g, none) == (L, none, g, none)
+    kept, remove_round_off = gauss.values(inverse, c, L, g), compiled(gauss.remove_round_off)
+    assert remove_round_off(inverse, c, loose, kept, 1.0, L, none, g, none) == (L, none, g, none)
     far_L, far_g = tuple(x + 3e-9 * k for k, x in enumerate(L)), tuple(x * (1 + 2e-9) + 5e-9 * k for k, x in enumerate(g))
-    near_L, lost_L, near_g, lost_g = gauss.remove_round_off(inverse, c, loose, kept, 1.0, far_L, none, far_g, none)
+    near_L, lost_L, near_g, lost_g = remove_round_off(inverse, c, loose, kept, 1.0, far_L, none, far_g, none)
     assert gauss.values(inverse, c, near_L, near_g) == pytest.approx(kept, abs=1e-15)  # from 5e-9, measured 1e-16
     assert np.linalg.norm(near_g) == pytest.approx(1, abs=1e-15)
     assert 1e-10 < np.abs(np.subtract(near_L, far_L)).max() < 1e-8
@@ -128,12 +134,15 @@ def test_coefficients_of_gauss_reach_the_kernel_with_their_low_parts() -> None:
 
 @pytest.mark.parametrize("turns", [[2.0**53, 1, 1, 1, 1, 1], [2.0**53, -0.5, -0.25, -0.5, -0.5], [1.0, 2.0**53, 1, 3, 3, 0.25]])
 def test_the_angle_of_gauss_is_a_sum_without_loss(turns: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The loop in Python, with made-up integrals: each angle stored is the exact sum, rounded once."""
-    stored, left = [], iter(turns)
+    """The loop in Python, with made-up integrals and no stages: each angle stored is the exact sum, rounded once."""
+    stored, left, none = [], iter(turns), (0.0, 0.0, 0.0)
+    for name, result in (("hold_rates", None), ("sweep", None), ("solve_stages", (0, 1, 0.0, True)), ("weigh", (none, none))):
+        monkeypatch.setattr(gauss, name, lambda *_, result=result: result)
+    monkeypatch.setattr(gauss, "middle", lambda *_: (0.0, 0.0, 1.0))
+    monkeypatch.setattr(gauss, "remove_round_off", lambda *state: state[5:])
     monkeypatch.setattr(gauss, "integrate_turn", lambda *_: next(left))
     monkeypatch.setattr(gauss, "store", lambda row, turned, phi, *_: stored.append(phi))
-    march = getattr(gauss.march, "py_func", gauss.march)
-    march(convert(heavy_body(1), cv.Gauss(2))[2], find_coefficients(2, 0.01), (len(turns), 1, 0, None, None))
+    gauss.march(convert(heavy_body(1), cv.Gauss(2))[2], find_coefficients(2, 0.01), (len(turns), 1, 0, None, None))
     exact = Fraction(0)
     for phi, turn in zip(stored[1:], turns, strict=True):
         exact += Fraction(turn)

@@ -1,4 +1,4 @@
-"""Random bodies are drawn from the distribution that is written down, the same from the same seed, each on its own."""
+"""Random bodies follow the documented distribution, and each depends only on its field, seed and index."""
 
 import re
 import sys
@@ -27,18 +27,18 @@ def moments(scene):
 
 
 def half_range(scene, draws=4000):
-    """Half of the range of the field's energy over random attitudes: from below, as the extremes lie between them."""
+    """Return half the range of the field's energy over random attitudes, a lower bound of the exact value."""
     q = np.random.default_rng(0).normal(size=(draws, 4))
     R = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
     return float(np.ptp(scene.potential.energy(R))) / 2
 
 
-def strength(scene, draws=4000):
-    return half_range(scene, draws) / scene.kinetic_energy0
+def strength(scene):
+    return half_range(scene) / scene.kinetic_energy0
 
 
 def fault(scenes):
-    """What breaks the distribution among scenes, in words; None if nothing does."""
+    """Return the first violation of the distribution among scenes, in words, or None."""
     for scene in scenes:
         J = moments(scene)
         if J[2] > J[0] + J[1]:
@@ -113,14 +113,14 @@ def test_rest_lengths_are_uniform_up_to_the_distance_of_the_anchor():
     assert np.abs(shares - expected).max() < 1.63 / np.sqrt(len(shares))  # Kolmogorov and Smirnov, 1 %; measured 0.06 < 0.115
 
 
-def test_the_motion_lasts_as_long_as_it_says():
+def test_the_duration_is_a_fixed_turn():
     for scene in MANY:
         rate = float(np.linalg.norm(scene.w_WB_B0))
         assert RATE[0] * (1 - 1e-12) <= rate <= RATE[1] * (1 + 1e-12)
         assert np.isclose(scene.t_end * rate, TURN, rtol=1e-12)
 
 
-def test_start_attitudes_have_no_direction():
+def test_initial_attitudes_have_no_preferred_direction():
     mean = np.mean([scene.R_WB0 for scene in MANY], axis=0)
     assert np.abs(mean).max() < 5 / np.sqrt(3 * len(MANY))  # five standard deviations: 0.102; measured 0.048
 

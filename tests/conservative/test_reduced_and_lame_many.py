@@ -1,4 +1,4 @@
-"""Steps of `Reduced` and `Lame` for many bodies at once: bit for bit those of one at a time, whoever the neighbours are."""
+"""Steps of `Reduced` and `Lame` for many bodies at once: those of one at a time to round-off, whatever the neighbours are."""
 
 from __future__ import annotations
 
@@ -54,11 +54,13 @@ def run(method: Method, bodies: Batch, grid: cv.Grid) -> Block:
 
 
 def differ(method: Method, bodies: Batch, grid: cv.Grid) -> list[int]:
-    """Which bodies were not finished, or are not the same to the last bit as alone; those that fail alone are left out."""
+    """Return the bodies that were not finished or differ from those run alone; bodies that fail alone are left out."""
     block, found = run(method, bodies, grid), []
     for i in range(len(bodies)):
         alone = method.solve(bodies.take(i), grid)
-        same = np.array_equal(alone.R_WB, block.R_WB[i]) and np.array_equal(alone.w_WB_B, block.w_WB_B[i])
+        speed = np.abs(alone.w_WB_B).max()
+        same = np.abs(alone.R_WB - block.R_WB[i]).max() < 1e-14  # measured 4e-15, and 0 in six of the eight cases
+        same = same and np.abs(alone.w_WB_B - block.w_WB_B[i]).max() < 1e-14 * speed  # measured 2e-15
         if alone.ok and not (block.finished[i] and same):
             found.append(i)
     return found
@@ -78,7 +80,7 @@ def differ(method: Method, bodies: Batch, grid: cv.Grid) -> list[int]:
     ],
 )
 def test_many_are_those_of_one_at_a_time(method: Method, bodies: Batch, dt: float) -> None:
-    """11 bodies: a lane of eight, and three in the second. Bits are the same; what is promised is 1e-14."""
+    """11 bodies: eight lanes, and three in a second group."""
     assert differ(method, bodies, cv.Grid(dt, 40, 7)) == []
 
 

@@ -1,16 +1,16 @@
-"""What `t_eval` takes, refuses and hands back."""
+"""Samples at given times: values that `t_eval` accepts and refuses, and the samples returned."""
 
 import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.methods import between
+from conservative.methods import between, trials
 
 BRICK = cv.scenes.brick_flip()
 TOP = cv.scenes.asymmetric_top(t_end=2.0)
 
 
-def test_a_number_is_so_many_samples():
+def test_an_integer_is_the_number_of_samples():
     found = cv.integrate(BRICK, 0.01, t_eval=7)
     np.testing.assert_array_equal(found.t, np.linspace(0, 6, 7))
     np.testing.assert_array_equal(cv.integrate(BRICK, 0.01, t_eval=np.int64(3), t_end=1.0).t, [0, 0.5, 1])
@@ -55,7 +55,7 @@ def test_few_samples_anywhere(times):
         (10**15, "1000000000000000 samples"),
     ],
 )
-def test_times_that_cannot_be_used_are_refused(times, got):
+def test_unusable_times_are_refused(times, got):
     with pytest.raises(cv.BadInput, match=f"t_eval: got {got}.*; expected times .* from 0 to t_end = 2") as caught:
         cv.integrate(TOP, 0.01, t_eval=times)
     assert caught.value.argument == "t_eval"
@@ -67,14 +67,11 @@ def test_times_that_cannot_be_used_are_refused(times, got):
         ({"sample_every": 2}, "sample_every"),
         ({"error": 1e-6, "dt": 0.1}, "dt"),
         ({"error": 1e-6, "method": cv.Reduced()}, "method"),
-        ({"error": -1.0}, "error"),
         ({"progress": 3}, "progress"),
         ({"dt": 5.0}, "dt"),
-        ({"t_end": -1.0}, "t_end"),
-        ({"method": cv.Lame()}, "method"),
     ],
 )
-def test_what_contradicts_times_is_refused(arguments, argument):
+def test_arguments_that_contradict_times_are_refused(arguments, argument):
     with pytest.raises(cv.BadInput) as caught:
         cv.integrate(TOP, **{"t_eval": [0.0, 1.0], **arguments})
     assert caught.value.argument == argument
@@ -92,7 +89,7 @@ def test_a_run_that_fails_has_the_samples_before():
         cv.integrate(scene, dt=0.6, t_eval=times)
 
 
-def test_samples_between_are_judged(monkeypatch):
+def test_samples_between_steps_are_checked(monkeypatch):
     move = between.move
 
     def spoil(*arguments):
@@ -104,14 +101,14 @@ def test_samples_between_are_judged(monkeypatch):
         cv.integrate(TOP, 0.01, cv.Projected(), t_eval=[0.0, 0.5, 0.505, 1.0])
 
 
-def test_what_cannot_be_followed_is_a_failure(monkeypatch):
+def test_a_gap_that_needs_too_many_steps_is_a_failure(monkeypatch):
     monkeypatch.setattr(between, "RADIANS", 1e-7)  # more steps than a gap may take
     found = cv.integrate(TOP, 0.5, cv.Projected(), t_eval=[0.0, 0.5, 0.9, 1.0], on_failure="return")
     assert found.outcome.kind is cv.OutcomeKind.DIVERGED
     np.testing.assert_array_equal(found.t, [0.0, 0.5])
 
 
-def test_of_many_steps_some_are_kept(monkeypatch):
+def test_some_of_many_steps_are_stored(monkeypatch):
     times = [0.0, 0.123, 0.77, 1.5]
     all_of_them = cv.integrate(TOP, 0.001, cv.Projected(), t_eval=times)
     monkeypatch.setattr(between, "MOST_KEPT", 20)
@@ -138,9 +135,7 @@ def test_a_potential_of_python_functions():
     np.testing.assert_allclose(found.R_WB, expected.R_WB, atol=1e-13)
 
 
-def test_progress_of_trial_runs(monkeypatch):
-    from conservative.methods import trials
-
+def test_progress_of_trial_runs(monkeypatch, capsys):
     monkeypatch.setattr(trials, "QUIET", 0.0)
     monkeypatch.setattr(trials, "PAUSE", 0.0)
     trials.recall.cache_clear()
@@ -150,20 +145,13 @@ def test_progress_of_trial_runs(monkeypatch):
     assert [each.runs for each in told] == list(range(0, 2 * len(told), 2))
     told.clear()
     cv.integrate(TOP, error=1e-6, progress=told.append)
-    assert not told  # all is known
-
-
-def test_nothing_is_shown_unasked(capsys, monkeypatch):
-    from conservative.methods import trials
-
-    monkeypatch.setattr(trials, "QUIET", 0.0)
-    trials.recall.cache_clear()
+    assert not told  # the trial runs are remembered
     cv.integrate(TOP, error=1e-5)
     assert capsys.readouterr() == ("", "")
 
 
 def test_samples_in_a_field_that_turns_are_the_same_in_units_of_our_own():
-    """A motion 2^30 times slower is the same to the last digits, and is computed in units of 2^16 s and more."""
+    """A motion that is 2^30 times as slow is computed in units of 2^16 s and more."""
     w, inertia = np.array((0.3, -0.4, 0.5)), (1.0, 1.4, 2.0)
 
     def sample(slower):

@@ -1,4 +1,4 @@
-"""Scales of drifts and default step sizes follow from the scene, even with moments that are far apart."""
+"""Reference scales of drifts, default step sizes, and bodies whose moments are far apart."""
 
 import numpy as np
 import pytest
@@ -49,20 +49,20 @@ def test_at_rest_momentum_is_relative_to_what_the_field_can_make():
     assert found["vertical momentum"] == pytest.approx(np.sqrt(1.3 * 1.5))
 
 
-def test_the_step_that_nobody_names():
+def test_default_step():
     assert cv.Scene("body", BODY, np.eye(3), (0, 0, 10.0), 6.0).dt == pytest.approx(0.05 / 10)
     assert cv.Scene("body", BODY, np.eye(3), (0, 0, 0.01), 6.0).dt == pytest.approx(0.06)
     assert cv.integrate(cv.scenes.brick_flip(), t_end=0.1).t[1] == 0.01
 
 
-def test_a_spring_much_longer_at_rest_than_it_ever_gets_is_measured_by_its_rest_length():
+def test_the_scale_of_a_long_spring_is_that_of_its_rest_length():
     spring = cv.LinearSpring(3.0, (0, 0, 1), (0, 2, 0), 1e6)
     assert spring.scale() == pytest.approx(1.5e12)
     assert spring.scale() == pytest.approx(spring.energy(np.eye(3)), rel=1e-5)
     assert cv.integrate(cv.Scene("pushed", BODY, np.eye(3), (0, 0, 1), 0.1, spring), 1e-4).ok
 
 
-def test_what_overflows_in_a_step_is_an_outcome():
+def test_an_overflow_in_a_step_is_an_outcome():
     body = cv.RigidBody((4e5, 4e6, 1e30))
     scene = cv.Scene("far apart", body, np.eye(3), (3e29, 2e9, 2e-23), 8e18)
     assert not cv.integrate(scene, 8e17, cv.Convected(), on_failure="return").ok

@@ -5,7 +5,6 @@ one was measured.
 """
 
 from importlib.metadata import version
-from types import SimpleNamespace
 
 import mujoco
 import mujoco.rollout
@@ -19,12 +18,9 @@ from conservative.grid import Grid
 from conservative.references import engine
 from conservative.references.engine import principal_axes
 from conservative.references.engines import heyoka
+from conservative.references.engines.catalogue import MuJoCo, Pinocchio
 from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.mujoco_versions import prepare_with
-from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
-from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.start import _BLOCK
 from conservative.references.precise import Precise
@@ -211,34 +207,16 @@ def test_a_closed_form_has_every_sample_of_many(top):
         np.testing.assert_allclose(alone.w_WB_B[-1], many.w_WB_B[k], atol=1e-13)
 
 
-class Counted:
-    """A module whose function `mj_step` is counted: the steps of each call."""
-
-    def __init__(self, module):
-        self.module, self.steps = module, []
-
-    def __getattr__(self, name):
-        return getattr(self.module, name)
-
-    def mj_step(self, model, data, nstep=1):
-        self.steps.append(nstep)
-        return self.module.mj_step(model, data, nstep)
-
-
-def test_mujoco_makes_the_steps_between_samples_in_one_call(free):
-    """A loop over `mj_step` in Python has the same states and takes many times as long."""
-    mj, grid = Counted(mujoco), Grid(0.01, 60, 20)
-    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
-    assert mj.steps == [20, 20, 20]
-
-
-def test_mujoco_makes_close_samples_in_one_call(free, monkeypatch):
-    mj, grid, calls = Counted(mujoco), Grid(0.01, 60, 2), []
-    rollout = mujoco.rollout.rollout
-    monkeypatch.setattr(mujoco.rollout, "rollout", lambda *args, **how: calls.append(how["nstep"]) or rollout(*args, **how))
-    prepare_with(mj, SimpleNamespace(integrator="RK4", **describe(principal_axes(free), grid)))()
-    assert calls == [60]
-    assert mj.steps == []
+@pytest.mark.parametrize(("every", "stepped", "stored"), [(20, [20, 20, 20], []), (2, [], [60])])
+def test_mujoco_makes_many_steps_in_one_call(free, monkeypatch, every, stepped, stored):
+    """One call per sample, or a single one if samples are close. A loop in Python has the same states but takes far longer."""
+    step, rollout, steps, rollouts = mujoco.mj_step, mujoco.rollout.rollout, [], []
+    monkeypatch.setattr(mujoco, "mj_step", lambda model, data, count: steps.append(count) or step(model, data, count))
+    monkeypatch.setattr(
+        mujoco.rollout, "rollout", lambda *args, **options: rollouts.append(options["nstep"]) or rollout(*args, **options)
+    )
+    assert MuJoCo().prepare(free, Grid(0.01, 60, every))().ok
+    assert (steps, rollouts) == (stepped, stored)
 
 
 BRICK = cv.scenes.brick_flip(t_end=1.0)

@@ -146,7 +146,7 @@ def test_what_uv_says_has_no_password():
 def test_an_engine_that_cannot_be_imported_is_said(tmp_path, monkeypatch):
     write_wheel(tmp_path, "4.0", code="import os\nos.abort()\n")
     write_numpy(tmp_path)
-    monkeypatch.setattr(registry.engine("trial"), "distribution", Distribution("trial", "trial"))
+    monkeypatch.setattr(registry.engine("trial"), "data", Distribution("trial", "trial"))
     assert installed(tmp_path, "trial==4.0").trouble.startswith("crashed (signal 6 (SIGABRT)")
 
 

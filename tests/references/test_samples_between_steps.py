@@ -95,7 +95,7 @@ def test_a_straight_line_between_steps_is_found(case, monkeypatch):
         return R_WB @ np.array(turns), w_WB_B, len(t)
 
     monkeypatch.setattr(between, "move", turn_on)
-    monkeypatch.setattr(between, "accept_samples", lambda found, *_: found)
+    monkeypatch.setattr(between, "cut_at_failure", lambda found, *_: found)
     found = cv.integrate(scene, 0.1, "taylor:order=18", t_eval=TIMES)
     assert errors(found, R_WB, w_WB_B)[0] > 1e-5
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.references.engines.catalogue import MuJoCo, Pinocchio
 from conservative.references.engines.heyoka import FRAMES, Heyoka
-from conservative.references.engines.mujoco import MuJoCo
-from conservative.references.engines.pinocchio import Pinocchio
 from conservative.references.engines.scipy import SciPy
 from conservative.references.heyoka_equations import formulations
 from conservative.references.precise import Precise

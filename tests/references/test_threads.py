@@ -8,8 +8,8 @@ import pytest
 
 import conservative as cv
 from conservative.references import precise
+from conservative.references.engines.catalogue import MuJoCo
 from conservative.references.engines.heyoka import Heyoka
-from conservative.references.engines.mujoco import MuJoCo
 from conservative.references.exact.method import Exact
 from conservative.references.heyoka_equations import forms, formulations
 from conservative.references.precise import Precise

@@ -16,12 +16,12 @@ from conservative import registry
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.timing import time_interleaved
 from conservative.benchmarks.studies import engines_at_one_step, studies, study
-from conservative.benchmarks.studies.case import Case, Failure
+from conservative.benchmarks.studies.case import Case
 from conservative.benchmarks.studies.study import Study
 from conservative.benchmarks.studies.time_limit import attempt_apart, attempt_here, attempt_within
 from conservative.errors import MissingEngine, Unsupported
 from conservative.grid import grid_for
-from conservative.outcome import OutcomeKind
+from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments import environment
 from conservative.references.environments.environment import worker_of
 from conservative.references.worker import client
@@ -278,8 +278,8 @@ def test_a_run_that_crashes_while_it_is_timed_is_marked_and_the_others_are_timed
 @pytest.mark.parametrize("within", [attempt_apart, attempt_here, attempt_within])
 def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
     found = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
-    assert isinstance(found, Failure)
-    assert str(found.outcome) == "timeout (after 0.5 s)"
+    assert isinstance(found, Outcome)
+    assert str(found) == "timeout (after 0.5 s)"
 
 
 @pytest.mark.usefixtures("trial_registered")

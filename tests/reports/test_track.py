@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from conservative.benchmarks.versions.engine import Fit
+from conservative.benchmarks.measures.convergence_order import Order
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import HEAD
@@ -149,13 +149,13 @@ def test_a_file_of_somebody_else_is_not_replaced_and_its_own_are_recognized(tmp_
     ("was", "now", "words"),
     [
         ({"drifts": {"energy": near(0.22)}}, {"drifts": {"energy": near(-0.17)}}, "turned from +22 % to -17 %"),
-        ({"rates_order": Fit(4.0, 0.1)}, {"rates_order": Fit(2.5, 0.1)}, "the order of the rates fell from 4 to 2.5"),
+        ({"rates_order": Order(4.0, 0.1)}, {"rates_order": Order(2.5, 0.1)}, "the order of the rates fell from 4 to 2.5"),
         ({"outcome": Outcome(OutcomeKind.UNSUPPORTED, "none")}, {}, "it appeared"),
         ({}, {"outcome": Outcome(OutcomeKind.UNSUPPORTED, "none")}, "it disappeared"),
         ({}, {"outcome": Outcome(OutcomeKind.CRASHED, "signal 11 (SIGSEGV)")}, "from ok to crashed (signal 11 (SIGSEGV))"),
         (
             {},
-            {"attitude_order": Fit(reason="no descent"), "error": near(1.0)},
+            {"attitude_order": Order(reason="no descent"), "error": near(1.0)},
             "no order of the attitude can be fitted any more, which was 2",
         ),
     ],

@@ -1,4 +1,4 @@
-"""The pytest plugin and its gate: runs of pytest in another project, and the rows that reports leave."""
+"""The pytest plugin and its gate: runs of pytest in another project, and the rows of its results."""
 
 import json
 import subprocess
@@ -52,7 +52,7 @@ print(*(name for name in set(sys.modules) - before if name.partition(".")[0] in 
 """
 
 
-def test_the_plugin_imports_nothing_of_ours():
+def test_the_plugin_imports_no_other_module_of_the_package():
     done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=60, check=True)
     plugin = "conservative.benchmarks.gate.pytest_plugin"
     above = {".".join(plugin.split(".")[:length]) for length in range(1, 5)}
@@ -60,14 +60,14 @@ def test_the_plugin_imports_nothing_of_ours():
 
 
 @pytest.mark.slow
-def test_without_the_option_other_projects_see_nothing(other):
+def test_without_the_option_other_projects_are_unaffected(other):
     code, text = run(other)
     assert code == 0
     assert "2 passed" in text
     assert "accuracy beside time" not in text
 
 
-def test_accuracy_stands_beside_the_times(other):
+def test_accuracy_is_printed_next_to_the_times(other):
     _, text = run(other, "--benchmark", "checks")
     after = text.split("accuracy beside time")[1].splitlines()
     assert after[1].split() == ["benchmark", "min,", "s", "median,", "s", "error"]
@@ -91,13 +91,13 @@ def test_the_suite_is_skipped_without_the_option(other):
     ],
     ids=["alone", "workers", "no timer"],
 )
-def test_benchmarks_and_the_gate_say_what_they_need(other, options, reason):
+def test_missing_requirements_are_usage_errors(other, options, reason):
     code, text = run(other, "--override-ini=addopts=", *options)
     assert (code, reason in text) == (pytest.ExitCode.USAGE_ERROR, True), text
 
 
 @pytest.mark.parametrize(("options", "expected"), [((), (0.1, 2)), (("--benchmark-max-time=3",), (1.0, 5))])
-def test_the_suite_is_what_runs_without_a_path_and_runs_briefly(options, expected):
+def test_the_suite_runs_briefly_without_a_path(options, expected):
     config = SimpleNamespace(
         args=["tests"],
         args_source=pytest.Config.ArgsSource.TESTPATHS,
@@ -116,11 +116,11 @@ def test_the_suite_is_what_runs_without_a_path_and_runs_briefly(options, expecte
 def test_options_of_pytest_benchmark_keep_their_meaning(other):
     assert "1 passed, 1 skipped" in run(other, "--benchmark-only")[1]
     assert "1 passed, 1 skipped" in run(other, "--benchmark-skip")[1]
-    code, text = run(other, "--benchmark", "--benchmark-only", "--benchmark-json=found.json", "checks")
+    code, text = run(other, "--benchmark", "--benchmark-only", "--benchmark-json=written.json", "checks")
     assert code == 0
     assert "1 passed, 1 skipped" in text
-    (found,) = json.loads((other / "found.json").read_text())["benchmarks"]
-    assert found["extra_info"] == {"label": "mine", "error": 1.25e-9}
+    (written,) = json.loads((other / "written.json").read_text())["benchmarks"]
+    assert written["extra_info"] == {"label": "mine", "error": 1.25e-9}
 
 
 GATED = """
@@ -165,8 +165,8 @@ def test_from_end_to_end(tmp_path, monkeypatch):
     code, text = run(tmp_path, "--benchmark", "--gate", "test_other.py")
     assert (code, "no baseline" in text) == (2, True)
     kept = ["--baseline", str(tmp_path / "benchmarks" / "baseline.json")]
-    found = str(tmp_path / results.FOLDER / results.FILE)
-    assert CliRunner().invoke(main, ["gate", *kept, "--update", "the first one", found]).exit_code == 0
+    written = str(tmp_path / results.FOLDER / results.FILE)
+    assert CliRunner().invoke(main, ["gate", *kept, "--update", "the first one", written]).exit_code == 0
     code, text = run(tmp_path, "--benchmark", "--gate", "test_other.py")
     assert code == 0, text
     assert "gate: passed, 5 rows" in text
@@ -211,7 +211,7 @@ def report(when="call", outcome="passed", **more):
 
 
 def hand_in(gate, item, *reports):
-    """Give reports to the hook as pytest does."""
+    """Pass reports to the hook as pytest does."""
     for each in reports:
         hook = gate.pytest_runtest_makereport(item)
         next(hook)
@@ -221,11 +221,17 @@ def hand_in(gate, item, *reports):
 
 
 def test_a_row_has_the_values_of_extra_info():
-    found = pytest_gate.row(benchmark({**INFO, "spreads": {"error": 1e-12, "gone": 0}}), report())
-    assert (found.id, found.scene, found.method, found.status, found.engine) == (ID, "brick", "reduced", Status.PASSED, "")
-    assert found.values["error"] == 1e-9
-    assert found.values["gone"] != found.values["gone"]
-    assert found.spreads == {"error": 1e-12, "gone": 0.0}
+    written = pytest_gate.row(benchmark({**INFO, "spreads": {"error": 1e-12, "gone": 0}}), report())
+    assert (written.id, written.scene, written.method, written.status, written.engine) == (
+        ID,
+        "brick",
+        "reduced",
+        Status.PASSED,
+        "",
+    )
+    assert written.values["error"] == 1e-9
+    assert written.values["gone"] != written.values["gone"]
+    assert written.spreads == {"error": 1e-12, "gone": 0.0}
     named = pytest_gate.row(benchmark({"definition": "mine", "engine": "e==1"}), report(outcome="failed"))
     assert (named.definition, named.engine, named.status) == ("mine", "e==1", Status.FAILED)
     assert pytest_gate.row(benchmark(), report(outcome="skipped", wasxfail="why")).status is Status.XFAILED
@@ -255,7 +261,7 @@ def test_which_reports_leave_a_row(gate):
     assert gate.rows["other.py::test_x[1]"].status is Status.FAILED
 
 
-def test_the_verdict_and_the_results_are_kept(gate, tmp_path, monkeypatch):
+def test_the_verdict_and_the_results_are_written(gate, tmp_path, monkeypatch):
     hand_in(gate, benchmark(), report())
     baseline.write(baseline.update_baseline(None, [Results("here", gate.rows)], "first"), gate.root / "kept.json")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "step.md"))

@@ -1,4 +1,4 @@
-"""Versions that nobody installed: rows with chosen values, and sides whose times come from a formula."""
+"""Made-up versions: rows with chosen values, and sides whose times come from a formula."""
 
 import random
 from pathlib import Path
@@ -31,7 +31,7 @@ VALUES = {
 
 
 def row(reason="", method="reduced", **changes):
-    """A row with values, some of which differ; with a reason it has none."""
+    """Return a row with values; `changes` replace some, and a row with a reason has none."""
     status = changes.pop("status", Status.PASSED)
     values = {} if reason else VALUES | {name.replace("_", " "): value for name, value in changes.items()}
     spreads = dict.fromkeys(values, 0.0)
@@ -39,14 +39,14 @@ def row(reason="", method="reduced", **changes):
 
 
 def comparison(*lines, base=BASE, head=HEAD):
-    """A comparison of lines (was, now, time): rows of both versions, and how their times compare; None for none."""
+    """Return a comparison of lines (was, now, time): rows of both versions and their times, each may be None."""
     names = [(was or now).method for was, now, _ in lines if was or now]
-    found = [Line("brick_flip", name, (was, now), time) for name, (was, now, time) in zip(names, lines, strict=True)]
-    return Comparison((base, head), tuple(found))
+    made = [Line("brick_flip", name, (was, now), time) for name, (was, now, time) in zip(names, lines, strict=True)]
+    return Comparison((base, head), tuple(made))
 
 
 def timed(first, again=None, reason=""):
-    """What was found of times: ratios as (value, low, high)."""
+    """Return the times of a row; ratios are (value, low, high)."""
     return TimeRow(STEP, first[0] * STEP, Ratio(*first, 7), Ratio(*again, 7) if again else None, reason)
 
 

@@ -1,16 +1,17 @@
-"""Versions of an engine that nobody measured: observations with chosen figures."""
+"""Made-up versions of an engine: observations with chosen figures."""
 
 from dataclasses import replace
 from pathlib import Path
 
+from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.comparison import Comparison, Line
-from conservative.benchmarks.versions.engine import Fit, Observation, Spread
+from conservative.benchmarks.versions.engine import Observation, Spread
 from conservative.benchmarks.versions.version import Version
 from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.environment import Environment
 
 TIMES = (1e-6, 1.02e-6, 1.01e-6)
-"""What a step takes, s, on a machine that has little else to do."""
+"""Times of a step, s, on an idle machine."""
 
 
 def near(value, relative=0.01):
@@ -24,16 +25,16 @@ GOOD = Observation(
     version="1.0",
     label="made==1.0/midpoint",
     dt=0.01,
-    attitude_order=Fit(2.0, 0.01),
-    rates_order=Fit(2.01, 0.01),
+    attitude_order=Order(2.0, 0.01),
+    rates_order=Order(2.01, 0.01),
     error=near(3e-3),
     drifts={"energy": near(2e-13, 0.2), "momentum": near(9e-4)},
 )
 """Order 2, energy conserved."""
 BAD = replace(
     GOOD,
-    attitude_order=Fit(0.99, 0.01),
-    rates_order=Fit(0.98, 0.02),
+    attitude_order=Order(0.99, 0.01),
+    rates_order=Order(0.98, 0.02),
     error=near(2.9),
     drifts={"energy": near(-0.17), "momentum": near(0.09)},
 )
@@ -46,7 +47,7 @@ FAILED = Observation(
     dt=0.01,
     outcome=Outcome(OutcomeKind.DIVERGED, "why", time=0.5),
 )
-"""No end of the run."""
+"""A run that fails."""
 
 
 def history(*observations, times=()):
@@ -58,5 +59,5 @@ def history(*observations, times=()):
 
 
 def versions(*names):
-    """Return versions of an engine that nobody installed."""
+    """Return made-up versions of an engine."""
     return [Version(name, "", Environment("made", name, Path(), "3.11.7", (f"made=={name}",))) for name in names]

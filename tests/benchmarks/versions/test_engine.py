@@ -1,4 +1,4 @@
-"""Which differences between two versions are conclusions, and which are noise."""
+"""Differences between two versions: conclusions and noise."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.benchmarks.measures.convergence_order import Order
 from conservative.benchmarks.versions.changes import Aspect, find_changes, list_transitions
 from conservative.benchmarks.versions.engine import (
     NO_STEP,
-    Fit,
     Spread,
     StepError,
     differ,
@@ -32,8 +32,8 @@ def changes(was, now, was_times=TIMES, now_times=TIMES):
 
 
 def test_a_lost_order_and_a_lost_invariant_are_losses():
-    found = changes(GOOD, BAD)
-    assert found == {
+    result = changes(GOOD, BAD)
+    assert result == {
         (Aspect.ATTITUDE_ORDER, ""): True,
         (Aspect.RATES_ORDER, ""): True,
         (Aspect.DRIFT, "energy"): True,
@@ -42,9 +42,9 @@ def test_a_lost_order_and_a_lost_invariant_are_losses():
 
 
 def test_a_gain_is_a_change_and_no_loss():
-    found = changes(BAD, GOOD)
-    assert set(found) == set(changes(GOOD, BAD))
-    assert not any(found.values())
+    result = changes(BAD, GOOD)
+    assert set(result) == set(changes(GOOD, BAD))
+    assert not any(result.values())
 
 
 @pytest.mark.parametrize("kind", [kind for kind in OutcomeKind if kind is not OutcomeKind.OK])
@@ -70,13 +70,13 @@ def test_a_small_drift_instead_of_a_large_one_is_a_change():
 
 ALIKE = {
     "the same": GOOD,
-    "orders within half": replace(GOOD, attitude_order=Fit(1.6, 0.01), rates_order=Fit(2.4, 0.01)),
-    "an order that is badly known": replace(GOOD, attitude_order=Fit(1.2, 0.4)),
+    "orders within half": replace(GOOD, attitude_order=Order(1.6, 0.01), rates_order=Order(2.4, 0.01)),
+    "an order that is badly known": replace(GOOD, attitude_order=Order(1.2, 0.4)),
     "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
     "drifts beside the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
     "errors within a factor": replace(GOOD, error=near(6e-3)),
     "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
-    "no order where the error is the same": replace(GOOD, rates_order=Fit(reason="no descent")),
+    "no order where the error is the same": replace(GOOD, rates_order=Order(reason="no descent")),
     "nothing known of a drift": replace(GOOD, drifts={"energy": Spread.of([np.nan]), "momentum": near(9e-4)}),
 }
 
@@ -87,7 +87,7 @@ def test_noise_changes_no_conclusion(what):
     assert changes(ALIKE[what], GOOD) == {}
 
 
-def test_a_drift_beside_the_edge_changes_nothing_within_a_factor():
+def test_a_drift_across_the_edge_is_no_change_within_a_factor():
     before, after = (replace(GOOD, drifts={"energy": near(drift)}) for drift in (0.6e-10, 1.4e-10))
     assert changes(before, after) == {}
     after = replace(after, drifts={"energy": near(4e-10)})
@@ -103,7 +103,7 @@ def test_errors_of_round_off_are_alike_however_far_apart():
 # -------------------------------------------------------------------------------------------------------------------- times
 
 
-def test_a_time_differs_where_all_repeats_do():
+def test_a_time_differs_if_all_repeats_do():
     slow = tuple(2 * time for time in TIMES)
     assert changes(GOOD, GOOD, TIMES, slow) == {(Aspect.TIME, ""): False}
     assert changes(GOOD, GOOD, slow, TIMES) == {(Aspect.TIME, ""): False}
@@ -115,8 +115,8 @@ def test_a_time_differs_where_all_repeats_do():
 
 
 def test_a_ratio_is_that_of_the_shortest_times():
-    found = ratio((1.0, 2.0, 4.0), (4.0, 2.0, 3.0))
-    assert found == Spread(2.0, 0.75, 4.0)
+    result = ratio((1.0, 2.0, 4.0), (4.0, 2.0, 3.0))
+    assert result == Spread(2.0, 0.75, 4.0)
     assert not differ((1.0, 2.0), (2.1, 3.0))
     assert differ((1.0, 2.0), (2.6, 3.0))
 
@@ -125,28 +125,28 @@ def test_a_ratio_is_that_of_the_shortest_times():
 
 
 def points(order, steps, reached):
-    found = [StepError(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
-    return tuple(point if k < reached else StepError(point.dt, np.nan, np.nan, False) for k, point in enumerate(found))
+    result = [StepError(0.1 / 2**k, 0.1 / 2 ** (k * order), 0.2 / 2 ** (k * order)) for k in range(steps)]
+    return tuple(point if k < reached else StepError(point.dt, np.nan, np.nan, False) for k, point in enumerate(result))
 
 
 def test_orders_are_fitted_to_the_steps_that_all_versions_have():
     bent = tuple(replace(point, attitude=max(point.attitude, 1e-3)) for point in points(2, 8, 8))
     slow, fast = replace(GOOD, points=points(2, 8, 4)), replace(GOOD, points=bent)
-    found = fit_orders([slow, fast])
-    assert [each.attitude_order.slope for each in found] == pytest.approx([2, 2])
+    result = fit_orders([slow, fast])
+    assert [each.attitude_order.slope for each in result] == pytest.approx([2, 2])
     assert fit_orders([fast])[0].attitude_order.slope != pytest.approx(2, abs=1e-6)
 
 
-def test_a_version_without_enough_steps_takes_none_from_the_others():
-    found = fit_orders([replace(GOOD, points=points(2, 8, 2)), replace(GOOD, points=points(2, 8, 8))])
-    assert np.isnan(found[0].attitude_order.slope)
-    assert found[0].attitude_order.reason
-    assert found[1].rates_order.slope == pytest.approx(2)
+def test_a_version_with_too_few_steps_does_not_limit_the_others():
+    result = fit_orders([replace(GOOD, points=points(2, 8, 2)), replace(GOOD, points=points(2, 8, 8))])
+    assert np.isnan(result[0].attitude_order.slope)
+    assert result[0].attitude_order.reason
+    assert result[1].rates_order.slope == pytest.approx(2)
 
 
-def test_what_has_no_step_has_no_order_and_says_so():
-    (found,) = fit_orders([replace(GOOD, points=())])
-    assert found.attitude_order.reason == NO_STEP
+def test_a_method_without_a_step_has_no_order_but_a_reason():
+    (result,) = fit_orders([replace(GOOD, points=())])
+    assert result.attitude_order.reason == NO_STEP
     failed = replace(GOOD, outcome=Outcome(OutcomeKind.DIVERGED))
     assert fit_orders([failed]) == (failed,)
 
@@ -155,15 +155,15 @@ def test_what_has_no_step_has_no_order_and_says_so():
 
 
 def test_changes_go_from_version_to_version():
-    found = list_transitions(history(BAD, GOOD, GOOD, BAD))
-    assert [bool(each.changes) for each in found] == [True, False, True]
-    assert [each.now.version for each in found if each.lost] == ["4.0"]
+    result = list_transitions(history(BAD, GOOD, GOOD, BAD))
+    assert [bool(each.changes) for each in result] == [True, False, True]
+    assert [each.now.version for each in result if each.lost] == ["4.0"]
 
 
 def test_times_belong_to_their_versions():
     slow = tuple(3 * time for time in TIMES)
-    found = list_transitions(history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow)))
-    assert [[each.aspect for each in step.changes] for step in found] == [[], [Aspect.TIME]]
+    result = list_transitions(history(GOOD, GOOD, GOOD, times=(TIMES, TIMES, slow)))
+    assert [[each.aspect for each in step.changes] for step in result] == [[], [Aspect.TIME]]
 
 
 @pytest.mark.parametrize(("versions", "message"), [(["1.0"], "two or more"), ([], "none"), (["1.0", "2.0", "1.0"], "twice")])

@@ -1,4 +1,4 @@
-"""Times of two versions: what is slower is found, what only looks so is not, and both are measured in new processes."""
+"""Times of two versions: slower versions fail, slow periods of the machine do not; both are measured in new processes."""
 
 import math
 
@@ -36,7 +36,7 @@ def test_the_same_is_not_slower_and_is_measured_once():
 
 
 @pytest.mark.parametrize("factor", [1.08, 1.1, 1.2, 3.0])
-def test_what_is_slower_is_measured_again_in_new_processes_and_fails(factor):
+def test_a_slower_version_is_measured_again_in_new_processes_and_fails(factor):
     base, head = Side(), Side(factor)
     row = compare(base, head)
     assert row.failed
@@ -47,33 +47,33 @@ def test_what_is_slower_is_measured_again_in_new_processes_and_fails(factor):
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.9, 1.03])
-def test_what_is_faster_or_little_slower_passes(factor):
+def test_a_faster_or_slightly_slower_version_passes(factor):
     row = compare(Side(), Side(factor))
     assert not row.failed
     assert row.again is None
 
 
-def test_a_slow_spell_of_the_machine_fails_nothing():
+def test_a_slow_period_of_the_machine_is_no_failure():
     row = compare(Side(), Side(spells=lambda process: 1.2 if process <= PROCESSES else 1.0))
     assert row.first.slower
     assert not row.again.slower
     assert not row.failed
 
 
-def test_processes_that_happen_to_be_slow_fail_nothing():
+def test_a_few_slow_processes_are_no_failure():
     row = compare(Side(), Side(spells=lambda process: 1.07 if process % 2 else 1.0))
     assert not row.failed
     assert row.first.value < 1.02
 
 
-def test_what_is_open_is_measured_in_more_processes():
+def test_an_open_ratio_is_measured_in_more_processes():
     row = compare(Side(), Side(1.08, spells=lambda process: (0.97, 1.0, 1.03)[process % 3]))
     assert row.first.processes > PROCESSES
     clock = Clock(Side(), Side(1.08, spells=lambda process: (0.96, 1.0, 1.05)[process % 3]))
     assert len(settle(clock, [TIMED], 3)[TIMED.key]) == 3 * MOST_TURNS
 
 
-def test_a_side_that_does_not_survive_fails_its_row_alone():
+def test_a_crashing_version_fails_only_its_row():
     other = Timed("brick_flip", "gauss", 0.01)
 
     class Fragile(Side):
@@ -81,11 +81,11 @@ def test_a_side_that_does_not_survive_fails_its_row_alone():
             self.crash = 3 if method == "gauss" else None
             return super().timed(scene, method, dt, n_steps)
 
-    found = compare_times(Side(), Fragile(), [TIMED, other])
-    assert found[other.key].failed
-    assert found[other.key].reason == "crashed (signal 11)"
-    assert found[other.key].first.processes == 2
-    assert not found[TIMED.key].failed
+    timed_rows = compare_times(Side(), Fragile(), [TIMED, other])
+    assert timed_rows[other.key].failed
+    assert timed_rows[other.key].reason == "crashed (signal 11)"
+    assert timed_rows[other.key].first.processes == 2
+    assert not timed_rows[TIMED.key].failed
 
 
 def test_no_rows_start_no_process():
@@ -107,7 +107,7 @@ def test_each_process_has_its_data_in_several_places():
     assert head.prepared == LAYOUTS * PROCESSES
 
 
-def test_the_interval_holds_what_it_should():
+def test_the_interval_has_its_confidence():
     # The ends hold with 99 % each: of 400 samples of a ratio of 1 with 7 processes, few are outside.
     rng = np.random.default_rng(4)
     outside = 0
@@ -117,7 +117,7 @@ def test_the_interval_holds_what_it_should():
     assert outside <= 40  # 23: a bootstrap of seven is a little too sure of itself
 
 
-def test_of_one_process_there_is_no_interval():
+def test_one_process_has_no_interval():
     for times in ([], [(1.0, 2.0)]):
         ratio = ratio_of(times)
         assert math.isnan(ratio.value)

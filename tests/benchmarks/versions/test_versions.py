@@ -29,7 +29,7 @@ backend-path = ["."]
 name = "{name}"
 version = "1.0"
 """
-BACKEND = '''"""Builds a wheel of the one module that stands beside it."""
+BACKEND = '''"""Builds a wheel of the module next to it."""
 import pathlib, zipfile
 
 NAME, MODULE, ENTRY = "{name}", "{module}", "{entry}"
@@ -61,7 +61,7 @@ def write_project(folder, name, module, code, entry=""):
 
 
 def commit(folder, message="change"):
-    """Commit all files of a folder, in a repository that is made where there is none; return the commit."""
+    """Commit all files of a folder, in a new repository if there is none; return the commit."""
     if not (folder / ".git").exists():
         git(folder, "init", "--quiet", "--initial-branch=main")
     git(folder, "add", "--all")
@@ -77,7 +77,7 @@ def git(folder, *arguments):
 
 
 NAME, MODULE = "made-up-integrator", "conservative"
-"""Its module is called as the package that environments of projects have to have."""
+"""The module has the name of the package that environments of projects must have."""
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def value_of(version):
     return (site / f"{MODULE}.py").read_text()
 
 
-def test_a_ref_is_what_was_committed(project, source):
+def test_a_ref_is_the_committed_version(project, source):
     (project / f"{MODULE}.py").write_text("VALUE = 3\n")
     first, second, now = (install_version(name, project, source) for name in ("first", "HEAD", str(project)))
     assert [value_of(each) for each in (first, second, now)] == ["VALUE = 1\n", "VALUE = 2\n", "VALUE = 3\n"]
@@ -134,7 +134,7 @@ def test_a_folder_that_did_not_change_keeps_its_environment(project, source):
     assert install_version(str(project), project, source).environment != first.environment
 
 
-def test_what_an_environment_has_changes_with_what_is_asked_for(project, source, tmp_path):
+def test_an_environment_has_the_additional_requirements(project, source, tmp_path):
     write_wheel(source.find_links, "1.0")
     plain, more = (install_version("first", project, source, wanted) for wanted in ((), ("trial",)))
     assert set(more.packages) - set(plain.packages) == {"trial==1.0"}
@@ -166,7 +166,7 @@ def test_the_oldest_environments_go(project, source, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["nowhere", "-x", "HEAD~9", "", "first:pyproject.toml"])
-def test_what_is_no_version_is_refused(project, source, name):
+def test_invalid_versions_are_refused(project, source, name):
     with pytest.raises(BadInput, match=r"against: got .*expected a git ref of the project's repository, a wheel, or a folder"):
         install_version(name, project, source)
 
@@ -200,7 +200,7 @@ def example(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def install(wheel, tmp_path_factory):
-    """What makes an environment of a wheel out of what is installed here, with us, from a wheel as well."""
+    """Return a function that makes an environment of a wheel from the packages installed here and a wheel of this package."""
     home, made = tmp_path_factory.mktemp("environments"), {}
 
     def environment_of(wheel_of_project, requirements, source):

@@ -1,0 +1,185 @@
+"""Largest drifts of the invariants of n bodies over their samples. A single body is a batch of one.
+
+A run is accepted by these drifts, and an `Ensemble` lists them. `Trajectory.drift` returns the drift of one invariant at each
+sample; `conservative.invariants` has the definitions and the scales of both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .attitude import Array
+from .batch import Batch
+from .deferred_imports import kernels
+from .grid import Grid
+from .invariants import AXIAL_MOMENTUM, MOMENTUM_UNIT, sizes
+from .potentials.field import lengths
+from .potentials.potential import depends_on_time
+from .potentials.turning import Turning, static_part
+from .scene import Scene
+
+ORTHONORMALITY = "orthonormality"
+NEARLY = 1e-11
+"""Relative difference of moments up to which the symmetry of a body is checked in full: more than counts as equal."""
+_NO_ENERGIES = np.empty((0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceValues:
+    """Initial values of the invariants of n bodies, and their reference scales.
+
+    Attributes
+    ----------
+    bodies
+        The bodies.
+    rows
+        Rows (n, 10, 3), as `conservative.kernels.drifts.measure` defines them.
+    """
+
+    bodies: Batch
+    rows: Array
+
+    def measure(self, grid: Grid, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+        """Return the largest drifts (n, 5) of each body, dimensionless.
+
+        The columns are orthonormality, energy, momentum, axial momentum, and the largest drift of those that are conserved by
+        the method. They are nan for a body with samples that are not finite, and for all if samples are not at the times of the
+        grid. Samples are at times (m,), s: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+        """
+        drifts = np.empty((len(self.rows), 5))
+        V = _NO_ENERGIES if self.bodies.scene.potential is None else field_energies(self.bodies, t, R_WB, w_WB_B)
+        kernels("drifts").measure(grid.dt, grid.every, grid.n_steps, t, R_WB, w_WB_B, V, self.rows, drifts)
+        return drifts
+
+
+def scene_reference(scene: Scene, conserved: frozenset[str]) -> ReferenceValues:
+    """Return the reference values of the body of a scene, for a method that conserves the invariants of these names."""
+    return find_reference(scene.derive(Batch.of), conserved)
+
+
+def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> ReferenceValues:
+    """Return the reference values of n bodies, for a method that conserves the invariants of these names.
+
+    The rules for scales are those of `Scene.energy_scale`, `invariants_of` and `kept_sizes`.
+    """
+    scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
+    largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
+    L_B = momenta_of(bodies)
+    kinetic = np.sum(L_B * w, axis=1) / 2
+    scale = kinetic + field_scales(bodies)
+    scale[scale == 0] = 1.0
+    largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
+    momentum = lengths(L_B)
+    momentum = np.where(momentum > 0, momentum, largest_momentum / np.sqrt(2))
+    if isinstance(potential, Turning):
+        scale += potential.orbit.rate * largest_momentum
+
+    rows = np.zeros((len(bodies), 10, 3))
+    rows[:, :3] = scene.body.inertia if bodies.inertia is None else bodies.inertia
+    rows[:, 3:6] = find_axes(bodies) / momentum[:, None, None]
+    L_W = np.einsum("nij,nj->ni", bodies.R_WB0, L_B)
+    rows[:, 6] = np.einsum("nij,nj->ni", rows[:, 3:6], L_W)
+    rows[:, 7] = np.nan_to_num(find_axial(bodies)) / momentum[:, None]
+    rows[:, 8, 2] = np.sum(rows[:, 7] * L_B, axis=1)
+    own = [each for each in scene.invariants if each not in scene.extra_invariants]
+    if any(each.unit == "J" for each in own):
+        V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], w[:, None])
+        rows[:, 8, 0], rows[:, 8, 1] = kinetic + (V[:, 0] if len(V) else 0.0), 1 / scale
+    for each in own:
+        if each.name in conserved and each.unit == "J":
+            rows[:, 9, 0] = 1.0
+        elif each.name in conserved:
+            rows[:, 9, 2 if each.name == AXIAL_MOMENTUM else 1] = momentum / np.maximum(momentum, largest_momentum)
+    return ReferenceValues(bodies, rows)
+
+
+def list_drifts(bodies: Batch) -> tuple[str, ...]:
+    """Return the names of drifts: orthonormality, and the invariants of the scene."""
+    return (ORTHONORMALITY, *(each.name for each in bodies.scene.invariants))
+
+
+def arrange_drifts(bodies: Batch, measured: Array, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return the largest drifts (n, k) by the names of `list_drifts`; nan where a body has no such invariant, or failed.
+
+    Parameters
+    ----------
+    bodies, measured
+        n bodies, and their drifts (n, 5), as `ReferenceValues.measure` returns them.
+    R_WB, w_WB_B
+        The samples: attitudes (n, m, 3, 3), body to world, and rates (n, m, 3), rad/s, body axes.
+    """
+    n, m = w_WB_B.shape[:2]
+    scene, columns = bodies.scene, [measured[:, 0]]
+    for each in scene.invariants:
+        if each in scene.extra_invariants:
+            start = each.evaluate(bodies.R_WB0, bodies.w_WB_B0)
+            values = each.evaluate(R_WB.reshape(-1, 3, 3), w_WB_B.reshape(-1, 3)).reshape(n, m, *start.shape[1:])
+            drift = (values - start[:, None]) / each.scale
+            columns.append(sizes(drift.reshape(n * m, *start.shape[1:])).reshape(n, m).max(axis=1))
+        elif each.name == AXIAL_MOMENTUM:
+            columns.append(np.where(np.isnan(find_axial(bodies)[:, 0]), np.nan, measured[:, 3]))
+        else:
+            columns.append(measured[:, 2 if each.unit == MOMENTUM_UNIT else 1])
+    return np.stack(columns, axis=1)
+
+
+def momenta_of(bodies: Batch) -> Array:
+    """Return the initial momenta (n, 3), kg m^2/s, body axes."""
+    if bodies.inertia is None:
+        return np.asarray(bodies.w_WB_B0 @ bodies.scene.body.inertia)
+    return np.sum(bodies.inertia * bodies.w_WB_B0[:, None], axis=2)  # ten times as fast as products of small matrices
+
+
+def find_axial(bodies: Batch) -> Array:
+    """Return unit vectors (n, 3), or (1, 3) for all, body axes, about which body and field are symmetric; nan without one."""
+    if bodies.scene.symmetry_axis_B is None:
+        return np.full((1, 3), np.nan)
+    if bodies.inertia is None and not bodies.parameters:
+        return bodies.scene.symmetry_axis_B[None]
+    axes_B = np.full((len(bodies), 3), np.nan)
+    J = np.sort(bodies.principal[0], axis=1)
+    nearly_symmetric = np.diff(J, axis=1).min(axis=1) <= NEARLY * J[:, 2]
+    for i in np.flatnonzero(nearly_symmetric).tolist():
+        axis = bodies.take(i).symmetry_axis_B
+        if axis is not None:
+            axes_B[i] = axis
+    return axes_B
+
+
+def find_axes(bodies: Batch) -> Array:
+    """Return unit vectors (n, 3, 3), or (1, 3, 3) for all, row by row, along which momentum is conserved; otherwise 0."""
+    if bodies.scene.potential is None:
+        return np.eye(3)[None]
+    axis_W = bodies.scene.potential.axis_W
+    if axis_W is None:
+        return np.zeros((1, 3, 3))
+    first = bodies.varied.axes_W() if bodies.parameters else axis_W[None]
+    return np.stack([first, np.zeros_like(first), np.zeros_like(first)], axis=1)
+
+
+def field_scales(bodies: Batch) -> Array | float:
+    """Return the size of the field, J: of each body (n,), or one for all."""
+    if bodies.scene.potential is None:
+        return 0.0
+    return bodies.varied.scales() if bodies.parameters else bodies.scene.potential.scale()
+
+
+def field_energies(bodies: Batch, t: Array, R_WB: Array, w_WB_B: Array) -> Array:
+    """Return the energies (n, m), J, that added to the kinetic ones are conserved; (0, 0) if none are.
+
+    In a turning field they include the term of the Jacobi integral. Samples are at times (m,), s: attitudes (n, m, 3, 3), body
+    to world, and rates (n, m, 3), rad/s, body axes.
+    """
+    potential = bodies.scene.potential
+    if potential is None or (depends_on_time(potential) and not isinstance(potential, Turning)):
+        return _NO_ENERGIES
+    R_OB = bodies.scene.in_field_axes(R_WB, t)
+    V = bodies.varied.energies(R_OB) if bodies.parameters else static_part(potential).energy(R_OB)
+    if isinstance(potential, Turning):
+        inertia = bodies.scene.body.inertia if bodies.inertia is None else bodies.inertia[:, None]
+        L_B = (inertia @ w_WB_B[..., None])[..., 0]
+        normal_B = potential.orbit.normal_W @ R_OB  # the normal has the same components in W and O
+        V = V - potential.orbit.rate * np.sum(normal_B * L_B, axis=-1)
+    return np.ascontiguousarray(V)

@@ -1,0 +1,234 @@
+"""Methods made from the adapters of engines: their settings, which are data, and the engines that run in this process."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, make_dataclass
+from functools import cache
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from conservative import registry
+from conservative.batch import Batch
+from conservative.card import Card, Maker
+from conservative.check import choice, finite_number, positive_integer
+from conservative.errors import BadInput, Unsupported
+from conservative.grid import Grid
+from conservative.method import Method, Role, Run
+from conservative.methods.many import RunMany
+from conservative.methods.units import in_own_units
+from conservative.scene import Scene
+
+from ..engine import load, principal_axes, unsupported_reason, version
+from .environment import Distribution
+from .plain_numbers import EngineSamples, ManySamples, describe, take_axes
+
+
+@dataclass(frozen=True)
+class EngineData(Distribution):
+    """The data in the file of an engine, `ENGINE`: its package (see `Distribution`) and its settings.
+
+    The file is imported here for this data, and runs in the environment for its function `prepare` (see
+    `conservative.references.worker.program`). It must therefore not import this package.
+
+    Attributes
+    ----------
+    settings
+        Settings and their defaults. "precision" and "as_installed" have the same meaning for all engines: number format
+        ("f64" or "f32"), and whether everything that is usually switched off stays on.
+    orders
+        Values of the first setting and their orders of convergence, None for adaptive steps; empty if it is not a choice.
+    order
+        Order of convergence if `orders` is empty.
+    choices
+        Allowed values of other settings.
+    tolerance
+        Name of the setting that is a tolerance for adaptive steps. If its default is 0, that value stands for fixed steps.
+    precision
+        "f64" or "f32", for engines without such a setting.
+    gravity
+        Whether bodies about a fixed point in uniform gravity are supported, not only free bodies.
+    free_only
+        The reason why only free bodies are supported, if the reason is in the engine; by values of the first setting if it
+        depends on that.
+    rate_limit
+        Largest angular velocity, rad/s, as installed.
+    title
+        First word of labels, for engines without a choice.
+    prefix
+        Text before the first setting in labels.
+    card
+        The engine's `conservative.card.Card`, as a dictionary.
+    """
+
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    orders: Mapping[str, int | None] = field(default_factory=dict)
+    order: int | None = 1
+    choices: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    tolerance: str = ""
+    precision: str = "f64"
+    gravity: bool = False
+    free_only: str | Mapping[str, str] = ""
+    rate_limit: float = math.inf
+    title: str = ""
+    prefix: str = ""
+    card: Mapping[str, Any] = field(default_factory=dict)
+
+
+AnyAdapted = TypeVar("AnyAdapted", bound="AdapterMethod")
+
+
+@cache
+def method_class(module: ModuleType, base: type[AnyAdapted]) -> type[AnyAdapted]:
+    """Return the class of the engine in a module that contains `ENGINE` (see `EngineData`) and a function `prepare`."""
+    data = EngineData(**module.ENGINE)
+    family = module.__name__.rpartition(".")[2]
+    described = {"family": family, "data": data, "adapter": module, "card": Card(**data.card)}
+    described |= {"__module__": module.__name__, "__doc__": module.__doc__}
+    if "precision" not in data.settings:
+        described["precision"] = data.precision
+    settings = [(name, type(default), field(default=default)) for name, default in data.settings.items()]
+    made = make_dataclass(family.capitalize(), settings, bases=(base,), namespace=described, frozen=True)
+    return made
+
+
+class AdapterMethod(Method):
+    """An engine with an adapter. `method_class` creates the subclasses: frozen dataclasses of the settings.
+
+    Attributes
+    ----------
+    data
+        The data in the file of the engine.
+    adapter
+        The file of the engine, as a module.
+
+    Raises
+    ------
+    BadInput
+        A setting is unknown or out of range.
+    MissingEngine
+        The engine is not installed.
+    """
+
+    role: ClassVar[Role] = Role.ENGINE
+    data: ClassVar[EngineData]
+    adapter: ClassVar[ModuleType]
+    precision: str
+
+    def __post_init__(self) -> None:
+        """Check the settings, and that the engine is installed."""
+        choices = {"precision": ("f64", "f32"), **self.data.choices}
+        for position, (name, value) in enumerate(self.settings.items()):
+            default = self.data.settings[name]
+            if name in choices or (position == 0 and self.data.orders):
+                choice(name, value, choices.get(name) or tuple(self.data.orders))
+            elif isinstance(default, bool) and not isinstance(value, bool):
+                raise BadInput(name, repr(value), "True or False")
+            elif type(default) is int:
+                positive_integer(name, value)
+            elif isinstance(default, float):
+                allowed = "a number above 0 and below 1" if default else "a number from 0 (fixed steps) to 1"
+                number = finite_number(name, value, allowed)
+                if not (0 < number < 1 if default else 0 <= number <= 1):
+                    raise BadInput(name, repr(value), allowed)
+        self.maker  # noqa: B018 - for its exception
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings and their values."""
+        value: Any = self
+        return {each.name: getattr(self, each.name) for each in fields(value)}
+
+    @property
+    def setting_parts(self) -> dict[str, str]:
+        """The first setting, those that are not defaults, the tolerance of adaptive steps, and single precision."""
+        parts = {"title": self.data.title} if self.data.title else {}
+        for position, (name, value) in enumerate(self.settings.items()):
+            text = f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
+            if name == "as_installed":
+                parts |= {name: "as installed"} if value else {}
+            elif position == 0:
+                parts[name] = self.data.prefix + value if isinstance(value, str) else text
+            elif name != "precision" and (
+                value != self.data.settings[name] or (name == self.data.tolerance and value and self.order is None)
+            ):
+                parts[name] = text
+        return parts if self.precision == "f64" else parts | {"precision": self.precision}
+
+    @property
+    def order(self) -> int | None:
+        """Order of convergence in dt; None for adaptive steps."""
+        settings, tolerance = self.settings, self.data.tolerance
+        if tolerance and not self.data.settings[tolerance] and settings[tolerance]:
+            return None
+        return self.data.orders[next(iter(settings.values()))] if self.data.orders else self.data.order
+
+    def unsupported(self, scene: Scene) -> str | None:
+        reason = unsupported_reason(scene)
+        if scene.potential is not None:
+            only = self.data.free_only
+            if not isinstance(only, str):
+                only = only.get(next(iter(self.settings.values())), "")
+            if not self.data.gravity:
+                reason = only or f"its adapter has free bodies, not {type(scene.potential).__name__}"
+            elif reason is None and only:
+                reason = only
+        if reason is None and self.settings.get("as_installed"):
+            return rate_limit_reason(scene, self.data.rate_limit)
+        return reason
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
+        return registry.method, (self.name,)
+
+
+def rate_limit_reason(scene: Scene, limit: float) -> str | None:
+    """Return why an engine that limits rates, rad/s, does not support a scene. Name a slower scene if there is one."""
+    rate = float(np.linalg.norm(scene.w_WB_B0))
+    if rate <= limit:
+        return None
+    slower = f"{scene.name}:slow=4"
+    try:
+        registry.scene(slower)
+    except BadInput:  # not a registered scene, or one without that parameter
+        advice = ""
+    else:
+        advice = f"; {slower} is a slower one"
+    return f"as installed it limits rates to {limit:g} rad/s, and the scene starts with {rate:.3g} rad/s{advice}"
+
+
+class LocalEngine(AdapterMethod):
+    """An engine in this process."""
+
+    @property
+    def maker(self) -> Maker:
+        return Maker(self.data.package, version(self.data.package, self.family))
+
+    @in_own_units
+    def prepare(self, scene: Scene, grid: Grid) -> Run:
+        """Prepare the run. Raise `Unsupported` if this version does not support it."""
+        axes = principal_axes(scene)
+        samples = EngineSamples(axes, grid, self.label)
+        try:
+            run = self._load().prepare(SimpleNamespace(**self.settings, **describe(axes, grid)))
+        except NotImplementedError as error:
+            raise Unsupported("method", self.name, f"what {self.label} supports ({error})") from None
+        return lambda: samples.trajectory(run())
+
+    def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
+        """Prepare the run of many bodies; return None if the engine does not support it for these bodies."""
+        axes = take_axes(bodies, grid, self.unsupported)
+        if axes is None:
+            return None
+        samples = ManySamples(axes, grid)
+        try:
+            run = self._load().prepare_many([SimpleNamespace(**self.settings, **describe(each, grid)) for each in axes])
+        except NotImplementedError:
+            return None
+        return lambda: samples.trajectory(run())
+
+    def _load(self) -> Any:
+        load(self.data.module, self.data.package, self.family)
+        return self.adapter
