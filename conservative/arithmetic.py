@@ -29,13 +29,13 @@ class Axes(NamedTuple):
     y: Any
     z: Any
 
-    def __add__(self, other: Any) -> Axes:  # type: ignore[override]
+    def __add__(self, other: Any) -> Axes:
         return Axes(*(a + b for a, b in zip(self, _thrice(other), strict=True)))
 
     def __sub__(self, other: Any) -> Axes:
         return Axes(*(a - b for a, b in zip(self, _thrice(other), strict=True)))
 
-    def __mul__(self, other: Any) -> Axes:  # type: ignore[override]
+    def __mul__(self, other: Any) -> Axes:
         return Axes(*(a * b for a, b in zip(self, _thrice(other), strict=True)))
 
     def __neg__(self) -> Axes:

@@ -78,7 +78,7 @@ class Batch:
         return Turning(own, potential.orbit) if isinstance(potential, Turning) else own
 
     @cached_property
-    def varied(self) -> Varied:
+    def varied(self) -> Varied | OneByOne:
         """The fields of all bodies, where they have numbers of their own: those that turn as they are in their axes."""
         vary = getattr(static_part(self.scene.potential), "vary", None)
         if vary is not None:

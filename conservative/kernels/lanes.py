@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import Any
 
 import numpy as np
 
@@ -38,20 +37,20 @@ if COMPILED:
 
     VECTOR = ir.VectorType(DOUBLE, REGISTER)
 
-    def _register(symbol: Any, operation: Any, first: Any, result: Any) -> None:
+    def _register(symbol, operation, first, result):
         """Let numba compile `symbol` for lanes as the operation on their symbols."""
 
-        class Operator(AbstractTemplate):  # type: ignore[misc]  # numba has no types
+        class Operator(AbstractTemplate):
             """What numba calls to find the type of the result."""
 
-            def generic(self, args: Any, kws: Any) -> Any:
+            def generic(self, args, kws):
                 """Return the signature, None for arguments of other kinds."""
                 widths = {kind.width for kind in args if isinstance(kind, first)}
                 others = [kind for kind in args if not isinstance(kind, first)]
                 fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
                 return signature(result(*widths), *args) if len(widths) == 1 and fits else None
 
-        def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        def lower(context, builder, sig, args):
             # No flags: the function that is compiled says whether products may be fused.
             numbers = (unpack(builder, *each, ()) for each in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
@@ -67,34 +66,35 @@ if COMPILED:
     _register(math.sqrt, arithmetic.root, Lanes, Lanes)
     _register(min, lambda a, b: arithmetic.choose(b < a, b, a), Lanes, Lanes)
     _register(max, lambda a, b: arithmetic.choose(b > a, b, a), Lanes, Lanes)
-    for _symbol in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq):
-        _register(_symbol, _symbol, Lanes, Mask)
-    for _symbol in (operator.and_, operator.or_, operator.invert):
-        _register(_symbol, _symbol, Mask, Mask)
+    for _comparison in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq):
+        _register(_comparison, _comparison, Lanes, Mask)
+    for _logical in (operator.and_, operator.or_, operator.invert):
+        _register(_logical, _logical, Mask, Mask)
 
-    def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any, register: Any = DOUBLE) -> Any:
-        """Return the address of an element, as that of a register of this type."""
-        pointer = builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+    def _place(context, builder, array, index, register=DOUBLE):
+        """Return the address of an element, as that of a register of this type; `array` is a numba type and a value."""
+        kind, value = array
+        pointer = builder.gep(context.make_array(kind)(context, builder, value).data, [index])
         return builder.bitcast(pointer, register.as_pointer())
 
-    def _move(builder: Any, index: Any, count: int) -> Any:
+    def _move(builder, index, count):
         return builder.add(index, ir.Constant(index.type, count))
 
-    def _read(context: Any, builder: Any, array: Any, index: Any, kind: Any) -> Any:
+    def _read(context, builder, array, index, kind):
         """Return the LLVM value of a number of this type; `array` is its numba type and value."""
         if kind == types.float64:
-            return builder.load(_place(context, builder, *array, index))
+            return builder.load(_place(context, builder, array, index))
         places = [_move(builder, index, i) for i in range(0, kind.width, REGISTER)]
-        registers = [builder.load(_place(context, builder, *array, each, VECTOR), align=8) for each in places]
+        registers = [builder.load(_place(context, builder, array, each, VECTOR), align=8) for each in places]
         return pack(context, builder, kind, Symbol(builder, registers))
 
-    def _of_width(width: Any) -> Any:
+    def _of_width(width):
         """Return the type of a number: of a width in the source, or of the type of another number."""
         if not isinstance(width, types.Literal):
             return width
         return types.float64 if width.literal_value == 1 else Lanes(width.literal_value)
 
-    def _arrange(like: Any, kind: Any) -> Any:
+    def _arrange(like, kind):
         """Return the type of a tuple of numbers of this type: of a count in the source, or arranged as another tuple."""
         if isinstance(like, types.Literal):
             return types.UniTuple(kind, like.literal_value)
@@ -102,7 +102,7 @@ if COMPILED:
             return kind
         return types.BaseTuple.from_types([_arrange(each, kind) for each in like], getattr(like, "instance_class", None))
 
-    def _flatten(value: Any) -> list[Any]:
+    def _flatten(value):
         return [x for each in value for x in _flatten(each)] if isinstance(value, tuple) else [value]
 
     @intrinsic(prefer_literal=True)
@@ -135,11 +135,11 @@ if COMPILED:
 
         return rows(array, types.intp, types.intp, like, width), build
 
-    def _write(context: Any, builder: Any, array: Any, index: Any, number: Any) -> None:
+    def _write(context, builder, array, index, number):
         """Store the registers of a symbol; `array` is its numba type and value."""
         for i, register in enumerate(number.registers):
             at = _move(builder, index, i * REGISTER)
-            builder.store(register, _place(context, builder, *array, at, register.type), align=8)
+            builder.store(register, _place(context, builder, array, at, register.type), align=8)
 
     @intrinsic
     def save(typing, array, index, value):
@@ -164,7 +164,7 @@ if COMPILED:
 
         return types.none(array, types.intp, types.intp, values), build
 
-    def _transpose(builder: Any, numbers: list[Any]) -> Any:
+    def _transpose(builder, numbers):
         """Return, of up to four registers, one per number, four registers, one per lane."""
         pick = lambda a, b, at: builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(INDEX, REGISTER), at))  # noqa: E731
         nothing = ir.Constant(VECTOR, ir.Undefined)
@@ -185,13 +185,13 @@ if COMPILED:
                 for registers in zip(*(number.registers for number in four), strict=True):
                     for lane in _transpose(builder, registers):
                         part = builder.shuffle_vector(lane, lane, kept)
-                        builder.store(part, _place(context, builder, sig.args[0], args[0], at, part.type), align=8)
+                        builder.store(part, _place(context, builder, (sig.args[0], args[0]), at, part.type), align=8)
                         at = builder.add(at, args[2])
             return context.get_dummy_value()
 
         return types.none(array, types.intp, types.intp, values), build
 
-    def _copy(builder: Any, value: Any) -> tuple[Any, Any]:
+    def _copy(builder, value):
         """Return the address of a copy in memory, as that of the whole and of the first float."""
         memory = cgutils.alloca_once_value(builder, value)
         return memory, builder.bitcast(memory, DOUBLE.as_pointer())

@@ -98,6 +98,11 @@ if COMPILED:
             at = self._address(self.builder.add(byte, count_bytes(place)))
             return Symbol(self.builder, [self.builder.load(at, align=BYTES)])
 
+    def gather(numbers):
+        """Return three numbers as `Axes`, and one as it is."""
+        numbers = tuple(numbers)
+        return Axes(*numbers) if len(numbers) == 3 else numbers[0]
+
     def count_bytes(registers):
         """Return the bytes of a number of registers as a constant of machine code."""
         return ir.Constant(INTEGER, registers * BYTES)
@@ -119,12 +124,6 @@ class History:
         if self._memory is None or not 0 < n < len(self._values) - 1:
             return self._values[n]
         return gather(map(self._memory.load, self.places[n]))
-
-
-def gather(numbers):
-    """Return three numbers as `Axes`, and one as it is."""
-    numbers = tuple(numbers)
-    return Axes(*numbers) if len(numbers) == 3 else numbers[0]
 
 
 class Vectors:

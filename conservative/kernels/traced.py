@@ -11,9 +11,7 @@ Products that are added at once are rounded once (the flag "contract"), as in `k
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -26,40 +24,40 @@ wider vectors LLVM fuses other products with sums, and results would depend on t
 
 if not COMPILED:
 
-    def trace(function: Callable[..., Any]) -> Any:
+    def trace(function):
         """Return the function itself."""
         return function
 
 else:
     from llvmlite import ir
     from numba.core import cgutils, types
-    from numba.core.datamodel import register_default
+    from numba.core.datamodel.registry import register_default
     from numba.core.registry import cpu_target
     from numba.core.typing.templates import infer, infer_global, make_intrinsic_template
     from numba.extending import models
 
     DOUBLE, BIT, INTEGER, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
 
-    class Lanes(types.Type):  # type: ignore[misc]  # numba has no types
+    class Lanes(types.Type):
         """The numba type of a number with `width` floats."""
 
-        def __init__(self, width: int) -> None:
+        def __init__(self, width):
             self.width = width
             super().__init__(name=f"Lanes({width})")
 
-    class Mask(types.Type):  # type: ignore[misc]  # numba has no types
+    class Mask(types.Type):
         """The numba type of `width` truth values."""
 
-        def __init__(self, width: int) -> None:
+        def __init__(self, width):
             self.width = width
             super().__init__(name=f"Mask({width})")
 
     @register_default(Lanes)
     @register_default(Mask)
-    class _RegistersModel(models.PrimitiveModel):  # type: ignore[misc]  # numba has no types
+    class _RegistersModel(models.PrimitiveModel):
         """Lanes and masks in memory: whole registers."""
 
-        def __init__(self, manager: Any, kind: Any) -> None:
+        def __init__(self, manager, kind):
             element = DOUBLE if isinstance(kind, Lanes) else BIT
             count = kind.width // REGISTER
             super().__init__(manager, kind, ir.LiteralStructType([ir.VectorType(element, REGISTER)] * count))
@@ -71,18 +69,18 @@ else:
         register, so that results do not depend on the number of lanes.
         """
 
-        def __init__(self, builder: Any, registers: Any, flags: tuple[str, ...] = ("contract",)) -> None:
+        def __init__(self, builder, registers, flags=("contract",)):
             self.builder, self.registers, self.flags = builder, tuple(registers), flags
 
         __hash__ = object.__hash__
 
         @property
-        def width(self) -> int:
+        def width(self):
             """Number of lanes; 0 for a single number."""
             kind = self.registers[0].type
             return kind.count * len(self.registers) if isinstance(kind, ir.VectorType) else 0
 
-        def spread(self, x: Any) -> Any:
+        def spread(self, x):
             """Return the registers of a number x brought to the lanes of this one."""
             if not isinstance(x, Symbol):
                 kind = ir.VectorType(DOUBLE, REGISTER) if self.width else DOUBLE
@@ -97,16 +95,16 @@ else:
             everywhere = ir.Constant(ir.VectorType(INDEX, REGISTER), [0] * REGISTER)
             return [self.builder.shuffle_vector(first, first, everywhere)] * len(self.registers)
 
-        def emit(self, operation: Callable[..., Any], *numbers: Any) -> Symbol:
+        def emit(self, operation, *numbers):
             """Return the result of an operation on registers, for numbers that may be lanes, single numbers or constants."""
             widest = max((x for x in numbers if isinstance(x, Symbol)), key=lambda x: x.width)
             registers = zip(*(widest.spread(x) for x in numbers), strict=True)
             return Symbol(self.builder, [operation(*each) for each in registers], self.flags)
 
-        def call(self, name: str, *numbers: Any) -> Symbol:
+        def call(self, name, *numbers):
             """Return the result of an LLVM intrinsic such as "sqrt"."""
 
-            def operation(*registers: Any) -> Any:
+            def operation(*registers):
                 kind = registers[0].type
                 suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
                 function_type = ir.FunctionType(kind, [kind] * len(registers))
@@ -117,93 +115,93 @@ else:
 
             return self.emit(operation, *numbers)
 
-        def _float(self, name: str, *numbers: Any) -> Symbol:
+        def _float(self, name, *numbers):
             return self.emit(lambda *registers: getattr(self.builder, name)(*registers, flags=self.flags), *numbers)
 
-        def _compare(self, sign: str, other: Any) -> Symbol:
+        def _compare(self, sign, other):
             return self.emit(lambda a, b: self.builder.fcmp_ordered(sign, a, b), self, other)
 
-        def __add__(self, other: Any) -> Symbol:
+        def __add__(self, other):
             return self._float("fadd", self, other)
 
-        def __radd__(self, other: Any) -> Symbol:
+        def __radd__(self, other):
             return self._float("fadd", other, self)
 
-        def __sub__(self, other: Any) -> Symbol:
+        def __sub__(self, other):
             return self._float("fsub", self, other)
 
-        def __rsub__(self, other: Any) -> Symbol:
+        def __rsub__(self, other):
             return self._float("fsub", other, self)
 
-        def __mul__(self, other: Any) -> Symbol:
+        def __mul__(self, other):
             return self._float("fmul", self, other)
 
-        def __rmul__(self, other: Any) -> Symbol:
+        def __rmul__(self, other):
             return self._float("fmul", other, self)
 
-        def __truediv__(self, other: Any) -> Symbol:
+        def __truediv__(self, other):
             return self._float("fdiv", self, other)
 
-        def __rtruediv__(self, other: Any) -> Symbol:
+        def __rtruediv__(self, other):
             return self._float("fdiv", other, self)
 
-        def __neg__(self) -> Symbol:
+        def __neg__(self):
             return self.emit(self.builder.fneg, self)
 
-        def __abs__(self) -> Symbol:
+        def __abs__(self):
             return self.call("fabs", self)
 
-        def __gt__(self, other: Any) -> Symbol:
+        def __gt__(self, other):
             return self._compare(">", other)
 
-        def __ge__(self, other: Any) -> Symbol:
+        def __ge__(self, other):
             return self._compare(">=", other)
 
-        def __lt__(self, other: Any) -> Symbol:
+        def __lt__(self, other):
             return self._compare("<", other)
 
-        def __le__(self, other: Any) -> Symbol:
+        def __le__(self, other):
             return self._compare("<=", other)
 
-        def __eq__(self, other: Any) -> Symbol:  # type: ignore[override]
+        def __eq__(self, other):
             return self._compare("==", other)
 
-        def __and__(self, other: Any) -> Symbol:
+        def __and__(self, other):
             return self.emit(self.builder.and_, self, other)
 
-        def __or__(self, other: Any) -> Symbol:
+        def __or__(self, other):
             return self.emit(self.builder.or_, self, other)
 
-        def __invert__(self) -> Symbol:
+        def __invert__(self):
             return self.emit(self.builder.not_, self)
 
-        def __bool__(self) -> bool:
+        def __bool__(self):
             raise TypeError("a traced function cannot branch on a number")
 
-        def fuse(self, a: Any, b: Any, c: Any) -> Symbol:
+        def fuse(self, a, b, c):
             """Return a b + c, rounded once."""
             return self.call("fma", a, b, c)
 
-        def root(self) -> Symbol:
+        def root(self):
             """Return the square root."""
             return self.call("sqrt", self)
 
-        def choose(self, a: Any, b: Any) -> Symbol:
+        def choose(self, a, b):
             """Return a where this mask is true and b elsewhere."""
             return self.emit(self.builder.select, self, a, b)
 
-        def split(self) -> tuple[Symbol, ...]:
+        def split(self):
             """Return the floats of one register."""
             (register,) = self.registers
             places = (ir.Constant(INDEX, i) for i in range(REGISTER))
             return tuple(Symbol(self.builder, [self.builder.extract_element(register, i)], self.flags) for i in places)
 
-        def shuffle(self, places: tuple[int, ...]) -> Symbol:
+        def shuffle(self, places):
             """Return the floats of a register at these places."""
             at = ir.Constant(ir.VectorType(INDEX, REGISTER), places)
             return self.emit(lambda register: self.builder.shuffle_vector(register, register, at), self)
 
-        def reduce(self, name: str) -> Symbol:
+        def reduce(self, name):
             """Return whether every ("and") or some ("or") truth value is true."""
             whole, *rest = self.registers
             for part in rest:
@@ -214,7 +212,7 @@ else:
                 whole = self.builder.call(cgutils.get_or_insert_function(self.builder.module, function_type, name), [whole])
             return Symbol(self.builder, [whole], self.flags)
 
-    def unpack(builder: Any, kind: Any, value: Any, flags: tuple[str, ...] = ("contract",)) -> Any:
+    def unpack(builder, kind, value, flags=("contract",)):
         """Return the symbols of an LLVM value of a numba type: one, or a tuple of them."""
         if isinstance(kind, types.BaseTuple):
             parts = cgutils.unpack_tuple(builder, value, len(kind))
@@ -224,7 +222,7 @@ else:
             return Symbol(builder, [builder.extract_value(value, i) for i in range(kind.width // REGISTER)], flags)
         return Symbol(builder, [value], flags)
 
-    def pack(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    def pack(context, builder, kind, value):
         """Return the LLVM value of a numba type of a symbol, a constant or a tuple of them."""
         if isinstance(kind, types.BaseTuple):
             parts = [pack(context, builder, *each) for each in zip(kind, value, strict=True)]
@@ -238,7 +236,7 @@ else:
             whole = builder.insert_value(whole, part, i)
         return whole
 
-    def type_of(value: Any) -> Any:
+    def type_of(value):
         """Return the numba type of a symbol, a constant or a tuple of them."""
         if isinstance(value, tuple):
             named = type(value) if hasattr(value, "_fields") else None
@@ -251,7 +249,7 @@ else:
         return {DOUBLE: types.float64, BIT: types.boolean, INTEGER: types.int64}[kind]
 
     @cache
-    def _find_type(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+    def _find_type(function, kinds):
         """Return the type of a function's result, found by tracing it into a module that is thrown away."""
         context = cpu_target.target_context
         arguments = [context.get_value_type(kind) for kind in kinds]
@@ -259,16 +257,16 @@ else:
         builder = ir.IRBuilder(whole.append_basic_block())
         return type_of(function(*(unpack(builder, *each) for each in zip(kinds, whole.args, strict=True))))
 
-    def trace(function: Callable[..., Any]) -> Any:
+    def trace(function):
         """Return the function itself, after making it known to numba; in Python it stays what it is."""
 
-        def traced(typing: Any, *kinds: Any) -> Any:
+        def traced(typing, *kinds):
             # A value that may be None by its type is not None here: numba's cast checks it.
             kinds = tuple(kind.type if isinstance(kind, types.Optional) else kind for kind in kinds)
             kinds = tuple(types.int64 if isinstance(kind, types.Integer) else kind for kind in kinds)
             found = _find_type(function, kinds)
 
-            def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            def build(context, builder, sig, args):
                 numbers = (unpack(builder, *each) for each in zip(sig.args, args, strict=True))
                 return pack(context, builder, found, function(*numbers))
 
@@ -276,16 +274,14 @@ else:
 
         parameters = inspect.signature(function).parameters.values()
         context = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        traced.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [context, *(each.replace(annotation=each.empty) for each in parameters)]
-        )
+        traced.__signature__ = inspect.Signature([context, *(each.replace(annotation=each.empty) for each in parameters)])
         template = make_intrinsic_template(function, traced, function.__name__)
         infer(template)
         infer_global(function, types.Function(template))
         return function
 
 
-def join(a: Any, b: Any, c: Any, d: Any) -> Any:
+def join(a, b, c, d):
     """Return four floats as one number: lanes for components, in plain Python an array."""
     symbol = next((x for x in (a, b, c, d) if isinstance(x, Traced)), None)
     if symbol is None:

@@ -233,7 +233,7 @@ def prepare_bodies(bodies: Batch, grid: Grid, order: int) -> RunMany | None:
         axis_W = (bodies.R_WB0 @ (R_BP @ (w * moments)[..., None]))[..., 0]
         field = kernel.Free(np.linalg.norm(L, axis=1))
     else:
-        field = field._replace(**{name: (getattr(field, name).T / energy_unit).T for name in field.ENERGIES})
+        field = field.in_units(energy_unit)
         if isinstance(field, UniformField):  # of symmetric bodies the moment is along the axis but for round-off
             field = field._replace(x=np.where(symmetric, 0.0, field.x), y=np.where(symmetric, 0.0, field.y))
     R_WD = directions(axis_W)

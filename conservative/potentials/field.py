@@ -18,8 +18,7 @@ and for arrays, where numbers are (...) and vectors (..., 3)
     energies(R_WB)               V (...), J
     scale()                      size of the field (...), J
     axis_W()                     vectors (..., 3) along the axis of symmetry; 0 without one
-
-`ENERGIES` names the field's numbers that are proportional to the energy.
+    in_units(energy)             the field with energies in units of `energy` (...), J
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..arithmetic import times
 from ..attitude import Array
 from .varied import Varied
 
@@ -113,3 +113,8 @@ def into_axes(v: Array, R_BP: Array | None) -> Array:
 def lengths(v: Array) -> Any:
     """Return |v|, (...), of vectors (..., 3); squares neither vanish nor overflow."""
     return np.hypot(np.hypot(v[..., 0], v[..., 1]), v[..., 2])
+
+
+def turned_moment(J_inverse: Any, m: Any) -> Any:
+    """Return J^-1 (m2, m3, m1) and J^-1 (m3, m1, m2)."""
+    return times(J_inverse, (m[1], m[2], m[0])), times(J_inverse, (m[2], m[0], m[1]))

@@ -25,18 +25,16 @@ class GradientField(NamedTuple):
     rows: Any
     e: Any
 
-    ENERGIES = ("rows",)
-
-    def energy(self, q):
+    def energy(self, q: Any) -> Any:
         """Return V in J."""
         return self.slope((), in_body(q, self.e))[0]
 
-    def body_torque(self, q):
+    def body_torque(self, q: Any) -> Any:
         """Return the torque in N m."""
         u = in_body(q, self.e)
         return cross(u, apply(self.rows, u))
 
-    def finite_torque(self, q, a):
+    def finite_torque(self, q: Any, a: Any) -> Any:
         """Return T = e x (M G ubar) and its derivative; M changes the product by dm, u changes by -du as it is taken at -a."""
         e = in_body(q, self.e)
         u, du = halfway(scale(-1.0, a), e)
@@ -44,16 +42,16 @@ class GradientField(NamedTuple):
         changes = (halfway(a, apply(self.rows, scale(-1.0, column)))[0] for column in du)
         return cross(e, m), tuple(cross(e, add(*each)) for each in zip(dm, changes, strict=True))
 
-    def finite_derivative(self, q0, q1):
+    def finite_derivative(self, q0: Any, q1: Any) -> Any:
         """Return e and G ubar."""
         u = tuple(0.5 * (dot(a, self.e) + dot(b, self.e)) for a, b in zip(q0, q1, strict=True))
         return self.e, apply(self.rows, u)
 
-    def finite_slope(self, q0, q1):
+    def finite_slope(self, q0: Any, q1: Any) -> Any:
         """Return G and e e' / 2."""
         return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
 
-    def find_constants(self, J_inverse):
+    def find_constants(self, J_inverse: Any) -> Any:
         """Return the rows of two matrices: u = G g, turned as r and as s and over J, is one of them times r, s and g."""
         x, y, z = self.rows
         rows = (
@@ -66,18 +64,18 @@ class GradientField(NamedTuple):
         )
         return tuple(times(J_inverse, row) for row in rows)
 
-    def slope(self, constants, g):
+    def slope(self, constants: Any, g: Any) -> Any:
         """Return V and dV/dg in J."""
         u = apply(self.rows, g)
         return 0.5 * dot(g, u), u
 
-    def series(self, constants, g, series):
+    def series(self, constants: Any, g: Any, series: Any) -> Any:
         """Return the recurrence of J^-1 (g x u)."""
         rows = [series.vector(*row) for row in constants]
         by_r, by_s, by_g = zip(rows[:3], rows[3:], strict=True)
         turned = series.history(), series.history()
 
-        def accelerate(c, n):
+        def accelerate(c: Any, n: Any) -> Any:
             for k, u in enumerate(turned):
                 u.push(fuse(by_s[k], c[n, 1], fuse(by_r[k], c[n, 0], by_g[k] * c.newest[0])))
             (r, s), (g_r, g_s) = turned, c.turned(0)
@@ -85,16 +83,20 @@ class GradientField(NamedTuple):
 
         return accelerate
 
-    def energies(self, R_WB):
+    def in_units(self, energy: Any) -> Any:
+        """Return the field with energies in units of `energy`, J."""
+        return self._replace(rows=self.rows / np.asarray(energy)[..., None, None])
+
+    def energies(self, R_WB: Any) -> Any:
         """Return V, (...), in J."""
         u = np.sum(R_WB * self.e[..., :, None], axis=-2)
         return np.sum(np.sum(self.rows * u[..., None, :], axis=-1) * u, axis=-1) / 2
 
-    def scale(self):
+    def scale(self) -> Any:
         """Return the largest V, J."""
         return np.linalg.eigvalsh(self.rows)[..., -1] / 2
 
-    def axis_W(self):
+    def axis_W(self) -> Any:
         """Return the direction of the centre."""
         return self.e
 

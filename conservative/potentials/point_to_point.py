@@ -21,190 +21,204 @@ from ..arithmetic import choose, cross, divide, dot, fuse, halfway, in_body, roo
 from ..attitude import Array
 from ..check import build_unchecked, finite_array, finite_number, positive_number, set_fields
 from ..errors import BadInput
-from .field import FieldPotential, into_axes, lengths
-from .uniform_gravity import turned_moment
+from .field import FieldPotential, into_axes, lengths, turned_moment
 
 _POINT = "three finite numbers (3,), m"
 _LENGTH = "a finite length of 0 or more, m"
 _STRENGTH = "a finite number other than 0, J m"
 
 
-def _energy(field, q):
-    """Return V in J."""
-    x = subtract(field.b, in_body(q, field.A))
-    return field.value(dot(x, x))
+class PointField:
+    """The law of both fields: V = F(s), J, of a point b of the body, in its axes, and a point A of the world, m."""
+
+    b: Any
+    A: Any
+    value: Any
+    derivative: Any
+    divided: Any
+    torque_factor: Any
+    start_power: Any
+
+    def energy(self, q: Any) -> Any:
+        """Return V in J."""
+        x = subtract(self.b, in_body(q, self.A))
+        return self.value(dot(x, x))
+
+    def body_torque(self, q: Any) -> Any:
+        """Return the torque in N m."""
+        A = in_body(q, self.A)
+        x = subtract(self.b, A)
+        return scale(2.0 * self.derivative(dot(x, x)), cross(self.b, A))
+
+    def finite_torque(self, q: Any, a: Any) -> Any:
+        """Return T = -2 slope A x m, m = M b, and its derivative: the slope changes with s1, and ds1 = 4 x1.dm."""
+        A = in_body(q, self.A)
+        m, dm = halfway(a, self.b)
+        x0, x1 = subtract(self.b, A), subtract(subtract(scale(2.0, m), self.b), A)
+        slope, change = self.divided(dot(x0, x0), dot(x1, x1))
+        Am, f = cross(A, m), -2.0 * slope
+
+        def change_along(column: Any) -> Any:
+            d, e = cross(A, column), -8.0 * change * dot(x1, column)
+            return tuple(fuse(f, x, e * y) for x, y in zip(d, Am, strict=True))
+
+        return scale(f, Am), tuple(map(change_along, dm))
+
+    def _find_ends(self, q0: Any, q1: Any) -> Any:
+        """Return R b - A at both attitudes, in world axes."""
+        return tuple(tuple(dot(self.b, (q[0][i], q[1][i], q[2][i])) - self.A[i] for i in range(3)) for q in (q0, q1))
+
+    def finite_derivative(self, q0: Any, q1: Any) -> Any:
+        """Return 2 slope (Rbar b - A) and b."""
+        x0, x1 = self._find_ends(q0, q1)
+        slope = self.divided(dot(x0, x0), dot(x1, x1))[0]
+        return tuple(slope * (x + y) for x, y in zip(x0, x1, strict=True)), self.b
+
+    def finite_slope(self, q0: Any, q1: Any) -> Any:
+        """Return b b' and the derivative of 2 slope (Rbar b - A) by R1 b."""
+        x0, x1 = self._find_ends(q0, q1)
+        slope, change = self.divided(dot(x0, x0), dot(x1, x1))
+        rows = [[2.0 * change * (x0[i] + x1[i]) * x1[k] + (slope if i == k else 0.0) for k in range(3)] for i in range(3)]
+        return tuple(scale(x, self.b) for x in self.b), tuple(map(tuple, rows))
+
+    def find_constants(self, J_inverse: Any) -> Any:
+        """Return the distance |A|, and its product with b and a factor of the torque, turned as for `turned_moment`."""
+        A = root(dot(self.A, self.A))
+        return A, *turned_moment(J_inverse, scale(-self.torque_factor() * A, self.b))
+
+    def slope(self, constants: Any, g: Any) -> Any:
+        """Return V and dV/dg in J."""
+        x = subtract(scale(constants[0], g), self.b)
+        s = dot(x, x)
+        return self.value(s), scale(2.0 * self.derivative(s) * constants[0], x)
+
+    def series(self, constants: Any, g: Any, series: Any) -> Any:
+        """Return the recurrence of J^-1 T of T = (base + y) g x m, where y is a multiple of s^alpha.
+
+        The squared distance s is linear in g. S holds S2, S3, S1 of s/s[0] = 1 + S.(g - g[0]). With s[k] in units of
+        s[0], s y' = alpha s' y gives
+
+            y[n] = (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n
+        """
+        A, *moments = constants
+        x = subtract(scale(A, g), self.b)
+        over, y0, alpha, base = self.start_power(dot(x, x))
+        S = scale(-2.0 * A * over * over, self.b)
+        S = series.vector(S[1], S[2], S[0])
+        M1, M2 = (series.vector(*moment) for moment in moments)
+        s, weighted_s, y, torque = (series.history() for _ in range(4))
+        y0 = series.spread(y0)
+
+        def accelerate(c: Any, n: Any) -> Any:
+            torque.push(fuse(-M1, c[n, 1], M2 * c[n, 0]))
+            distance = series.add_up(S * c[n, 0])
+            s.push(distance)
+            weighted_s.push(distance * float(n))
+            if n:
+                plain, weighted = series.convolve(n, 1, n, ((s, y),), ((weighted_s, y),))
+                y.push(weighted * ((alpha + 1) / n) - plain)
+            else:
+                y.push(y0)
+            return series.convolve(n, 0, n, ((y, torque),), start=torque[n] if base else None)[0]
+
+        return accelerate
+
+    def energies(self, R_WB: Any) -> Any:
+        """Return V, (...), in J."""
+        b, A = self.b, self.A
+        x = R_WB[..., 0] * b[..., :1] + R_WB[..., 1] * b[..., 1:2] + R_WB[..., 2] * b[..., 2:] - A
+        return self.value(np.sum(x * x, axis=-1))
+
+    def axis_W(self) -> Any:
+        """Return the direction of the world point; 0 if it is the pivot, and the field does nothing."""
+        return self.A
 
 
-def _body_torque(field, q):
-    """Return the torque in N m."""
-    A = in_body(q, field.A)
-    x = subtract(field.b, A)
-    return scale(2.0 * field.derivative(dot(x, x)), cross(field.b, A))
-
-
-def _finite_torque(field, q, a):
-    """Return T = -2 slope A x m, m = M b, and its derivative: the slope changes with s1, and ds1 = 4 x1.dm."""
-    A = in_body(q, field.A)
-    m, dm = halfway(a, field.b)
-    x0, x1 = subtract(field.b, A), subtract(subtract(scale(2.0, m), field.b), A)
-    slope, change = field.divided(dot(x0, x0), dot(x1, x1))
-    Am, f = cross(A, m), -2.0 * slope
-
-    def change_along(column):
-        d, e = cross(A, column), -8.0 * change * dot(x1, column)
-        return tuple(fuse(f, x, e * y) for x, y in zip(d, Am, strict=True))
-
-    return scale(f, Am), tuple(map(change_along, dm))
-
-
-def _find_ends(field, q0, q1):
-    """Return R b - A at both attitudes, in world axes."""
-    return tuple(tuple(dot(field.b, (q[0][i], q[1][i], q[2][i])) - field.A[i] for i in range(3)) for q in (q0, q1))
-
-
-def _finite_derivative(field, q0, q1):
-    """Return 2 slope (Rbar b - A) and b."""
-    x0, x1 = _find_ends(field, q0, q1)
-    slope = field.divided(dot(x0, x0), dot(x1, x1))[0]
-    return tuple(slope * (x + y) for x, y in zip(x0, x1, strict=True)), field.b
-
-
-def _finite_slope(field, q0, q1):
-    """Return b b' and the derivative of 2 slope (Rbar b - A) by R1 b."""
-    x0, x1 = _find_ends(field, q0, q1)
-    slope, change = field.divided(dot(x0, x0), dot(x1, x1))
-    rows = [[2.0 * change * (x0[i] + x1[i]) * x1[k] + (slope if i == k else 0.0) for k in range(3)] for i in range(3)]
-    return tuple(scale(x, field.b) for x in field.b), tuple(map(tuple, rows))
-
-
-def _find_constants(field, J_inverse):
-    """Return the distance |A|, and its product with b and a factor of the torque, turned as for `turned_moment`."""
-    A = root(dot(field.A, field.A))
-    return A, *turned_moment(J_inverse, scale(-field[2] * A, field.b))
-
-
-def _slope(field, constants, g):
-    """Return V and dV/dg in J."""
-    x = subtract(scale(constants[0], g), field.b)
-    s = dot(x, x)
-    return field.value(s), scale(2.0 * field.derivative(s) * constants[0], x)
-
-
-def _series(field, constants, g, series):
-    """Return the recurrence of J^-1 T of T = (base + y) g x m, where y is a multiple of s^alpha.
-
-    The squared distance s is linear in g. S holds S2, S3, S1 of s/s[0] = 1 + S.(g - g[0]). From s y' = alpha s' y follows, with
-    s[k] in units of s[0],
-
-        y[n] = (alpha + 1)/n sum of k s[k] y[n-k] - sum of s[k] y[n-k]        k = 1 ... n
-    """
-    A, *moments = constants
-    x = subtract(scale(A, g), field.b)
-    over, y0, alpha, base = field.start_power(dot(x, x))
-    S = scale(-2.0 * A * over * over, field.b)
-    S = series.vector(S[1], S[2], S[0])
-    M1, M2 = (series.vector(*moment) for moment in moments)
-    s, weighted_s, y, torque = (series.history() for _ in range(4))
-    y0 = series.spread(y0)
-
-    def accelerate(c, n):
-        torque.push(fuse(-M1, c[n, 1], M2 * c[n, 0]))
-        distance = series.add_up(S * c[n, 0])
-        s.push(distance)
-        weighted_s.push(distance * float(n))
-        if n:
-            plain, weighted = series.convolve(n, 1, n, ((s, y),), ((weighted_s, y),))
-            y.push(weighted * ((alpha + 1) / n) - plain)
-        else:
-            y.push(y0)
-        return series.convolve(n, 0, n, ((y, torque),), start=torque[n] if base else None)[0]
-
-    return accelerate
-
-
-def _energies(field, R_WB):
-    """Return V, (...), in J."""
-    b, A = field.b, field.A
-    x = R_WB[..., 0] * b[..., :1] + R_WB[..., 1] * b[..., 1:2] + R_WB[..., 2] * b[..., 2:] - A
-    return field.value(np.sum(x * x, axis=-1))
-
-
-def _axis_W(field):
-    """Return the direction of the world point; 0 if it is the pivot, and the field does nothing."""
-    return field.A
-
-
-class SpringField(NamedTuple):
-    """F = stiffness/2 (sqrt(s) - rest)^2 with b in body and A in world axes, m (`conservative.potentials.field`)."""
+class SpringNumbers(NamedTuple):
+    """Numbers of `SpringField`: points, m, and stiffness, N/m, and rest length, m."""
 
     b: Any
     A: Any
     stiffness: Any
     rest: Any
 
-    ENERGIES = ("stiffness",)
-    energy, body_torque, finite_torque, energies, axis_W = _energy, _body_torque, _finite_torque, _energies, _axis_W
-    finite_derivative, finite_slope = _finite_derivative, _finite_slope
-    find_constants, slope, series = _find_constants, _slope, _series
 
-    def value(self, s):
+class SpringField(SpringNumbers, PointField):
+    """F = stiffness/2 (sqrt(s) - rest)^2 with b in body and A in world axes, m (`conservative.potentials.field`)."""
+
+    def value(self, s: Any) -> Any:
         """Return F in J."""
         stretch = root(s) - self.rest
         return 0.5 * self.stiffness * stretch * stretch
 
-    def derivative(self, s):
+    def derivative(self, s: Any) -> Any:
         """Return dF/ds in N/m; without a rest length it does not depend on the distance, which may be 0."""
         return 0.5 * self.stiffness * (1.0 - divide(self.rest, root(s)))
 
-    def divided(self, s0, s1):
+    def divided(self, s0: Any, s1: Any) -> Any:
         """Return (F(s1) - F(s0)) / (s1 - s0), N/m, and its derivative by s1, N/m^3."""
         half, r1 = 0.5 * self.stiffness, root(s1)
         both = root(s0) + r1
         return half * (1.0 - divide(2.0 * self.rest, both)), divide(half * self.rest, r1 * both * both)
 
-    def start_power(self, s):
+    def torque_factor(self) -> Any:
+        """Return the factor of the torque with which `series` starts, N/m."""
+        return self.stiffness
+
+    def in_units(self, energy: Any) -> Any:
+        """Return the field with energies in units of `energy`, J."""
+        return self._replace(stiffness=self.stiffness / energy)
+
+    def start_power(self, s: Any) -> Any:
         """Return one over the distance, y at the start, alpha and base of `series`: 0 twice without a rest length."""
         over = divide(choose(self.rest > 0.0, 1.0, 0.0), root(s))
         return over, -self.rest * over, -0.5, 1
 
-    def scale(self):
+    def scale(self) -> Any:
         """Return the largest V there can be, J: at the largest distance, or at none if that is farther from rest."""
         return self.stiffness / 2 * np.maximum(lengths(self.b) + lengths(self.A), self.rest) ** 2
 
 
-class AttractionField(NamedTuple):
-    """F = -strength / sqrt(s) with b in body and A in world axes, m (`conservative.potentials.field`)."""
+class AttractionNumbers(NamedTuple):
+    """Numbers of `AttractionField`: points, m, and strength, J m."""
 
     b: Any
     A: Any
     strength: Any
 
-    ENERGIES = ("strength",)
-    energy, body_torque, finite_torque, energies, axis_W = _energy, _body_torque, _finite_torque, _energies, _axis_W
-    finite_derivative, finite_slope = _finite_derivative, _finite_slope
-    find_constants, slope, series = _find_constants, _slope, _series
 
-    def value(self, s):
+class AttractionField(AttractionNumbers, PointField):
+    """F = -strength / sqrt(s) with b in body and A in world axes, m (`conservative.potentials.field`)."""
+
+    def value(self, s: Any) -> Any:
         """Return F in J."""
         return -self.strength * (1.0 / root(s))  # the quotient of `derivative`, which compiled code computes once
 
-    def derivative(self, s):
+    def derivative(self, s: Any) -> Any:
         """Return dF/ds in N/m."""
         over = 1.0 / root(s)
         return 0.5 * self.strength * over * over * over
 
-    def divided(self, s0, s1):
+    def divided(self, s0: Any, s1: Any) -> Any:
         """Return (F(s1) - F(s0)) / (s1 - s0), N/m, and its derivative by s1, N/m^3."""
         r0, r1 = root(s0), root(s1)
         value = self.strength / ((r0 + r1) * r0 * r1)
         return value, -0.5 * value * (r0 + 2.0 * r1) / (s1 * (r0 + r1))
 
-    def start_power(self, s):
+    def torque_factor(self) -> Any:
+        """Return the factor of the torque with which `series` starts, J m."""
+        return self.strength
+
+    def in_units(self, energy: Any) -> Any:
+        """Return the field with energies in units of `energy`, J."""
+        return self._replace(strength=self.strength / energy)
+
+    def start_power(self, s: Any) -> Any:
         """Return one over the distance, y at the start, alpha and base of `series`."""
         over = 1.0 / root(s)
         return over, over * over * over, -1.5, 0
 
-    def scale(self):
+    def scale(self) -> Any:
         """Return the size of V where the points' directions from the pivot are at right angles, J."""
         return abs(self.strength) / np.hypot(lengths(self.b), lengths(self.A))
 

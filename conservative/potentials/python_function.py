@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, from_quaternion, rotation_about, triple
 from ..check import build_unchecked, describe, finite_array, positive_number, set_fields
+from ..deferred_imports import kernels
 from ..errors import BadInput, PotentialFailed
 from .callback import Callback, moment
 from .pointwise import Energy, EnergyFunction, Gradient, GradientFunction, Product, Size
@@ -123,11 +124,10 @@ class FunctionPotential:
 
     def kernel_field(self, R_BP: Array) -> Any:
         """Return the address of what kernels call, which lives as long as the potential, and the frame, row by row."""
-        from ..kernels.function_field import Function, FunctionInTime
-
+        kernel = kernels("function_field")
         # Atomic: of threads that come here at once, each gets the one that stays.
         address, rows = id(self.__dict__.setdefault("_callback", Callback(self))), tuple(triple(row) for row in R_BP)
-        return FunctionInTime(address, rows, 0.0) if self.time_dependent else Function(address, rows)
+        return kernel.FunctionInTime(address, rows, 0.0) if self.time_dependent else kernel.Function(address, rows)
 
 
 def _check_gradient(energy: Energy, gradient: Gradient, t: tuple[float, ...]) -> None:

@@ -86,28 +86,28 @@ class Turned(NamedTuple):
     normal: Any
     back: Any
 
-    def at_time(self, t):
+    def at_time(self, t: Any) -> Any:
         """Return the field at a time t, s."""
         half = 0.5 * self.rate * t
         return self._replace(back=(cosine(half), *scale(-sine(half), self.normal)))
 
-    def energy(self, q):
+    def energy(self, q: Any) -> Any:
         """Return V in J: that of the fixed field at the attitude in axes O."""
         return self.field.energy(product(self.back, q))
 
-    def body_torque(self, q):
+    def body_torque(self, q: Any) -> Any:
         """Return the torque in N m."""
         return self.field.body_torque(product(self.back, q))
 
-    def find_constants(self, J_inverse):
+    def find_constants(self, J_inverse: Any) -> Any:
         """Return those of the fixed field."""
         return self.field.find_constants(J_inverse)
 
-    def slope(self, constants, g):
+    def slope(self, constants: Any, g: Any) -> Any:
         """Return V and dV/dg of the fixed field."""
         return self.field.slope(constants, g)
 
-    def series(self, constants, g, series):
+    def series(self, constants: Any, g: Any, series: Any) -> Any:
         """Return the recurrence of the fixed field."""
         return self.field.series(constants, g, series)
 

@@ -9,10 +9,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arithmetic import cross, dot, fuse, halfway, times, vertical
+from ..arithmetic import cross, dot, fuse, halfway, vertical
 from ..attitude import Array
 from ..check import build_unchecked, finite_array, finite_number, set_fields
-from .field import FieldPotential, into_axes, lengths
+from .field import FieldPotential, into_axes, lengths, turned_moment
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -24,59 +24,56 @@ class UniformField(NamedTuple):
     y: Any
     z: Any
 
-    ENERGIES = ("x", "y", "z")
-
-    def energy(self, q):
+    def energy(self, q: Any) -> Any:
         """Return V in J."""
         return dot(vertical(q), self)
 
-    def body_torque(self, q):
+    def body_torque(self, q: Any) -> Any:
         """Return the torque in N m."""
         return cross(vertical(q), self)
 
-    def finite_torque(self, q, a):
+    def finite_torque(self, q: Any, a: Any) -> Any:
         """Return T = (M c) x (-gamma) and its derivative: c on average over the step."""
         g = vertical(q)
         m, dm = halfway(a, self)
         return cross(g, m), tuple(cross(g, column) for column in dm)
 
-    def finite_derivative(self, q0, q1):
+    def finite_derivative(self, q0: Any, q1: Any) -> Any:
         """Return the gradient as (c, d): V is linear in the base vectors."""
         return (0.0, 0.0, 1.0), tuple(self)
 
-    def finite_slope(self, q0, q1):
+    def finite_slope(self, q0: Any, q1: Any) -> Any:
         """Return no change."""
         return (ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO)
 
-    def find_constants(self, J_inverse):
+    def find_constants(self, J_inverse: Any) -> Any:
         """Return two vectors with which J^-1 (g x m) is a difference of two products."""
         return turned_moment(J_inverse, self)
 
-    def slope(self, constants, g):
+    def slope(self, constants: Any, g: Any) -> Any:
         """Return V and dV/dg in J."""
         return dot(g, self), tuple(self)
 
-    def series(self, constants, g, series):
+    def series(self, constants: Any, g: Any, series: Any) -> Any:
         """Return the recurrence of J^-1 (g x m)."""
         M1, M2 = (series.vector(*moment) for moment in constants)
         return lambda c, n: fuse(-M1, c[n, 1], M2 * c[n, 0])
 
-    def energies(self, R_WB):
+    def in_units(self, energy: Any) -> Any:
+        """Return the field with energies in units of `energy`, J."""
+        return UniformField(self.x / energy, self.y / energy, self.z / energy)
+
+    def energies(self, R_WB: Any) -> Any:
         """Return V, (...), in J."""
         return dot((R_WB[..., 2, 0], R_WB[..., 2, 1], R_WB[..., 2, 2]), self)
 
-    def scale(self):
+    def scale(self) -> Any:
         """Return weight times lever arm, J."""
         return lengths(np.stack(self, axis=-1))
 
-    def axis_W(self):
+    def axis_W(self) -> Any:
         """Return the vertical."""
         return np.broadcast_to((0.0, 0.0, 1.0), (*np.shape(self.x), 3))
-
-
-def turned_moment(J_inverse, m):
-    """Return J^-1 (m2, m3, m1) and J^-1 (m3, m1, m2)."""
-    return times(J_inverse, (m[1], m[2], m[0])), times(J_inverse, (m[2], m[0], m[1]))
 
 
 @dataclass(frozen=True, eq=False, init=False)

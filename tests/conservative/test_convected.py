@@ -6,7 +6,7 @@ import pytest
 import conservative as cv
 from conservative.attitude import rotation_about
 from conservative.kernels import convected as paper
-from conservative.kernels.fields import Uniform
+from conservative.potentials.uniform_gravity import UniformField
 
 RNG = np.random.default_rng(20)
 A, B = RNG.normal(size=(2, 9))
@@ -37,7 +37,7 @@ def test_conjugate_momentum_obeys_12_and_17():
     np.testing.assert_allclose(paper.C(ORTHONORMAL) @ p, 0, atol=1e-15)
 
 
-@pytest.mark.parametrize("field", [None, Uniform(0.7, -1.1, 2.3)])
+@pytest.mark.parametrize("field", [None, UniformField(0.7, -1.1, 2.3)])
 def test_tangent_29_is_the_derivative_of_the_residual(field):
     q0, p0 = ORTHONORMAL, paper.conjugate_momentum(ORTHONORMAL, RNG.normal(size=3))
     u = np.concatenate([q0, p0]) + 0.1 * RNG.normal(size=18)
