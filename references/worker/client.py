@@ -104,6 +104,12 @@ class Worker:
         self._owner, self.starts = os.getpid(), 0
         _workers.add(self)
 
+    def _forget_process(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._output: IO[bytes] | None = None
+        self._work: Path | None = None
+        self._life = -1
+
     def ask(self, do: str, **values: Any) -> dict[str, Any]:
         """Return the answer to a request. Requests of several threads are answered one after the other.
 
@@ -258,12 +264,6 @@ class Worker:
         if self._work:
             shutil.rmtree(self._work, ignore_errors=True)
         self._forget_process()
-
-    def _forget_process(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        self._output: IO[bytes] | None = None
-        self._work: Path | None = None
-        self._life = -1
 
 
 @atexit.register

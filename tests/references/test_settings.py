@@ -50,6 +50,12 @@ def test_bad_settings(method, settings, message):
         method(**settings)
 
 
+@pytest.mark.parametrize("name", ["colour", "variants", "suite", "rank", "candidates"])
+def test_an_entry_of_the_card_is_no_attribute_of_a_class(name):
+    with pytest.raises(TypeError, match=rf"Mine\.{name} has no effect\. Write: card = Card\({name}="):
+        type("Mine", (cv.Method,), {name: ()})
+
+
 def test_a_non_spinning_frame_needs_symmetry(free, heavy, top):
     method = Heyoka(frame="non_spinning")
     assert method.unsupported(top) is None
