@@ -32,11 +32,26 @@ class Interval:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell with more than text: a grade, a less important note, an interval to draw, or two halves (in a `GRID`)."""
+    """A cell of a table.
+
+    Attributes
+    ----------
+    text, note
+        The text, and a less important one.
+    grade
+        Its grade, if it is judged.
+    value
+        The number that the page sorts the column by; NaN comes last.
+    interval
+        An interval to draw.
+    parts
+        The two halves of a cell in a `GRID`.
+    """
 
     text: str
     grade: Grade | None = None
     note: str = ""
+    value: float | None = None
     interval: Interval | None = None
     parts: tuple[Cell, ...] = ()
 
