@@ -123,8 +123,10 @@ def classes_table(
     rows: list[Row] = []
     for kind in MethodClass:
         families = of_classes(points, kind)["family"].unique()
+        sample = [samples[kind]] if samples else []
         if not len(families):
-            rows.append([kind.value, *[DASH] * (len(header) - 2), "does not support these motions, or was not measured"])
+            missing = "does not support these motions, or was not measured"
+            rows.append([kind.value, *[DASH] * (2 + len(ERRORS)), *sample, missing])
             continue
         best = cheapest_of_each(of_classes(reached, kind), "class")
         at_errors = {error: best[best["error"] == error] for error in ERRORS}
@@ -143,7 +145,7 @@ def classes_table(
                     else DASH
                     for found in at_errors.values()
                 ),
-                *([samples[kind]] if samples else []),
+                *sample,
                 "; ".join(filter(None, [*misses, failures.get(kind, "")])) or "nowhere here",
             ]
         )

@@ -50,7 +50,7 @@ def test_files_have_the_rows_and_the_tables(made_up, tmp_path):
     assert done.exit_code == 0, done.output
     with (tmp_path / "a.csv").open(newline="") as file:
         assert len(list(csv.DictReader(file))) == len(made_up)
-    assert "| spring | 1e-2 | 2 of 2 | ✓ 1.00 | ✗ 0.50 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
+    assert "| spring | 1e-2 | 2 of 2 | ✓ 1.00 | ✗ 0.500 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["study.csv", "study.json", "study.md"]
 
 
