@@ -71,13 +71,16 @@ def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
 
 def _whole(text: str) -> Markup:
     """Return a text in which no line breaks within a number such as 1e-3, or before its unit; words in backticks are code."""
-    whole = re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
-    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", whole))
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", _with_whole_numbers(text)))
+
+
+def _with_whole_numbers(text: str) -> str:
+    return re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
 
 
 def _narrow(name: str) -> Markup:
     """Return a name in which a line may break after each underscore, so that a narrow column has whole words."""
-    return Markup(str(escape(name)).replace("_", "_<wbr>"))
+    return Markup(_with_whole_numbers(name).replace("_", "_<wbr>"))
 
 
 def _cell(value: str | Cell) -> Cell:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 from conservative.benchmarks.contest import Contest, costs
@@ -21,10 +21,10 @@ from .summary import Summary
 
 _RATIOS = (
     "The time of the fastest engine divided by that of our fastest method, at each decade of the largest attitude error. "
-    "✓: ours is faster. ✗: the engine in the last column is faster. Random bodies have the geometric mean, and in parentheses "
-    "the number of bodies on which an engine is faster, or alone in reaching the error. Times between two measured points "
-    "are interpolated log-log and not extrapolated. The error of a point is the largest of its own and of all finer points, "
-    "so isolated good results are ignored."
+    "✓: ours is faster. ✗: an engine is faster. Random bodies have the geometric mean, and in parentheses the number of "
+    "bodies on which an engine is faster, or alone in reaching the error. Times between two measured points are interpolated "
+    "log-log and not extrapolated. The error of a point is the largest of its own and of all finer points, so isolated good "
+    "results are ignored."
 )
 
 
@@ -48,23 +48,19 @@ def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
         replace(summary.classes, caption=f"{about}: µs of computing per simulated second, by class of methods"),
         Paragraph(f"{summaries.TERMS} {summaries.SAMPLE_TERMS}", Emphasis.NOTE),
         Paragraph(f"{summaries.CAVEAT} Compare times only {together}.{quick}", Emphasis.NOTE),
-        Section("Where an engine is faster", [Paragraph(_RATIOS), ratio_table(measured)]),
+        Section("Where an engine is faster", [ratio_table(measured), Paragraph(_RATIOS, Emphasis.NOTE)]),
     )
     return Section(f"Verdict: {about}", blocks, "verdict", "Verdict")
 
 
 def ratio_table(measured: Measured) -> Table:
     """Return the ratios at each decade: a row for each field of random bodies, then for each scene and class of ours."""
-    rows: list[tuple[str, MethodClass, dict[float, Cell], Iterable[Contest]]] = []
-    fields: dict[str, list[RandomRatios]] = {}
+    rows: list[tuple[str, MethodClass, dict[float, Cell], str]] = []
+    fields: dict[str, dict[float, Cell]] = {}
     for part in measured.ratios:
         if part.engine == ANY:
-            fields.setdefault(part.field, []).append(part)
-    for field, parts in fields.items():
-        contests = [contest for part in parts for contest in part.contests]
-        rows.append(
-            (f"random bodies, {field}", MethodClass.GENERAL, {each.error: _random_cell(each) for each in parts}, contests)
-        )
+            fields.setdefault(part.field, {})[part.error] = _random_cell(part)
+    rows += [(f"random bodies, {field}", MethodClass.GENERAL, cells, DASH) for field, cells in fields.items()]
     for scene in measured.plan.scenes:
         points, every_step = measured.points[measured.points["scene"] == scene.name], measured.every_step[scene.name]
         runs = {scene.name: costs(points, DECADES)}
@@ -73,12 +69,13 @@ def ratio_table(measured: Measured) -> Table:
             for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
                 contests = sides(reached, kind)
                 if any(each.ours for each in contests):
-                    rows.append((label, kind, {each.error: contest_cell(each) for each in contests}, contests))
+                    names = dict.fromkeys(each.theirs.name for each in contests if each.lost and each.theirs)
+                    cells = {each.error: contest_cell(each) for each in contests}
+                    rows.append((label, kind, cells, ", ".join(names) or DASH))
     errors = [error for error in DECADES if any(error in cells for _, _, cells, _ in rows)]
-    body: list[Row] = []
-    for label, kind, cells, contests in rows:
-        winners = dict.fromkeys(each.theirs.name for each in contests if each.lost and each.theirs)
-        body.append([label, kind.value, *(cells.get(error, DASH) for error in errors), ", ".join(winners) or DASH])
+    body: list[Row] = [
+        [label, kind.value, *(cells.get(error, DASH) for error in errors), winners] for label, kind, cells, winners in rows
+    ]
     caption = "The fastest engine's time divided by ours, by attitude error, rad"
     return Table(["motion", "our methods", *map(tolerance, errors), "faster engine"], body, caption, Style.FILTERED)
 
