@@ -63,7 +63,7 @@ class Convected(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from ..kernels.convected import G, conjugate_momentum
+        from ..kernels.convected import conjugate_momentum
 
         q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
         u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
@@ -73,9 +73,10 @@ class Convected(Method):
         def run() -> Trajectory:
             with np.errstate(all="ignore"):  # what overflows is no solution, and the step fails
                 u, corrections, failure = _march(linearise, u0, grid, self.tol)
-            q, p = u[:, :9].copy(), u[:, 9:].copy()
-            L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
-            R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
+            q, p = u[:, :9].reshape(-1, 3, 3), u[:, 9:].reshape(-1, 3, 3)
+            R_WB = np.swapaxes(q, 1, 2)
+            M = p @ R_WB  # p_i . q_j
+            L = np.stack([M[:, 1, 2] - M[:, 2, 1], M[:, 2, 0] - M[:, 0, 2], M[:, 0, 1] - M[:, 1, 0]], axis=1)  # (8)
             done = grid.n_steps if failure is None else failure.step - 1
             work = Counters(steps=done, stages=done, iterations=corrections)
             return Trajectory(scene, grid.t[: len(u)], R_WB, L @ J_inverse, self.label, work, failure)
