@@ -69,7 +69,7 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: Samples) 
         chosen, verified = [*chosen, number], [i for i in verified if i != number]
     choice = ChoiceForMany(method, dt, error, max(worst.total, estimate), attempts, len(numbers), grid)
     if not choice.reached:
-        warnings.warn(AccuracyNotReached(error, choice.estimate), stacklevel=4)
+        warnings.warn(AccuracyNotReached(error, choice.estimate), stacklevel=3)
     return choice
 
 

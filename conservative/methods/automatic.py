@@ -66,7 +66,7 @@ def integrate_to_error(
     if samples.at is not None:
         trajectory = sample_between(trajectory, method, grid, samples.at)
     if trajectory.ok and not choice.reached:
-        warnings.warn(AccuracyNotReached(error, total), stacklevel=4)
+        warnings.warn(AccuracyNotReached(error, total), stacklevel=3)
     return replace(trajectory, choice=choice)
 
 

@@ -150,8 +150,8 @@ def test_numbers_depend_neither_on_blocks_nor_on_threads(monkeypatch):
 
 def test_blocks_are_as_large_as_their_samples_allow():
     assert blocks.list_blocks(2500, cv.Grid(0.1, 10)) == range(0, 2500, 1024)
-    assert blocks.count_bodies(cv.Grid(0.1, 10**4)) == 17  # 16.3 MB
-    assert blocks.count_bodies(cv.Grid(0.1, 10**6)) == 1
+    assert blocks.list_blocks(1, cv.Grid(0.1, 10**4)).step == 17  # 16.3 MB
+    assert blocks.list_blocks(1, cv.Grid(0.1, 10**6)).step == 1
 
 
 def test_progress_is_told_after_each_block(monkeypatch):

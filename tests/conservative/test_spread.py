@@ -146,7 +146,7 @@ ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
         (REST, {"rate": "any"}, "rate", "'any' of 0", "in rad/s"),
         (TOP, {"inertia": "101%"}, "inertia", "'101%'", "up to 100%"),
         (ODD, {"inertia": "1%"}, "inertia", "[1.0, 1.0, 3.0]", "none is larger than the sum"),
-        (ORBIT, {"inertia": "1%"}, "inertia", "a field that turns", "none"),
+        (ORBIT, {"inertia": "1%"}, "inertia", "a turning field", "none"),
         (TOP, {"parameters": {"wieght": "1%"}}, "parameters", "'wieght'", "'weight' (nearest)"),
         (TOP, {"parameters": {"weight": "1kg"}}, "potential.weight", "'1kg'", "its own SI unit"),
         (TOP, {"seed": -1}, "seed", "-1", "0 or more"),

@@ -177,7 +177,7 @@ def test_a_full_disk_keeps_what_is_done(whole, tmp_path, monkeypatch):
         return put(path, value, exclusive)
 
     monkeypatch.setattr(zarr.storage._local, "_put", fill_up)
-    with pytest.raises(cv.NotWritten, match=r"No space left on device.*blocks that are done are kept, and resume=True"):
+    with pytest.raises(cv.NotWritten, match=r"No space left on device.*finished blocks stay there, and resume=True"):
         run(place)
     monkeypatch.undo()
     monkeypatch.setattr(blocks, "MOST_BODIES", 8)
