@@ -14,7 +14,7 @@ from ..errors import BadInput, Unsupported
 from ..grid import MOST_STEPS, grid_for
 from ..method import Method
 from ..methods.automatic import integrate_to_error
-from ..methods.between import Samples, grid_before, read_times, sample_between
+from ..methods.between import SampleTimes, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced
 from ..methods.search import candidates
 from ..outcome import Progress
@@ -168,7 +168,7 @@ def read_target(
     t_end: float | None,
     sample_every: int,
     at: Array | None = None,
-) -> tuple[float, Samples]:
+) -> tuple[float, SampleTimes]:
     """Return the duration, s, and the samples of a run with a target error, rad; `at` are the times of the samples, s.
 
     Raises
@@ -184,5 +184,5 @@ def read_target(
         raise BadInput("dt", describe(dt), allowed)
     end = read_end(scene, t_end)
     spacing = None if dt is None else grid_for(scene, dt, end).dt
-    samples = Samples(spacing, positive_integer("sample_every", sample_every), at)
+    samples = SampleTimes(spacing, positive_integer("sample_every", sample_every), at)
     return (end if at is None else float(at[-1]) or end), samples

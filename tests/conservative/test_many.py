@@ -21,7 +21,7 @@ from conservative.integration import blocks, shared_choice
 from conservative.integration.inputs import read_bodies
 from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
 from conservative.method import Method, Role
-from conservative.methods.between import Samples
+from conservative.methods.between import SampleTimes
 from conservative.methods.many import Block, pause
 from conservative.methods.trials import Estimate
 from conservative.trajectory import Trajectory
@@ -225,7 +225,7 @@ def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
         return Estimate(worst, 0.0), number
 
     monkeypatch.setattr(shared_choice, "find_worst", find_worst)
-    choice = shared_choice.choose_for_all(bodies, error, 2.0, Samples(None, 1))
+    choice = shared_choice.choose_for_all(bodies, error, 2.0, SampleTimes(None, 1))
     assert choice.reached
     assert choice.grid.dt < steps[0] * 5e5 ** (-1 / choice.method.order)
 
