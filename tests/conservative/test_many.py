@@ -575,7 +575,7 @@ OTHERS = {
     "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 2000001000 samples of 1000 bodies"),
     "two inertias": (
         {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
-        r"^parameters: got None; expected .* an inertia of its own",
+        r"^parameters: got None; expected .* has an inertia",
     ),
     "cannot do": ({"method": cv.Projected(), "scene": scene(), "w_WB_B0": W}, r"^method: got projected"),
 }
