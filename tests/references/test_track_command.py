@@ -1,4 +1,4 @@
-"""`conservative track` on versions of the tests' engine that behave differently, each in its environment, and on real ones."""
+"""`conservative track` on versions of the test engine that behave differently, and on MuJoCo."""
 
 import json
 import re
@@ -17,7 +17,7 @@ BEHAVIOUR = {
     "1.1": ("integrate", 4),
     "1.2": ("refuse", 4),
 }
-"""What each version does, and the stages of its integrator: the midpoint rule, the classical Runge-Kutta method."""
+"""The behaviour of each version, and the stages of its integrator: the midpoint rule, the classical Runge-Kutta method."""
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def track(index, no_environments):
     return run
 
 
-def test_what_changed_between_versions_is_found_and_left_in_files(track, tmp_path):
+def test_changes_between_versions_are_reported_and_written(track, tmp_path):
     files = ("--out", tmp_path / "page", "--junit", tmp_path / "junit.xml", "--markdown", tmp_path / "track.md")
     code, text, words = track("1.0", "1.1", "1.2", *files)
     assert code == 0
@@ -64,12 +64,12 @@ def test_what_changed_between_versions_is_found_and_left_in_files(track, tmp_pat
 
 
 @pytest.mark.slow
-def test_the_newest_releases_are_taken_and_equal_ones_change_nothing(track, index, tmp_path):
+def test_the_newest_releases_are_compared(track, index, tmp_path):
     code, text, _ = track("--last", 1, "1.0", "--json")
     assert code == 0
-    found = json.loads(text)
-    assert [each["version"] for each in found["versions"]] == ["1.0", "1.2"]
-    assert [change["sentence"].split(" from ")[1] for change in found["changes"]] == ["1.0 to 1.2 it disappeared"]
+    document = json.loads(text)
+    assert [each["version"] for each in document["versions"]] == ["1.0", "1.2"]
+    assert [change["sentence"].split(" from ")[1] for change in document["changes"]] == ["1.0 to 1.2 it disappeared"]
 
 
 def against(track, folder, behaviour, release, *more):
@@ -114,7 +114,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD)
-def test_what_cannot_be_used_is_said_before_anything_is_measured(arguments, message, track):
+def test_bad_arguments_are_reported_before_measuring(arguments, message, track):
     code, text, words = track(*arguments)
     assert code == 2
     assert message in words
@@ -133,12 +133,12 @@ KNOWN = {
     ("discrete", "3.11.0", "3.17.0"): "it appeared",
     ("RK4", "3.17.0", "4.0.0"): "the order of the attitude rose from 2 to 4",
 }
-"""What is known to have changed in MuJoCo, from scripts that call it."""
+"""Known changes of MuJoCo, from scripts that call it."""
 VERSIONS = ("3.6.0", "3.7.0", "3.8.0", "3.8.1", "3.10.0", "3.11.0", "3.17.0", "4.0.0")
 
 
 @pytest.mark.engine("mujoco==3.6.0")
-def test_an_old_mujoco_and_a_new_one_differ_in_what_is_known():
+def test_the_known_changes_between_two_versions_of_mujoco():
     settings = ("--scenes", "brick_flip", "--settings", "RK4,Euler", "--json")
     done = CliRunner().invoke(main, ["track", "mujoco", "3.6.0", "4.0.0", *settings])
     assert done.exit_code == 0
@@ -148,13 +148,13 @@ def test_an_old_mujoco_and_a_new_one_differ_in_what_is_known():
 
 
 @pytest.mark.engine("mujoco==3.7.0")
-def test_all_that_is_known_to_have_changed_in_mujoco_is_found_and_nothing_else():
+def test_exactly_the_known_changes_of_mujoco_are_found():
     done = CliRunner().invoke(main, ["track", "mujoco", *VERSIONS, "--scenes", "brick_flip", "--json"])
     assert done.exit_code == 0
-    found = json.loads(done.stdout)
-    said = {(each["setting"], each["from"], each["to"]): each["sentence"] for each in found["changes"]}
+    document = json.loads(done.stdout)
+    said = {(each["setting"], each["from"], each["to"]): each["sentence"] for each in document["changes"]}
     measured = {key for key, text in said.items() if "a step takes" not in text or "," in text}
     assert measured == set(KNOWN)
     assert all(words in said[key] for key, words in KNOWN.items())
-    orders = {row["version"]: row["rates_order"]["slope"] for row in found["rows"] if row["setting"] == "RK4"}
+    orders = {row["version"]: row["rates_order"]["slope"] for row in document["rows"] if row["setting"] == "RK4"}
     assert all(abs(order - 4) < 0.25 for order in orders.values())
