@@ -22,8 +22,8 @@ from .principal_axes import PrincipalStart
 def prepare_run(scene: Scene, grid: Grid, label: str, start: PrincipalStart, kernel: Any, model: Any, coefficients: Any) -> Run:
     """Return the run of a kernel with its model and coefficients (`conservative.kernels.protocol`).
 
-    `start` turns the samples from principal to body axes. Everything that all calls share is made here. That includes the arrays
-    q and L, because a run is not called twice at a time.
+    `start` turns the samples from principal to body axes. Everything that all calls share is made here, including the arrays q
+    and L, because a run is not called twice at a time.
     """
     n, n_steps, t = grid.n_samples, grid.n_steps, grid.t
     q, L, of_R, of_w = np.empty((n, 4)), np.empty((n, 3)), (n, 3, 3), (n, 3)
