@@ -12,6 +12,7 @@ import numpy as np
 from ..attitude import Array
 from ..card import Card
 from ..check import positive_number
+from ..deferred_imports import kernels
 from ..errors import NotConverged
 from ..grid import Grid
 from ..method import Method, Role, Run
@@ -63,10 +64,8 @@ class Convected(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from ..kernels.convected import conjugate_momentum
-
         q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
-        u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
+        u0 = np.concatenate([q0, kernels("convected").conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
         J_inverse = np.ascontiguousarray(scene.body.inverse)
         linearise = _linearise(scene, grid.dt, J_inverse)
 
@@ -86,8 +85,7 @@ class Convected(Method):
 
 def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
     """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
-    from ..kernels.convected import finite_gradient, residual_and_tangent
-
+    residual_and_tangent, finite_gradient = kernels("convected").residual_and_tangent, kernels("convected").finite_gradient
     if scene.potential is None:
         return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
     field = scene.potential.kernel_field(np.eye(3))
