@@ -25,7 +25,7 @@ from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
 from .blocks import BlockResult
-from .store import read_store, write_store
+from .store import open_store, write_store
 
 if TYPE_CHECKING:
     import altair
@@ -236,7 +236,10 @@ def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
     """
-    return Ensemble(**read_store(path, scene))
+    store = open_store(path)
+    bodies, (drifts, failures), record = store.read_bodies(scene), store.read_results(), store.record
+    grid = Grid(record["dt"], record["n_steps"], record["sample_every"])
+    return Ensemble(bodies, grid, store.arrays["R_WB"], store.arrays["w_WB_B"], drifts, record["method"], failures)
 
 
 def ensemble_of_one(bodies: Batch, grid: Grid, trajectory: Trajectory, choice: Choice | None) -> Ensemble:

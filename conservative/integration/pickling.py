@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..check import read_only
-from ..errors import require_extra
+from ..errors import require_extra, restore
 
 LOCK = threading.Lock()
 """Held by `dump`, because the list of modules that are pickled by value belongs to the whole process."""
@@ -104,11 +104,11 @@ def _reduce(value: Any) -> Any:
     if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
         return read_only, (value.copy(order="K"),)
     if isinstance(value, BaseException):  # whatever arguments its constructor takes
-        return _restore, (type(value), value.args, vars(value))
+        return restore, (type(value), value.args, vars(value))
     kind: Any = type(value)
     cached = _cached_names(kind)
     if not cached.isdisjoint(getattr(value, "__dict__", ())):
-        return _restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
+        return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
     return NotImplemented
 
 
@@ -116,11 +116,3 @@ def _reduce(value: Any) -> Any:
 def _cached_names(kind: Any) -> frozenset[str]:
     """Return the names of the cached properties of a class."""
     return frozenset(name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property))
-
-
-def _restore(kind: type, args: tuple[Any, ...], state: dict[str, Any]) -> Any:
-    value: Any = kind.__new__(kind, *args)
-    if isinstance(value, BaseException):
-        value.args = args
-    vars(value).update(state)
-    return value

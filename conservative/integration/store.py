@@ -133,11 +133,39 @@ class Store:
         except OSError as error:
             raise NotWritten("path", self.place, error, _ROOM) from None
 
-    def read_failures(self) -> dict[int, IntegrationFailed]:
-        """Return the failures by the numbers of the bodies."""
-        failed = np.flatnonzero(self.arrays["outcome"][:] != _KINDS.index(OutcomeKind.OK)).tolist()
-        texts = self.arrays["failure"][:] if failed else ()
-        return {i: _restore_failure(texts[i]) for i in failed}
+    def read_results(self) -> tuple[dict[str, Array], dict[int, IntegrationFailed]]:
+        """Return the drifts (n,) by name, and the failures by the numbers of the bodies.
+
+        Raises
+        ------
+        BadInput
+            A block is damaged.
+        """
+        try:
+            drifts, kinds = self.arrays["drifts"][:], self.arrays["outcome"][:]
+            failed = np.flatnonzero(kinds != _KINDS.index(OutcomeKind.OK)).tolist()
+            texts = self.arrays["failure"][:] if failed else ()
+        except ValueError as error:  # a checksum
+            raise BadInput("path", f"{str(self.place)!r}, an ensemble that is damaged ({error})", _WHOLE) from None
+        names = self.arrays["drifts"].attrs["names"]
+        return dict(zip(names, drifts.T, strict=True)), {i: _restore_failure(texts[i]) for i in failed}
+
+    def read_bodies(self, scene: Scene | None) -> Batch:
+        """Return the bodies. Their initial states and parameters stay on the disk. See `open_ensemble` for the scene.
+
+        Raises
+        ------
+        BadInput
+            The scene is missing, or another one.
+        """
+        inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
+        for name in self.record["digests"]:
+            group, _, own = name.partition("/")
+            inputs[group][own] = _OnDisk(self.arrays[name])
+        scene, start, n = find_scene(self.record["scene"], scene), inputs["start"], self.record["bodies"]
+        R_WB0 = start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
+        w_WB_B0 = start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
+        return Batch(scene, R_WB0, w_WB_B0, start.get("inertia"), inputs["parameters"])
 
 
 def _record_failure(failure: IntegrationFailed) -> str:
@@ -329,18 +357,8 @@ def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
         raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", allowed) from None
 
 
-def read_store(path: str | Path, scene: Scene | None = None) -> dict[str, Any]:
-    """Return the fields of the `Ensemble` in a folder. Samples, initial states and parameters stay on the disk.
-
-    The scene is needed only if it contains functions.
-
-    Raises
-    ------
-    BadInput
-        The folder contains no ensemble, or blocks are missing or damaged; or the scene is missing, or another one.
-    MissingExtra
-        Zarr, of the extra `ensembles`, is not installed.
-    """
+def open_store(path: str | Path) -> Store:
+    """Return a complete store for reading. Raise `BadInput` or `MissingExtra` as `open_ensemble` does."""
     require_extra("open_ensemble", "ensembles")
     place = Path(path).absolute()
     record = read_record(place, "the folder of an ensemble that integrate_many has written")
@@ -349,30 +367,7 @@ def read_store(path: str | Path, scene: Scene | None = None) -> dict[str, Any]:
     if left > 0:
         got = f"{str(place)!r}, an ensemble of {n} bodies of which {left} were not integrated, or are missing or damaged"
         raise BadInput("path", got, _WHOLE)
-    try:
-        drifts, failures = store.arrays["drifts"][:], store.read_failures()
-    except ValueError as error:  # a checksum
-        raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", _WHOLE) from None
-    inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
-    for name in record["digests"]:
-        group, _, own = name.partition("/")
-        inputs[group][own] = _OnDisk(store.arrays[name])
-    scene, start = find_scene(record["scene"], scene), inputs["start"]
-    return {
-        "bodies": Batch(
-            scene,
-            start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3))),
-            start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3))),
-            start.get("inertia"),
-            inputs["parameters"],
-        ),
-        "grid": Grid(record["dt"], record["n_steps"], record["sample_every"]),
-        "R_WB": store.arrays["R_WB"],
-        "w_WB_B": store.arrays["w_WB_B"],
-        "drifts": dict(zip(store.arrays["drifts"].attrs["names"], drifts.T, strict=True)),
-        "label": record["method"],
-        "failures": failures,
-    }
+    return store
 
 
 class _OnDisk:
