@@ -12,8 +12,8 @@ from conservative.errors import require_extra
 from . import completion
 from .options import (
     FilePath,
+    Output,
     OutputCommand,
-    OutputFile,
     allow_build_option,
     epilog,
     find_links_option,
@@ -70,10 +70,10 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
 )
 @find_links_option
 @allow_build_option
-@click.option("--junit", type=OutputFile('name="conservative gate"'), help="With --against: write a JUnit report.")
-@click.option("--markdown", type=OutputFile("**gate: "), help="With --against: write verdict and table as Markdown.")
+@click.option("--junit", type=Output('name="conservative gate"'), help="With --against: write a JUnit report.")
+@click.option("--markdown", type=Output("**gate: "), help="With --against: write verdict and table as Markdown.")
 @click.option(
-    "--html", type=OutputFile("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
+    "--html", type=Output("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print violations and notes, or the new entry of the history, as JSON.")
 @click.pass_context

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from conservative import BadInput
 from conservative.errors import NotWritten
 from conservative.reports.cli.main import main
-from conservative.reports.cli.options import OutputCommand, OutputFile, OutputFolder, require_replaceable
+from conservative.reports.cli.options import Output, OutputCommand, require_replaceable
 from conservative.reports.terminal.report_folder import MANIFEST, recover, report_folder
 
 
@@ -231,8 +231,8 @@ def test_a_dash_is_not_the_name_of_a_file(tmp_path, monkeypatch):
 
 def test_two_options_cannot_write_one_file(tmp_path):
     @click.command(cls=OutputCommand)
-    @click.option("--one", type=OutputFile("1"))
-    @click.option("--two", type=OutputFolder({"a": "2"}))
+    @click.option("--one", type=Output("1"))
+    @click.option("--two", type=Output({"a": "2"}))
     def both(one, two):
         """Write both."""
 

@@ -140,7 +140,7 @@ def test_a_file_of_somebody_else_is_not_replaced_and_its_own_are_recognized(tmp_
         assert (done.exit_code, "--force" in done.stderr, mine.read_text()) == (2, True, "mine")
         command = main.commands["track"]
         kind = next(each.type for each in command.params if option in each.opts)
-        assert kind.marks(tmp_path if option == "--out" else mine)[mine] in text[:HEAD]
+        assert kind.marks[name if option == "--out" else ""] in text[:HEAD]
         mine.unlink()
 
 
