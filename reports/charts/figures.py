@@ -161,7 +161,7 @@ def engines(points: pd.DataFrame, scene: str) -> Any:
 
 
 def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
-    """Return the cheapest engine's time over ours against the error, a panel for each field: mean, worst and best body."""
+    """Return the fastest engine's time divided by ours against the error, a panel for each field: mean, worst and best body."""
     lowest, highest = float(points["worst"].min()), float(points["best"].max())
     low, high = min(lowest, 0.9) / 1.1, max(highest, 1.1) * 1.1
     y: dict[str, Any] = {
@@ -180,7 +180,7 @@ def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
         mark = base.mark_line(color=blue, strokeWidth=2, point=alt.OverlayMarkDef(color=blue, size=40))
         panels.append(band + even.encode(y=alt.Y("even:Q", **y)) + mark.encode(y=alt.Y("mean:Q", **y), tooltip=shown))
     title = alt.Title(
-        f"Random bodies: the cheapest engine's time over ours ({bodies} in each field, seed {seed})",
+        f"Random bodies: the fastest engine's time divided by ours ({bodies} in each field, seed {seed})",
         subtitle="line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster",
     )
     return apply_style(alt.concat(*panels, columns=2, title=title))

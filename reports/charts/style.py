@@ -1,6 +1,6 @@
 """One look for every picture: colours by family, marks by setting, sizes, and a number format.
 
-The colours are those of Okabe and Ito (2008), then of Tol's muted scheme, which colour-blind readers can distinguish. Marks and
+The colours are from Okabe and Ito (2008), then from Tol's muted scheme; colour-blind readers can distinguish them. Marks and
 dashes distinguish settings.
 """
 
@@ -80,7 +80,7 @@ def _by_value(name: str) -> list[tuple[float, str]]:
 
 
 def colours(families: Families) -> dict[str, str]:
-    """Return a colour for each line: that of its family, the same in every picture."""
+    """Return the colour of each line: the colour of its family, which is the same in every picture."""
     named = family_colours()
     strangers = sorted(set(families.values()) - named.keys())
     known = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
@@ -88,7 +88,7 @@ def colours(families: Families) -> dict[str, str]:
 
 
 def number_in_family(families: Families) -> dict[str, int]:
-    """Return the number of each line among those of its family, from 0."""
+    """Return the number of each line within its family, from 0."""
     counts: dict[str, int] = {}
     numbers = {}
     for name, family in families.items():
@@ -112,7 +112,7 @@ def look(families: Families, second: str, **legend: Any) -> dict[str, Any]:
 
 
 _POWER = "datum.value >= 0.01 && datum.value < 1e6 ? format(datum.value, ',~r') : format(datum.value, '~e')"
-"""How Vega writes a number of an axis: as people do."""
+"""Vega expression for the numbers of an axis: plain, or with an exponent if very small or large."""
 
 
 def power_axis(title: str, low: float, high: float) -> alt.Axis:

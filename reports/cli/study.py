@@ -97,8 +97,7 @@ def study(
             split_list("sizes", sizes),
             **numbers,
         )
-        source = provenance()
-        made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
+        made = provenance().facts
         announce(f"study {name.replace('_', ' ')}")
         with progress() as step:
             measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)

@@ -108,7 +108,7 @@ def sweep(
     from ..terminal.progress import progress
 
     if picture is not None and picture == out:
-        raise BadInput("picture", repr(str(picture)), "another name than that of the folder --out")
+        raise BadInput("picture", repr(str(picture)), "another name than --out")
     varied = work.read_spread(split_list("spread", spread))
     with ExitStack() as stack:
         # first, as a place that cannot be written is an error before any work

@@ -87,14 +87,14 @@ def _answer(
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
 
-    from ..run.provenance import describe_origin
+    from ..run.provenance import provenance
     from ..sections.track import build
     from ..terminal.progress import progress
 
     def tell(what: str) -> None:
         click.echo(what, err=True)
 
-    made = describe_origin()
+    made = provenance().facts
     source, against = Source(options["find_links"], options["allow_build"]), options["against"]
     last = options["last"] or (1 if against is not None and not versions else 0)
     newest = newest_releases(engine, last, source) if last else ()

@@ -128,7 +128,7 @@ def find_unfinished(out: Path) -> Path | None:
             if stream.read(len(_BEGINNING)) != _BEGINNING.encode():
                 raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file next to it")
     except OSError as error:
-        raise BadInput("out", f"{str(path)!r} ({error.strerror})", "a file that can be read, or none of this name") from None
+        raise BadInput("out", f"{str(path)!r} ({error.strerror})", "a readable file, or no file of this name") from None
     return path
 
 

@@ -37,7 +37,7 @@ MOMENTA = ("momentum", "vertical momentum")
 AT_ITS_BEST = "at its best"
 ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 FAR_FROM_ORDER = 0.5
-"""How far an order may be below the expected one without a mark."""
+"""Largest difference of an order below the expected one that is not marked."""
 
 COLUMNS = (
     (

@@ -140,10 +140,10 @@ def classes_table(
                 _conserved_text(drifts[drifts["family"].isin(families)]) if len(drifts) else "not measured",
                 affordable,
                 *(
-                    Cell(microseconds(geometric_mean(found["time"])), note=found["name"].mode().iloc[0])
-                    if len(found) >= max(1, MOST * bodies)
+                    Cell(microseconds(geometric_mean(lines["time"])), note=lines["name"].mode().iloc[0])
+                    if len(lines) >= max(1, MOST * bodies)
                     else DASH
-                    for found in at_errors.values()
+                    for lines in at_errors.values()
                 ),
                 *sample,
                 "; ".join(filter(None, [*misses, failures.get(kind, "")])) or "nowhere here",

@@ -107,12 +107,12 @@ def test_another_sweep_is_not_resumed(answered, change):
 def test_an_interrupted_sweep_says_what_is_kept_and_resume_does_the_rest(answered, tmp_path, monkeypatch):
     _, folder = answered
 
-    def stop(sweep, progress):
+    def stop(rate):
         raise KeyboardInterrupt
 
     out = tmp_path / "sweep.zarr"
     with monkeypatch.context() as context:
-        context.setattr(work, "_progress_text", stop)
+        context.setattr(work, "rate_text", stop)
         done = conservative(*COMMON, "--out", out, "--threads", "1")
     assert done.exit_code == 130
     kept = rf"(1,024|476) of 1,500 bodies are finished in {re.escape(str(out))}; the same command with --resume does the rest"

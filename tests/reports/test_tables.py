@@ -178,10 +178,10 @@ def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds()
         "setting": "dt = 0.25 s",
         "µs per simulated s": "4",
         "error to expect, rad": "2.0e-05",
-        "drift to expect": "kept",
+        "drift to expect": "conserved",
     }
     shown = dict(zip(failing.header, failing.rows[0], strict=True))
-    assert (shown["µs per simulated s"], shown["keeps the error for"], shown["to expect, rad"]) == ("4", "7 s", "2.0e-05")
+    assert (shown["µs per simulated s"], shown["reaches the error for"], shown["to expect, rad"]) == ("4", "7 s", "2.0e-05")
     assert dict(zip(probes.header, probes.rows[0], strict=True))["run, s"] == "3"
 
 
