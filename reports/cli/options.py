@@ -106,11 +106,12 @@ def require_replaceable(file: Path, mark: str, option: str, force: bool = False,
             return
     except OSError:  # such as a name that is too long: writing the file reports it
         return
+    head, shared = "", False
     for other in inputs:
-        with suppress(OSError, ValueError):
-            if file.samefile(other):
-                raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
-    head = ""
+        with suppress(OSError, ValueError):  # a word that is not the name of a file
+            shared = shared or file.samefile(other)
+    if shared:
+        raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
     with suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
         head = stream.read(HEAD)
     if not force and mark not in head:

@@ -9,8 +9,6 @@ from conservative.benchmarks.contest import cheapest, costs
 from conservative.benchmarks.studies import studies
 from conservative.benchmarks.studies.engines_over_steps import WORSE
 from conservative.outcome import Outcome, OutcomeKind
-from conservative.reports.cli.completion import engine_lists
-from conservative.reports.cli.options import split_list
 from conservative.reports.document.model import Grade
 from conservative.reports.rows.names import OF_ENGINES, of_classes
 from conservative.reports.rows.points import all_points, points
@@ -80,7 +78,7 @@ def test_an_order_that_is_lower_than_expected_is_marked(settings):
     assert settings[WRONG]["order (expected)"].grade is Grade.BAD
 
 
-def test_an_engine_that_gets_worse_has_no_order_and_says_so(settings):
+def test_an_engine_that_gets_worse_has_no_order(settings):
     assert str(settings[SINGLE]["order (expected)"]) == f"– none (4): {WORSE}"
     assert str(settings[SINGLE]["bits"]) == "32"
 
@@ -90,14 +88,14 @@ def test_turns_over_and_the_direction_of_energy_are_shown(settings):
     assert (str(settings[GOOD]["energy drift"]), str(settings[POOR]["energy drift"])) == ("✓ 1.0e-12", "✗ 0.22 gained")
 
 
-def test_a_crash_is_a_marked_row_and_what_is_not_supported_one_for_each_engine(settings):
+def test_a_crash_is_a_marked_row_and_unsupported_settings_share_one(settings):
     assert str(settings["d==4/x"]["run"]) == "✗ crashed: signal 11 (SIGSEGV)"
     assert settings["d==4/x"]["run"].grade is Grade.BAD
     assert str(settings["e==5, 2 settings"]["run"]) == "– unsupported: its adapter has free bodies"
     assert list(settings)[-1] == "e==5, 2 settings"
 
 
-def test_an_engine_as_installed_stands_beside_its_best(rows):
+def test_an_engine_as_installed_is_compared_with_its_best(rows):
     table = side_by_side(list(rows.values()), SCENE)
     found = {row[0]: dict(zip(table.header, map(str, row), strict=True)) for row in table.rows}
     assert list(found) == ["a==1", "b==2", "c==3"]
@@ -134,19 +132,6 @@ def test_unfinished_work_with_other_engines_is_not_gone_on_with():
     source = provenance([])
     assert not list(differences(terms(first, source), terms(first, source)))
     assert any(text.startswith("engines: pinocchio") for text in differences(terms(first, source), terms(second, source)))
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [("", ["all", "mujoco"]), ("al", ["all"]), ("exudyn,muj", ["exudyn,mujoco"]), ("mujoco,exu", ["mujoco,exudyn"])],
-)
-def test_completion_of_engines_goes_on_after_a_comma(text, found):
-    assert set(found) <= {item.value for item in engine_lists(None, None, text)}
-    assert not engine_lists(None, None, "reduc")
-
-
-def test_versions_are_no_settings_of_the_name_before_them():
-    assert split_list("engines", ("all, exudyn,mujoco==3.6.0",)) == ["all", "exudyn", "mujoco==3.6.0"]
 
 
 def test_the_verdict_counts_engines_that_only_their_own_studies_measured():

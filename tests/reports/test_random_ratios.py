@@ -111,7 +111,7 @@ def test_an_engine_that_takes_no_field_of_this_kind_has_no_row():
     assert {each.engine for each in found(*TWICE, missing)} == {ANY, "heyoka"}
 
 
-def test_without_an_engine_there_is_nothing_to_say():
+def test_without_an_engine_there_are_no_ratios():
     assert found(TWICE[0]) == ()
     assert random_bodies.sentence(()) == "On no random body do our integrators and an engine both reach 1e-6 rad."
 

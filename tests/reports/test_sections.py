@@ -192,7 +192,7 @@ def test_curves_that_are_missing_are_named(planned, table):
     assert not any(isinstance(each, Figure) and each.name == "sphere_lagrange_top" for each in document.figures)
 
 
-def test_names_of_scenes_cannot_become_markup_and_nothing_measured_is_said():
+def test_names_of_scenes_cannot_become_markup_and_empty_figures_are_stated():
     scene = Scene("<b>", scenes.brick_flip().body, np.eye(3), (0.1, 0.2, 3.0), 1.0, dt=0.1, source="<i>")
     page = html.render(build(Plan((scene,), (Reduced(),), (), quick=True), measurements(), provenance([])))
     assert "<i>" not in page

@@ -58,7 +58,7 @@ def test_a_method_for_integrable_motions_is_no_general_integrator(method, role, 
         *(("asymmetric_top", False), ("turned_top", False), ("random_body", False), ("stable_satellite", False)),
     ],
 )
-def test_a_scene_says_whether_it_is_integrable(name, integrable):
+def test_scenes_are_integrable_or_not(name, integrable):
     assert registry.scene(name).integrable is integrable
 
 
@@ -76,7 +76,7 @@ def test_a_sentence_compares_general_integrators_and_tells_of_a_solution_apart()
     assert slow.endswith("scipy is 1.3 times as fast as lame, which solves integrable motions only.")
 
 
-def test_what_is_lost_is_said_of_the_engine():
+def test_a_faster_engine_is_the_subject_of_the_sentence():
     slow = [*point("gauss", "ours", 1e-3, 2e-5), *point("gauss", "ours", 1e-7, 4e-5, 0.01)]
     sentence = told(slow, SOLVER, integrable=False).sentence
     assert sentence.startswith(
@@ -89,7 +89,7 @@ def test_a_side_that_does_not_get_there_has_no_ratio(lines, words):
     assert words in told(*lines).sentence
 
 
-def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
+def test_a_class_has_its_times_and_its_error_at_equal_cost():
     found = told(OURS, SOLVER, SOLUTION, ENGINE)
     assert [str(line[0]).partition(" (")[0] for line in found.classes.rows] == [kind.value for kind in MethodClass]
     ours = cells(found, MethodClass.GENERAL)
@@ -101,7 +101,7 @@ def test_a_class_has_what_it_needs_and_what_it_gets_at_equal_cost():
     assert cells(told(OURS), MethodClass.ENGINE)["where it fails"] == "does not support these motions, or was not measured"
 
 
-def test_the_cheapest_line_stands_for_its_class_whatever_the_order():
+def test_the_fastest_line_stands_for_its_class_in_any_order():
     faster = point("taylor", "ours", 1e-8, 1e-6)
     for lines in ((OURS, faster, SOLVER), (faster, OURS, SOLVER)):
         assert cells(told(*lines), MethodClass.GENERAL)["µs at 1e-6 rad"] == "1.0 (taylor)"
@@ -115,7 +115,7 @@ def test_a_class_fails_where_a_setting_does_and_not_where_one_of_its_forms_is_fo
     assert ours["where it fails"] == "diverged at some settings: gauss, taylor"
 
 
-def test_a_class_keeps_what_its_best_setting_keeps():
+def test_a_class_conserves_the_invariants_of_its_best_setting():
     found = [row("long_runs", f"gauss:{k}", "energy drift max", drift) for k, drift in enumerate((1e-3, 1e-15))]
     found += [
         row("long_runs", "gauss", f"{name} drift max", drift) for name, drift in (("momentum", 1e-6), ("a momentum", 1e-15))
@@ -125,7 +125,7 @@ def test_a_class_keeps_what_its_best_setting_keeps():
     assert cells(told(OURS), MethodClass.GENERAL)["conserves"] == "not measured"
 
 
-def test_the_best_of_a_family_is_what_nothing_of_its_own_beats():
+def test_the_best_of_a_family_is_its_front():
     bad = point("gauss:stages=2", "ours", 1e-2, 9e-6)
     picture = told(OURS, bad, SOLVER).points
     best = picture[~picture["single"].astype(bool)]
@@ -166,7 +166,7 @@ def test_random_bodies_have_points_where_most_of_them_get_there():
     assert math.isclose(ours["time"].iloc[0], 1.0)
 
 
-def test_what_lies_exactly_under_another_line_is_said():
+def test_hidden_lines_are_named():
     one, other = (pd.DataFrame({"x": [1.0, 2.0], "y": [y, 4.0]}) for y in (1e-16, 1.1e-16))
     lines = [("a", one), ("b", one), ("c", other), ("d", one)]  # drawn in this order, the last on top
     assert list(families.under(lines, "x", "y")) == ["Exactly under d: a, b."]

@@ -109,7 +109,7 @@ def order_table(found):
     return scenes.order(*fits, "made_up")
 
 
-def test_order_is_fitted_and_its_window_told():
+def test_order_is_fitted_in_a_window():
     found = [
         row("convergence", measure, 3 * dt**2, dt=dt)
         for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX)
@@ -125,7 +125,7 @@ def test_too_few_points_give_the_reason_and_no_order():
     assert "2 runs" in cells[3]
 
 
-def test_failures_and_what_is_unsupported_are_told_apart():
+def test_failures_and_unsupported_runs_have_separate_tables():
     nan = math.nan
     found = [
         row("paper", "energy drift max", nan, outcome=DIVERGED),
@@ -143,7 +143,7 @@ def test_failures_and_what_is_unsupported_are_told_apart():
     ]
 
 
-def test_what_a_method_cannot_do_is_told_once_with_its_first_reason():
+def test_an_unsupported_method_has_one_row_with_its_first_reason():
     found = [
         row("paper", "energy drift max", math.nan, method=method, outcome=cannot(reason))
         for method, reason in (("a", "2 > 1"), ("a", "3 > 1"), ("b", "for free bodies"), ("c", "for free bodies"))
@@ -185,7 +185,7 @@ def test_a_recommendation_is_in_microseconds_and_tells_how_long_an_error_holds()
     assert dict(zip(probes.header, probes.rows[0], strict=True))["run, s"] == "3"
 
 
-def test_truths_are_told_with_their_agreement():
+def test_reference_solutions_have_their_agreement():
     found = [rows.row("paper", "exact", Measure.AGREEMENT, 2.5e-15, 0.01, role="truth", label="exact and heyoka")]
     table = failures.truths(frame(found))
     assert table.header[1:] == ["dt, s", "reference solutions", "largest angle between them, rad"]
@@ -209,7 +209,7 @@ def test_the_largest_drift_is_shown_and_not_the_last(bumped):
     assert (summary["last"]["t"], summary["last"]["energy"]) == (bumped.t[-1], bumped.energy[-1])
 
 
-def test_methods_are_ranked_by_what_they_keep():
+def test_methods_are_ranked_by_their_drift():
     """Ours and the engines' are among each other: who drifts least comes first, who fails last."""
     found = [
         made_up.row("long_runs", "b", "energy drift max", math.nan, outcome=Diverged(0.36, "why").outcome),

@@ -96,7 +96,7 @@ def test_the_table_has_every_line_and_at_how_many_bodies():
     }
 
 
-def test_what_did_not_run_has_its_reason():
+def test_a_method_that_did_not_run_has_its_reason():
     failed = row(
         "throughput", "mjx", "attitude error max", float("nan"), outcome="unsupported", role="engine", scene="heavy_tops"
     )

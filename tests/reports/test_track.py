@@ -47,7 +47,7 @@ def test_a_lost_order_fails_a_build_and_a_gain_does_not():
     assert not build(history(GOOD, BAD)).failures  # a history is no build to judge
 
 
-def test_only_what_the_last_version_lost_counts():
+def test_only_losses_of_the_last_version_count():
     assert not build(history(GOOD, BAD, BAD), gated=True).failures
 
 
@@ -78,7 +78,7 @@ def test_junit_has_a_case_for_each_setting_and_a_failure_for_a_loss():
     assert passed.find(".//system-out").text == NOTHING_CHANGED
 
 
-def test_junit_takes_what_an_engine_may_say():
+def test_junit_accepts_any_message_of_an_engine():
     failed = replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "\x00<&>\x1b[31m"))
     text = text_of(build(history(GOOD, failed), gated=True), "junit")
     assert "?<&>?[31m" in ElementTree.fromstring(text).find(".//failure").get("message")
@@ -108,13 +108,13 @@ def test_json_has_every_figure_and_change():
     assert {"aspect": "drift", "quantity": "energy", "lost": True} in change["changes"]
 
 
-def test_what_was_not_measured_is_null_in_json():
+def test_missing_measurements_are_null_in_json():
     row = json.loads(text_of(build(history(GOOD, FAILED)), "json"))["rows"][1]
     assert row["attitude_error_rad"]["value"] is None
     assert row["time_ratio"] is None
 
 
-def test_the_page_stands_alone_and_says_what_the_markdown_says():
+def test_the_page_needs_no_network_and_has_the_changes():
     failed = replace(GOOD, outcome=Outcome(OutcomeKind.CRASHED, "<script>alert(1)</script>"))
     answer = build(history(BAD, GOOD, failed), gated=True)
     page = text_of(answer, "html")
@@ -159,6 +159,6 @@ def test_a_file_of_somebody_else_is_not_replaced_and_its_own_are_recognized(tmp_
         ),
     ],
 )
-def test_a_change_is_said(was, now, words):
+def test_a_change_is_one_line(was, now, words):
     (sentence,) = sentences(build(history(replace(GOOD, **was), replace(GOOD, **now))))
     assert words in sentence

@@ -51,7 +51,7 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
     ]
 
 
-def test_nothing_is_claimed_below_what_the_truth_is_known_to():
+def test_errors_below_the_resolution_of_the_reference_are_raised_to_it():
     def agreement(detail):
         return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
 
@@ -88,7 +88,7 @@ def test_lines_that_differ_in_tolerance_alone_are_one():
     assert found["series"].unique().tolist() == ["heyoka"]
 
 
-def test_front_is_what_nothing_beats():
+def test_front_has_the_points_that_no_other_beats():
     groups = (*OURS, *ENGINE, point("bad", "engine", 1e-3, 9.0))
     front = work_precision.front(points(table(*groups)))
     assert front["error"].tolist() == [1e-2, 1e-3, 1e-4, 1e-8]
