@@ -80,8 +80,8 @@ def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     from ..terminal.progress import progress
     from ..terminal.report_folder import MANIFEST
 
-    names = {name: split_names(name, options.pop(name)) for name in ("scenes", "methods")}
-    plan = plan_report(**names, engines=split_list("engines", options.pop("engines")), **options)
+    scenes, methods = (split_names(name, options.pop(name)) for name in ("scenes", "methods"))
+    plan = plan_report(scenes, methods, split_list("engines", options.pop("engines")), **options)
     if not resume and (unfinished := find_unfinished(out)):
         click.echo(f"{unfinished}: replacing an unfinished report. With --resume its studies are not measured again.", err=True)
     with progress() as step:

@@ -81,5 +81,5 @@ def _variants(name: str) -> Iterator[dict[str, Any]]:
             yield {**about, "conserves": sorted(method.conserves), "available": not reason, "reason": reason}
     except (MissingEngine, BadInput) as missing:
         # An engine that is not installed, or a registered package that is damaged: shown, never an error of the list.
-        about = {"name": name, "role": "", "label": "", "order": None, "conserves": []}
-        yield {**about, "available": False, "reason": str(missing)}
+        about = {"name": name, "role": "", "label": "", "order": None}
+        yield {**about, "conserves": [], "available": False, "reason": str(missing)}
