@@ -67,7 +67,7 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
     scene, potential, w = bodies.scene, bodies.scene.potential, bodies.w_WB_B0
     largest = (scene.body.moments[None] if bodies.inertia is None else bodies.principal[0]).max(axis=1)
     L_B = momenta_of(bodies)
-    kinetic = np.sum(L_B * w, axis=1) / 2
+    kinetic = np.einsum("ni,ni->n", L_B, w) / 2
     scale = kinetic + field_scales(bodies)
     scale[scale == 0] = 1.0
     largest_momentum = np.sqrt(2 * largest) * np.sqrt(scale)
@@ -81,8 +81,9 @@ def find_reference(bodies: Batch, conserved: frozenset[str] = frozenset()) -> Re
     rows[:, 3:6] = find_axes(bodies) / momentum[:, None, None]
     L_W = np.einsum("nij,nj->ni", bodies.R_WB0, L_B)
     rows[:, 6] = np.einsum("nij,nj->ni", rows[:, 3:6], L_W)
-    rows[:, 7] = np.nan_to_num(find_axial(bodies)) / momentum[:, None]
-    rows[:, 8, 2] = np.sum(rows[:, 7] * L_B, axis=1)
+    if scene.symmetry_axis_B is not None:
+        rows[:, 7] = np.nan_to_num(find_axial(bodies)) / momentum[:, None]
+        rows[:, 8, 2] = np.einsum("ni,ni->n", rows[:, 7], L_B)
     own = [each for each in scene.invariants if each not in scene.extra_invariants]
     if any(each.unit == "J" for each in own):
         V = field_energies(bodies, np.zeros(1), bodies.R_WB0[:, None], w[:, None])

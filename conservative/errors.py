@@ -6,27 +6,30 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self, TypeVar
 
 from .outcome import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+T = TypeVar("T")
+
 
 class _Error(Exception):
     """An exception that can be pickled, whatever arguments its `__init__` takes."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _restore, (type(self), self.args, self.__dict__)
+        return restore, (type(self), self.args, vars(self))
 
 
-def _restore(kind: type[_Error], args: tuple[object, ...], values: dict[str, object]) -> _Error:
-    """Return a pickled error without calling its `__init__`, whose arguments are not those in `args`."""
-    error = kind.__new__(kind, *args)
-    error.args = args
-    error.__dict__.update(values)
-    return error
+def restore(kind: type[T], args: tuple[object, ...], values: Mapping[str, object]) -> T:
+    """Return a pickled exception or object without calling its `__init__`."""
+    value = kind.__new__(kind, *args)
+    if isinstance(value, BaseException):
+        value.args = args
+    vars(value).update(values)
+    return value
 
 
 class BadInput(_Error, ValueError):

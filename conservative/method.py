@@ -53,6 +53,9 @@ class Method(ABC):
         __dataclass_fields__: ClassVar[dict[str, Any]]  # subclasses are dataclasses
 
     def __init_subclass__(cls) -> None:
+        for name in ("colour", "variants", "suite", "rank", "candidates"):
+            if name in vars(cls):  # entries of the card were class attributes once
+                raise TypeError(f"{cls.__name__}.{name} has no effect. Write: card = Card({name}=...)")
         if "unsupported" in vars(cls):
             cls.unsupported = _refuse_time(cls.unsupported)  # type: ignore[method-assign]
 

@@ -161,7 +161,7 @@ def find_mistake(result: Any, scene: Scene, grid: Grid) -> str | None:
     for name, values, shape in (("t", result.t, (n,)), ("R_WB", result.R_WB, (n, 3, 3)), ("w_WB_B", result.w_WB_B, (n, 3))):
         if not isinstance(values, np.ndarray):
             return f"{name} as a {type(values).__name__}"
-        if values.dtype != _FLOAT or values.shape != shape:
+        if values.shape != shape or values.dtype != _FLOAT:
             return f"{name} of shape {values.shape} and type {values.dtype} instead of {shape} and float64"
     return None
 

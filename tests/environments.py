@@ -68,8 +68,8 @@ class Environment:
     folder: Path
 
     @classmethod
-    def create(cls, folder, wheel=None):
-        """Make an environment with the packages of this one, and perhaps a wheel."""
+    def create(cls, folder, *wheels):
+        """Make an environment with the packages of this one, and wheels."""
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=120)
         environment = cls(folder)
         links = folder / "packages"
@@ -83,10 +83,10 @@ class Environment:
         script = folder / "bin" / "pytest"
         script.write_text(f"#!{environment.python}\n{PYTEST}")
         script.chmod(0o755)
-        if wheel:
+        if wheels:
             pip = [sys.executable, "-m", "pip", "--python", environment.python]
             options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--no-index"]
-            subprocess.run([*pip, "install", *options, wheel], env=variables(), check=True, timeout=120)
+            subprocess.run([*pip, "install", *options, *wheels], env=variables(), check=True, timeout=120)
         return environment
 
     @property

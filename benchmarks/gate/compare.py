@@ -120,7 +120,7 @@ def _write_value(value: float | None) -> str:
 
 
 def _improvements(baseline: Baseline, results: Results) -> Iterator[str]:
-    """Yield values that improved by more than they may get worse: a change to understand, and to accept."""
+    """Yield values that improved by more than they may get worse. Such a change should be understood and accepted."""
     for id, was in baseline.rows.items():
         row: Row | None = results.rows.get(id)
         if row is None or row.definition != was.definition:

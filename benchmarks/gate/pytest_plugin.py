@@ -131,7 +131,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line("--benchmark: timing is off under -n, since workers disturb each other; use -n0 for times")
     measured = config.stash.get(MEASURED, [])
     if measured:
-        terminalreporter.section("accuracy beside time")
+        terminalreporter.section("accuracy and time")
         for group in dict.fromkeys(row["group"] for row in measured):
             for line in (*table_lines([row for row in measured if row["group"] == group]), ""):
                 terminalreporter.write_line(line)

@@ -38,19 +38,6 @@ class Timing:
         return f"{self.rounds} rounds x {self.calls} calls"
 
 
-@contextmanager
-def without_collector() -> Iterator[None]:
-    """Collect garbage now, and not during the block."""
-    enabled = gc.isenabled()
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
 def wall_time(run: Callable[[], Any], calls: int = 1) -> float:
     """Return the wall time of `calls` calls, s. A run in another process measures its own time."""
     own: Callable[[int], float] | None = getattr(run, "wall_time", None)
@@ -102,10 +89,16 @@ def time_interleaved(
     positive_number("min_time", min_time, "a finite duration above 0, s")
     timed = {name: _TimedRun(run, min_time, budget) for name, run in runs.items()}
     shuffled = random.Random(seed)
-    with without_collector():
+    collects = gc.isenabled()
+    gc.collect()
+    gc.disable()  # a collection would add its time to a sample
+    try:
         for _ in range(rounds):
             for name in shuffled.sample(list(runs), len(runs)):
                 timed[name].take_sample()
+    finally:
+        if collects:
+            gc.enable()
     return {name: each.timing() for name, each in timed.items()}
 
 

@@ -67,7 +67,7 @@ class ErrorLaw:
     excess
         Factor by which the motion itself amplifies errors beyond that, between the length and the duration.
     carried
-        Text on the coarser setting whose law this is, scaled to a finer one; "" for the law of the run itself.
+        Text on the coarser setting from which this law was scaled; "" for a law of the run itself.
     """
 
     length: float

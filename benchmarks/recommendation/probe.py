@@ -265,8 +265,8 @@ class Conditions(Question):
     def _carry_over(self, method: Method, dt: float, length: float, before: Sequence[Probe]) -> ErrorLaw | None:
         """Return the law of the coarser setting that ran longest, scaled to a finer one by the order of the method.
 
-        A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. None
-        if the finer run is about as long itself.
+        A run of a few turns at a short step shows round-off and the first oscillation, not the law by which errors grow. The
+        result is None if the finer run is about as long as the coarser one.
         """
         whole = [probe for probe in before if self.shows_growth(probe)]
         name = tolerance_setting(method)

@@ -45,7 +45,7 @@ RUN_TIME = 0.005
 """Target duration of a timed run, s."""
 ROUNDS, TIMING_BUDGET = 7, 0.25
 COARSER_START = 4
-"""First step of ours, in units of that of the automatic choice, so that an order can be observed."""
+"""First step of our methods, in units of the automatically chosen step, so that an order can be observed."""
 LOOSEST = 1e-3
 """Largest first tolerance of adaptive methods."""
 SMALLEST_CUT, DEFAULT_CUT = 1 / 16, 1 / 8

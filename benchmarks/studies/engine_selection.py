@@ -74,11 +74,11 @@ def _settings(name: str, skip_missing: bool) -> tuple[Method, ...]:
 
 def _family(engine: str, version: str) -> type[Method]:
     """Return the class of an engine: in an environment if there is a version, otherwise in this environment."""
-    beside_us = {name for name, family in registry.list_families().items() if family.role == Role.ENGINE}
-    known = {*registry.list_engines(), *(() if version else beside_us)}
+    here = {name for name, family in registry.list_families().items() if family.role == Role.ENGINE}
+    known = {*registry.list_engines(), *(() if version else here)}
     if engine not in known:
         raise BadInput("engines", repr(engine), f"{ALL!r}, or {nearest(engine, known)}")
-    if engine in beside_us and not version:
+    if engine in here and not version:
         return registry.list_families()[engine]
     engine_class: Any = registry.engine(engine)
     return engine_class.at_version(version) if version else engine_class

@@ -24,7 +24,9 @@ KINDS = ("heavy_tops", "free_bodies")
 DURATION = 12.0
 """Length of the motion, s."""
 RATE = 2.0
+"""Standard deviation of each initial rate, rad/s."""
 MOMENT = (1.8, 12.0)
+"""Smallest and largest weight times distance, N m."""
 
 
 def draw(kind: str, n: int, seed: int = 0) -> Batch:
@@ -34,22 +36,17 @@ def draw(kind: str, n: int, seed: int = 0) -> Batch:
     second = 10 ** -tables[0].random((n, 3))
     J = second.sum(axis=1, keepdims=True) - second
     J /= J.mean(axis=1, keepdims=True)
-    R_BP, R_WB0 = (_rotations(table.standard_normal((n, 4))) for table in tables[1:3])
+    normal = (table.standard_normal((n, 4)) for table in tables[1:3])
+    R_BP, R_WB0 = (from_quaternion(each / np.linalg.norm(each, axis=1)[:, None]) for each in normal)
     w_WB_B0 = RATE * tables[3].standard_normal((n, 3))
     inertia = (R_BP * J[:, None]) @ R_BP.swapaxes(1, 2)
     inertia = (inertia + inertia.swapaxes(1, 2)) / 2
-    parameters = {"com_B": _points(tables[4].standard_normal((n, 3)), tables[5].random(n))} if kind == KINDS[0] else {}
-    potential = UniformGravity(1.0, parameters["com_B"][0]) if parameters else None
+    parameters: dict[str, Array] = {}
+    potential = None
+    if kind == "heavy_tops":  # with a weight of 1 N
+        direction, (low, high) = tables[4].standard_normal((n, 3)), MOMENT
+        length = (low + (high - low) * tables[5].random(n)) / np.linalg.norm(direction, axis=1)
+        parameters["com_B"] = direction * length[:, None]
+        potential = UniformGravity(1.0, parameters["com_B"][0])
     first = Scene(kind, RigidBody(inertia[0]), R_WB0[0], w_WB_B0[0], DURATION, potential, group="random", source="ours")
     return Batch(first, R_WB0, w_WB_B0, inertia, parameters)
-
-
-def _rotations(normal: Array) -> Array:
-    """Return rotations (n, 3, 3), uniform on the group, from normal numbers (n, 4)."""
-    return from_quaternion(normal / np.linalg.norm(normal, axis=1)[:, None])
-
-
-def _points(normal: Array, u: Array) -> Array:
-    """Return centres of mass (n, 3), m, of bodies with a weight of 1 N."""
-    low, high = MOMENT
-    return normal * ((low + (high - low) * u) / np.linalg.norm(normal, axis=1))[:, None]

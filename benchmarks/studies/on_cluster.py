@@ -25,7 +25,7 @@ UNTIMED = ("paper", "convergence", "long_runs", "sphere_curves", "paper_figures"
 def require_untimed(name: str) -> None:
     """Raise `BadInput` if a study measures times."""
     if name not in UNTIMED:
-        allowed = f"none for a study of times, which share a machine with nothing; with one, {', '.join(UNTIMED)}"
+        allowed = f"no scheduler for a study of times, which need an idle machine, or one of {', '.join(UNTIMED)}"
         raise BadInput("scheduler", f"one for the study {name!r}", allowed)
 
 

@@ -65,11 +65,7 @@ def project_on_sphere(trajectory: Trajectory) -> Array:
     if scene.free:
         momentum = trajectory.w_WB_B @ scene.body.inertia  # symmetric
         return np.asarray(momentum @ np.linalg.eigh(scene.body.inertia)[1] / np.linalg.norm(momentum[0]))
-    return np.asarray(trajectory.R_WB @ traced_axis(scene))
-
-
-def traced_axis(scene: Scene) -> Array:
-    """Return the traced unit vector (3,), body axes: towards the centre of mass if there is one, else the third axis."""
+    # The traced axis points to the centre of mass; without one it is the third body axis.
     com_B = np.asarray(scene.potential.com_B) if isinstance(scene.potential, UniformGravity) else np.zeros(3)
     length = float(np.linalg.norm(com_B))
-    return com_B / length if length else np.eye(3)[2]
+    return np.asarray(trajectory.R_WB @ (com_B / length if length else np.eye(3)[2]))

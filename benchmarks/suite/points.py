@@ -135,7 +135,10 @@ def measure(point: Point) -> dict[str, GatedValue]:
     exact = point.truths(point.scene, point.grid).trajectory
     runs = [point.scene, *(nudge(point.scene, units) for units in NUDGES)]
     measured = [_measure_run(point.method.solve(scene, point.grid), exact) for scene in runs]
-    values = {name: GatedValue(measured[0][name], _range([each[name] for each in measured])) for name in measured[0]}
+    values = {}
+    for name, value in measured[0].items():
+        nudged = [each[name] for each in measured]
+        values[name] = GatedValue(value, float(max(nudged) - min(nudged)))
     return values | (fit_order(point) if point.scene.name in PAPER else {})
 
 
@@ -165,10 +168,6 @@ def fit_order(point: Point) -> dict[str, GatedValue]:
     ]
     order = observed_order([grid.dt for grid in grids], sizes)
     return {} if order.reason else {Measure.ORDER.text: GatedValue(order.slope, 0.0)}
-
-
-def _range(values: list[float]) -> float:
-    return float(max(values) - min(values))
 
 
 def _digits(values: object) -> list[float]:

@@ -1,9 +1,9 @@
-"""The comparison of n versions: every setting on every scene in each version, then the times of settings that work."""
+"""The comparison of n versions: every setting on every scene in each version. Times are added by the caller."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
@@ -53,12 +53,9 @@ class Comparison(Generic[Result, Times]):
 
 
 def compare(
-    sides: Sequence[Side[Result]],
-    scenes: Sequence[str],
-    finish: Callable[[Sequence[Line[Result, Times]]], Mapping[tuple[str, str], Times]],
-    tell: Tell = lambda share, what: None,
+    sides: Sequence[Side[Result]], scenes: Sequence[str], tell: Tell = lambda share, what: None
 ) -> Comparison[Result, Times]:
-    """Return the comparison of versions.
+    """Return the comparison of versions, without times.
 
     Parameters
     ----------
@@ -66,8 +63,6 @@ def compare(
         Two or more, in the order of comparison.
     scenes
         Registered names.
-    finish
-        Takes all lines and returns the measured times by scene and setting.
     tell
         Progress.
     """
@@ -80,6 +75,4 @@ def compare(
         settings = dict.fromkeys(setting for results in by_version for setting in results)
         lines += [Line(scene, setting, tuple(results.get(setting) for results in by_version)) for setting in settings]
     tell(TIMING, f"timing {len(lines)} rows")
-    times = finish(lines)
-    timed = (replace(line, times=times.get((line.scene, line.setting))) for line in lines)
-    return Comparison(tuple(side.version for side in sides), tuple(timed))
+    return Comparison(tuple(side.version for side in sides), tuple(lines))

@@ -29,7 +29,7 @@ from ..studies.case import Case, Success
 from ..studies.line import measure_line
 from ..studies.speed import TimedRun, keep_end, make_timed, shorten
 from ..studies.study import Study
-from .comparison import Comparison, Line, Tell, compare
+from .comparison import TIMING, Comparison, Line, Tell, compare
 from .version import Version
 
 MORE_STEPS = (0, 1, 2)
@@ -272,22 +272,18 @@ def require_several(versions: list[str]) -> None:
 def compare_engine(sides: Sequence[EngineSide], tell: Tell) -> EngineComparison:
     """Return the comparison of versions of an engine: all settings on all scenes in all versions."""
     study = sides[0].study
-    names = [scene.name for scene in study.scenes]
-
-    def finish(lines: Sequence[EngineLine]) -> dict[tuple[str, str], Mapping[str, StepTimes]]:
-        times: dict[tuple[str, str], Mapping[str, StepTimes]] = {}
-        for number, line in enumerate(lines):
-            tell(0.5 + number / len(lines) / 2, f"{line.scene}: timing {line.setting}")
-            good = {
-                side.version.name: next(method for method in side.methods if method.setting() == line.setting)
-                for side, seen in zip(sides, line.results, strict=True)
-                if seen is not None and seen.outcome.ok
-            }
-            times[line.scene, line.setting] = time_versions(study, study.scenes[names.index(line.scene)], good)
-        return times
-
-    made = compare(sides, names, finish, tell)
-    lines = (replace(line, results=fit_orders([each for each in line.results if each])) for line in made.lines)
+    scenes = {scene.name: scene for scene in study.scenes}
+    made: EngineComparison = compare(sides, list(scenes), tell)
+    lines = []
+    for number, line in enumerate(made.lines):
+        tell(TIMING + (1 - TIMING) * number / len(made.lines), f"{line.scene}: timing {line.setting}")
+        good = {
+            side.version.name: next(method for method in side.methods if method.setting() == line.setting)
+            for side, seen in zip(sides, line.results, strict=True)
+            if seen is not None and seen.outcome.ok
+        }
+        results = fit_orders([each for each in line.results if each])
+        lines.append(replace(line, results=results, times=time_versions(study, scenes[line.scene], good)))
     return replace(made, lines=tuple(lines))
 
 

@@ -219,19 +219,20 @@ def compare_projects(
         sides = ProjectSide(base, methods, truths), ProjectSide(head, methods, truths)
         for side in sides:
             stack.callback(side.close)
+        made: ProjectComparison = compare(sides, scenes, tell)
+        if not made.lines:
+            raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
 
-        def finish(lines: Sequence[ProjectLine]) -> dict[tuple[str, str], TimeRow]:
-            if not lines:
-                raise BadInput("methods", ", ".join(methods) or "none", "methods that a version has")
-            good = [
-                line
-                for line in lines
-                if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
-            ]
-            timed = [Timed(line.scene, line.setting, registry.scene(line.scene).dt) for line in good]
-            return compare_times(*sides, timed, processes)
+        def setting_of(line: ProjectLine) -> Timed:
+            return Timed(line.scene, line.setting, registry.scene(line.scene).dt)
 
-        return compare(sides, scenes, finish, tell)
+        good = [
+            line
+            for line in made.lines
+            if all(each and each.status is Status.PASSED and not each.reason for each in line.results)
+        ]
+        times = compare_times(*sides, list(map(setting_of, good)), processes)
+        return replace(made, lines=tuple(replace(line, times=times.get(setting_of(line))) for line in made.lines))
 
 
 def judge(comparison: ProjectComparison) -> Verdict:

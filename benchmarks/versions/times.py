@@ -60,11 +60,6 @@ class Timed:
     method: str
     dt: float
 
-    @property
-    def key(self) -> tuple[str, str]:
-        """Scene and method."""
-        return self.scene, self.method
-
 
 @dataclass(frozen=True)
 class Ratio:
@@ -102,68 +97,67 @@ class TimeRow:
         return bool(self.reason) or (self.first.slower and self.again is not None and self.again.slower)
 
 
-Key = tuple[str, str]
-Times = dict[Key, list[tuple[float, float]]]
-"""Shortest times of a step, s, in both versions, for each pair of processes, by scene and method."""
+Times = dict[Timed, list[tuple[float, float]]]
+"""Shortest times of a step, s, in both versions, for each pair of processes."""
 
 
-def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[Key, TimeRow]:
-    """Return the times of two versions by scene and method; rows that are slower are measured again."""
+def compare_times(base: Process, head: Process, rows: Sequence[Timed], processes: int = PROCESSES) -> dict[Timed, TimeRow]:
+    """Return the times of two versions; rows that are slower are measured again."""
     clock = Clock(base, head)
     first = settle(clock, rows, processes)
-    ratios = {row.key: ratio_of(first[row.key]) for row in rows}
-    slower = [row for row in rows if ratios[row.key].slower]
+    ratios = {row: ratio_of(first[row]) for row in rows}
+    slower = [row for row in rows if ratios[row].slower]
     again = settle(clock, slower, processes)
-    repeated = {row.key: ratio_of(again[row.key]) for row in slower}
-    every = {row.key: [*first[row.key], *again.get(row.key, [])] for row in rows}
+    repeated = {row: ratio_of(again[row]) for row in slower}
     time_rows = {}
-    for key, times in every.items():
+    for row in rows:
+        times = [*first[row], *again.get(row, [])]
         was, now = np.min(times, axis=0) if times else (math.nan, math.nan)
-        time_rows[key] = TimeRow(float(was), float(now), ratios[key], repeated.get(key), clock.failures.get(key, ""))
+        time_rows[row] = TimeRow(float(was), float(now), ratios[row], repeated.get(row), clock.failures.get(row, ""))
     return time_rows
 
 
 def settle(clock: Clock, rows: Sequence[Timed], processes: int) -> Times:
     """Return the times of rows from a number of processes, and from more for rows whose interval contains the limit."""
-    times_by_key: Times = {row.key: [] for row in rows}
+    every: Times = {row: [] for row in rows}
     for _ in range(MOST_TURNS):
-        for key, times in clock.measure(rows, processes).items():
-            times_by_key[key] += times
-        rows = [row for row in rows if ratio_of(times_by_key[row.key]).open]
-    return times_by_key
+        for row, times in clock.measure(rows, processes).items():
+            every[row] += times
+        rows = [row for row in rows if ratio_of(every[row]).open]
+    return every
 
 
 class Clock:
-    """Measures rows in new processes each time. `failures` has the reasons of rows without times, by scene and method."""
+    """Measures rows in new processes each time. `failures` has the reasons of rows without times."""
 
     def __init__(self, base: Process, head: Process) -> None:
         self._sides = base, head
-        self._work: dict[Key, tuple[int, int]] = {}
-        self.failures: dict[Key, str] = {}
+        self._work: dict[Timed, tuple[int, int]] = {}
+        self.failures: dict[Timed, str] = {}
 
     def measure(self, rows: Sequence[Timed], processes: int) -> Times:
         """Return the times of rows from a number of processes."""
-        times_by_key: Times = {row.key: [] for row in rows}
+        every: Times = {row: [] for row in rows}
         for turn in range(processes if rows else 0):
             for side in self._sides:
                 side.close()
             for row in rows:
-                if row.key in self.failures:
+                if row in self.failures:
                     continue
                 try:
-                    times_by_key[row.key].append(self._shortest(row, turn))
+                    every[row].append(self._shortest(row, turn))
                 except IntegrationFailed as failure:
-                    self.failures[row.key] = str(failure.outcome)
-        return times_by_key
+                    self.failures[row] = str(failure.outcome)
+        return every
 
     def _shortest(self, row: Timed, turn: int) -> tuple[float, float]:
         """Return the shortest time of a step, s, in each version."""
-        if row.key not in self._work:
+        if row not in self._work:
             base = self._sides[0]
             n, run = last_a_sample(lambda n: base.timed(row.scene, row.method, row.dt, n))
             spent = min(wall_time(run) for _ in range(5))
-            self._work[row.key] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
-        steps, calls = self._work[row.key]
+            self._work[row] = n, min(MOST_CALLS, max(1, math.ceil(SAMPLE / max(spent, 1e-9) / 2)))
+        steps, calls = self._work[row]
         runs = [[side.timed(row.scene, row.method, row.dt, steps) for _ in range(LAYOUTS)] for side in self._sides]
         was, now = _sample(runs, calls, turn)
         return was / steps, now / steps

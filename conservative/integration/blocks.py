@@ -1,17 +1,19 @@
-"""Blocks of bodies: one block is integrated and checked at a time, many of them side by side on an executor.
+"""Blocks of bodies: each is integrated and checked as one, on threads or on a cluster.
 
-The size of a block follows from the number of its samples alone, so that numbers do not depend on threads, on the order in
-which blocks end, or on where they run.
+The size of a block depends only on the number of samples. So results do not depend on the number of threads, on the order in
+which blocks end, or on the machine that runs them.
 """
 
 from __future__ import annotations
 
+import os
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,27 +24,34 @@ from ..errors import BadInput, IntegrationFailed, NotRun
 from ..grid import Grid
 from ..method import Method
 from ..methods.many import Block, pause, watch
+from ..outcome import ProgressOfMany
+from .cluster import start_executor
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 MOST_BODIES, MOST_BYTES = 1024, 2**24
-"""Bodies of a block at most, and about how many bytes its samples take at most."""
+"""Largest number of bodies in a block, and the approximate limit on the size of its samples, bytes."""
 SAMPLE_BYTES = 96
-"""Bytes of the attitude and the rates of a sample."""
+"""Size of a sample: attitude and rates, bytes."""
+MOST_WAITING = 16
+"""Largest number of blocks that wait for a worker of a cluster, in addition to those that run."""
 LONGEST_WAIT = 0.1
-"""Time, s, between two looks at what has ended: in between, some systems do not let Ctrl-C in."""
+"""Time, s, between two checks for blocks that have ended. On some systems Ctrl-C has no effect during a wait."""
 
 
 @dataclass(frozen=True, eq=False)
 class BlockResult:
-    """The result of a block of n bodies, of m samples each. It can be sent to another process.
+    """Samples, drifts and failures of a block of n bodies with m samples each. It can be sent to another process.
 
     Attributes
     ----------
     R_WB, w_WB_B
         Attitudes (n, m, 3, 3), body to world, and angular velocities (n, m, 3), rad/s, body axes; nan after a failure.
     drifts
-        Largest drifts (n, k), dimensionless, by the names that `conservative.drifts.list_drifts` has of the bodies.
+        Largest drifts (n, k), dimensionless, by the names of `conservative.drifts.list_drifts`.
     failures
-        The failures of those that did not reach their end, by their indices in the block.
+        Failures by the index of the body in the block.
     """
 
     R_WB: Array
@@ -50,28 +59,25 @@ class BlockResult:
     drifts: Array
     failures: dict[int, IntegrationFailed]
 
+    def put(self, first: int, part: BlockResult) -> None:
+        """Put the result of the bodies from number `first` on into this one."""
+        rows = slice(first, first + len(part))
+        self.R_WB[rows], self.w_WB_B[rows], self.drifts[rows] = part.R_WB, part.w_WB_B, part.drifts
+        self.failures.update((first + i, failure) for i, failure in part.failures.items())
+
     def __len__(self) -> int:
         return len(self.R_WB)
 
 
-def count_bodies(grid: Grid) -> int:
-    """Return how many bodies a block has."""
-    return max(1, min(MOST_BODIES, MOST_BYTES // (SAMPLE_BYTES * grid.n_samples)))
-
-
 def list_blocks(n: int, grid: Grid) -> range:
-    """Return the first index of each block of n bodies."""
-    return range(0, n, count_bodies(grid))
+    """Return the first index of each block of n bodies. The step of the range is the number of bodies in a block."""
+    return range(0, n, max(1, min(MOST_BODIES, MOST_BYTES // (SAMPLE_BYTES * grid.n_samples))))
 
 
 def run_block(method: Method, bodies: Batch, grid: Grid) -> BlockResult:
-    """Return the samples of bodies, whose outcomes are those of `Method.solve` for each of them alone."""
-    n, m, run, reference = (
-        len(bodies),
-        grid.n_samples,
-        method.prepare_many(bodies, grid),
-        find_reference(bodies, method.conserves),
-    )
+    """Return the samples of a block. The outcome of each body is that of `Method.solve` for the body alone."""
+    n, m = len(bodies), grid.n_samples
+    run, reference = method.prepare_many(bodies, grid), find_reference(bodies, method.conserves)
     if run is None:
         block, alone = Block(np.full((n, m, 3, 3), np.nan), np.full((n, m, 3), np.nan), np.zeros(n, dtype=bool)), np.arange(n)
     else:
@@ -110,70 +116,97 @@ def are_accepted(method: Method, bodies: Batch, grid: Grid, measured: Array) -> 
 
 
 def run_alone(method: Method, bodies: Batch, grid: Grid, i: int, block: Block) -> IntegrationFailed | None:
-    """Integrate body i alone, put its samples into the block, and return its failure, if there is one."""
+    """Integrate body i alone, put its samples into the block, and return its failure, or None."""
     block.R_WB[i], block.w_WB_B[i] = np.nan, np.nan
     scene = bodies.take(i)
     try:
         reason = method.unsupported(scene)
         if reason:
             return NotRun(f"{method.name}: {reason}")
-        found = method.solve(scene, grid)
+        trajectory = method.solve(scene, grid)
     except BadInput as refusal:
         return NotRun(str(refusal))
-    block.R_WB[i, : len(found)], block.w_WB_B[i, : len(found)] = found.R_WB, found.w_WB_B
-    return found.failure
+    block.R_WB[i, : len(trajectory)], block.w_WB_B[i, : len(trajectory)] = trajectory.R_WB, trajectory.w_WB_B
+    return trajectory.failure
 
 
 @contextmanager
-def start_threads(threads: int) -> Iterator[Executor]:
-    """Yield an executor of so many threads. Blocks that still run at the end, as after Ctrl-C, are given up."""
+def start_workers(client: Client | None, threads: int | None, n_blocks: int) -> Iterator[tuple[Executor, int]]:
+    """Yield an executor for blocks, and the number of blocks to submit to it at a time.
+
+    Blocks run on the workers of a client, or on threads of this process, by default one for each processor. At the end of the
+    context, for example after Ctrl-C, blocks that still run are given up.
+    """
+    if client is not None:
+        with start_executor(client) as cluster:
+            yield cluster, cluster.places + min(cluster.places, MOST_WAITING)
+        return
+    if threads is None:
+        threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = min(threads, n_blocks)
     if threads == 1:
-        yield Inline()
+        yield Inline(), 1
         return
     given_up = threading.Event()
     executor = ThreadPoolExecutor(threads, initializer=watch, initargs=(given_up,))
     try:
-        yield executor
+        yield executor, 2 * threads
     finally:
         given_up.set()
         executor.shutdown(cancel_futures=True)
 
 
 class Inline(Executor):
-    """Runs each call at once, in the calling thread: in the main thread, Ctrl-C ends a run at any moment."""
+    """Runs each call at once in the calling thread. In the main thread, Ctrl-C can end a run at any time."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return the future of a call that is already over."""
+        """Return the future of a finished call."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
 
 
 def run_blocks(
-    method: Method, bodies: Batch, grid: Grid, executor: Executor, in_flight: int, firsts: Iterable[int]
-) -> Generator[tuple[int, BlockResult], None, None]:
-    """Run blocks, and yield the first index of each with its result, in the order in which they end.
+    method: Method,
+    bodies: Batch,
+    grid: Grid,
+    workers: tuple[Executor, int],
+    left: Sequence[int],
+    write: Callable[[int, Batch, BlockResult], object],
+    progress: Callable[[ProgressOfMany], object] | None,
+) -> None:
+    """Integrate the blocks with the first indices `left`.
 
     Parameters
     ----------
     method, bodies, grid
-        The method, all bodies, and the steps in s.
-    executor, in_flight
-        The executor, and how many blocks it has at a time: those that run, and those that wait or have not been taken yet.
-    firsts
-        First indices of the blocks to run.
+        The method, all bodies, and the steps.
+    workers
+        An executor, and the number of blocks to submit to it at a time.
+    left
+        The first indices of the blocks.
+    write
+        Called with the first index, the bodies and the result of each block, as soon as it has ended.
+    progress
+        Called after each block, or None.
     """
-    size, left = count_bodies(grid), iter(firsts)
+    (executor, in_flight), total, size = workers, len(bodies), list_blocks(len(bodies), grid).step
+    done = found = total - sum(min(size, total - first) for first in left)
+    begin, waiting = perf_counter(), iter(left)
     pending: dict[Future[BlockResult], int] = {}
     try:
         while True:
-            while len(pending) < in_flight and (first := next(left, None)) is not None:
+            while len(pending) < in_flight and (first := next(waiting, None)) is not None:
                 pending[executor.submit(run_block, method, bodies[first : first + size], grid)] = first
             if not pending:
                 return
             ended, _ = wait(pending, LONGEST_WAIT, FIRST_COMPLETED)
-            for future in [each for each in pending if each in ended]:  # in the order in which they were handed over
-                yield pending.pop(future), future.result()
+            for future in [each for each in pending if each in ended]:  # in the order of submission
+                first, result = pending.pop(future), future.result()
+                write(first, bodies[first : first + size], result)
+                done += len(result)
+                if progress is not None:
+                    progress(ProgressOfMany(perf_counter() - begin, done, total, found))
     finally:
         for future in pending:
             future.cancel()

@@ -5,16 +5,16 @@
     with Client("tcp://10.0.0.7:8786") as client:  # or open_client, whose error is one line
         ensemble = cv.integrate_many(scene, w_WB_B0=starts, path="starts.zarr", client=client)
 
-A task is a pure function of the bytes that it is sent, and its result comes back to the process that submitted it. Workers need
-no common file system. If a worker dies, another one runs its tasks, and a task that runs twice counts once. Workers need this
-package in the same version, which is checked before any work. Processors of the same kind give the same numbers as without a
-cluster, bit for bit; compiled code differs from kind to kind.
+A task is a pure function of the bytes that it is sent, and its result is sent back to the submitting process. Workers need no
+common file system. If a worker dies, another one runs its tasks, and the result of a task that runs twice counts once. Workers
+need the same version of this package, which is checked before any work. On processors of the same kind the results are the same
+as without a cluster, bit for bit; compiled code differs between kinds.
 
 If a worker dies with results, the scheduler tries to reach it for 30 s (its setting `distributed.comm.timeouts.connect`) before
 it has them computed again. A run can stand still for that long.
 
-Futures of Dask's own `Client.get_executor` are not used: they never end if fetching a result fails, as it does when a scheduler
-dies (distributed 2026.8.0).
+Futures of Dask's own `Client.get_executor` are not used, because they never end if fetching a result fails, for example when a
+scheduler dies (distributed 2026.8.0).
 """
 
 from __future__ import annotations
@@ -37,14 +37,13 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 CONNECT_LIMIT = 5.0
 """Time, s, that a scheduler may take to answer."""
-_LOST = "a cluster that stays there; what was written to a path is kept, and resume=True goes on from there"
 _LOGGERS = ("distributed", "distributed.client", "tornado.application")
-"""Loggers that print tracebacks of exceptions that are raised as well."""
+"""Loggers that print tracebacks of exceptions that are also raised."""
 
 
 @contextmanager
 def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
-    """Yield a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, with Dask's own messages off in the block.
+    """Yield a client of the scheduler at an address such as `tcp://127.0.0.1:8786`, without Dask's own messages in the block.
 
     The scheduler has `limit`, s, to answer.
 
@@ -64,9 +63,9 @@ def open_client(address: str, limit: float = CONNECT_LIMIT) -> Iterator[Client]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         try:
-            get_address_host_port(address)  # first, as a client with a wrong address raises again when it is collected
+            get_address_host_port(address)  # a client with a wrong address raises again when it is collected
             client = Client(address, timeout=limit, set_as_default=False)
-        except Exception as error:  # another program that listens there can answer anything
+        except Exception as error:  # another program at that address can answer anything
             got = f"{address!r}, where no scheduler answers ({error or type(error).__name__})"
             allowed = "the address of a Dask scheduler that runs, such as 'tcp://127.0.0.1:8786'"
             raise BadInput("scheduler", got, allowed) from None
@@ -84,8 +83,8 @@ def start_executor(client: Client) -> Iterator[ClusterExecutor]:
     Raises
     ------
     BadInput
-        The client is not one, or not connected; there are no workers; or some have another version of this package. From the
-        block: the cluster was lost, or a task has ended every worker that tried it.
+        The argument is not a client, or not a connected one; there are no workers, or some with another version of this
+        package. From the block: the cluster was lost, or a task ended every worker that tried it.
     MissingExtra
         Dask, of the extra `cluster`, is not installed.
     """
@@ -102,16 +101,17 @@ def start_executor(client: Client) -> Iterator[ClusterExecutor]:
         require_versions(client)
         yield ClusterExecutor(client)
     except (CommClosedError, KilledWorker, CancelledError) as error:
-        raise BadInput("client", f"a cluster that was lost ({type(error).__name__}: {error})", _LOST) from error
+        allowed = "a cluster that keeps running; blocks written to a path stay there, and resume=True computes the others"
+        raise BadInput("client", f"a cluster that was lost ({type(error).__name__}: {error})", allowed) from error
 
 
 def require_versions(client: Any) -> None:
     """Raise `BadInput` unless the client has workers, and all of them have this version of this package."""
-    found = client.run(pkgutil.resolve_name, "conservative.version:VERSION", on_error="return")
-    if not found:
+    versions = client.run(pkgutil.resolve_name, "conservative.version:VERSION", on_error="return")
+    if not versions:
         allowed = "one with a worker or more, which client.wait_for_workers(1) waits for"
         raise BadInput("client", f"a scheduler at {client.scheduler.address} without workers", allowed)
-    others = [f"{version!s} on {worker}" for worker, version in found.items() if version != VERSION]
+    others = [f"{version!s} on {worker}" for worker, version in versions.items() if version != VERSION]
     if others:
         raise BadInput("client", f"workers of another version: {', '.join(others)}", f"{VERSION}, as here, on all of them")
 
@@ -124,26 +124,24 @@ class ClusterExecutor(Executor):
         self._client = client
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Return the future of a call. Function and arguments are sent as bytes, so they may be those of a script."""
+        """Return the future of a call. Function and arguments can be those of a script, because they are sent as bytes."""
         task = self._client.submit(_call, VERSION, dump((fn, args, kwargs)), pure=False)
-        found: Future[T] = Future()
-        found.add_done_callback(lambda done: task.cancel() if done.cancelled() else None)
-        task.add_done_callback(lambda task: _pass_on(task, found))
-        return found
+        future: Future[T] = Future()
 
+        def pass_on(task: Any) -> None:  # called by Dask for one task after the other, in a thread of its own
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(task.result())
+                except BaseException as error:  # raised by the waiting process
+                    future.set_exception(error)
 
-def _pass_on(task: Any, found: Future[Any]) -> None:
-    """Copy the result of a task to a future. Dask calls this for one task after the other, in a thread of its own."""
-    if not found.set_running_or_notify_cancel():
-        return
-    try:
-        found.set_result(task.result())
-    except BaseException as error:  # whatever it is, the waiting process raises it
-        found.set_exception(error)
+        future.add_done_callback(lambda done: task.cancel() if done.cancelled() else None)
+        task.add_done_callback(pass_on)
+        return future
 
 
 def _call(version: str, content: bytes) -> Any:
-    """Make a call on a worker. A worker that started after versions were compared can have another version."""
+    """Make a call on a worker. A worker that started after the comparison of versions can have another version."""
     if version != VERSION:
         raise BadInput("client", f"a worker of version {VERSION}", version)
     do, args, kwargs = load(content)

@@ -1,7 +1,7 @@
-"""How the attitudes of many bodies are distributed, found block by block, in memory or on a disk.
+"""Mean attitude and spread of many bodies, computed block by block, from memory or from a disk.
 
-Source: the mean attitude is the rotation nearest to the mean of all matrices (M. Moakher, Means and averaging in the group of
-rotations, 2002); quantiles are read off counts in narrow bins.
+The mean attitude is the rotation nearest to the mean of all matrices (M. Moakher, Means and averaging in the group of
+rotations, 2002). Quantiles are determined from a histogram with narrow bins.
 """
 
 from __future__ import annotations
@@ -15,21 +15,20 @@ import numpy as np
 from ..attitude import Array
 
 QUANTILES = (0.05, 0.5, 0.95)
-"""Shares of the bodies whose attitudes are nearer to the mean than an angle."""
+"""Quantiles of the angle between an attitude and the mean."""
 _LEAST = 1e-9
-"""Angle, rad, below which all are 0: nobody's attitudes are better than that, and sums of a million are rounded as much."""
+"""Angle, rad, below which all count as 0: the round-off of a sum of a million attitudes."""
 _WIDTH = 0.005
-"""Width of a bin, relative to its angle: quantiles are right to half of it."""
+"""Width of a bin, relative to its angle. The error of a quantile is half of it."""
 _BINS = math.ceil(math.log(math.pi / _LEAST) / _WIDTH)
 _BLOCK = 1 << 24
-"""Bytes of attitudes that are read at once."""
+"""Size of the attitudes that are read at once, bytes."""
 
 
 def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
-    """Yield the attitudes (b, m, 3, 3) of one block of bodies after the other, of all samples or of those chosen.
+    """Yield the attitudes (b, m, 3, 3) of one block of bodies after the other, at all samples or at the given ones.
 
-    Those of all, (n, m, 3, 3), are a NumPy array, or what gives one when it is sliced, as an array on a disk does: then along
-    the blocks in which it is stored.
+    R_WB (n, m, 3, 3) is a NumPy array, or an array of Zarr, which is read along its chunks.
     """
     n, count = R_WB.shape[:2]
     stored = getattr(R_WB, "chunks", None)
@@ -41,7 +40,7 @@ def blocks(R_WB: Any, samples: Sequence[int] | None = None) -> Iterator[Array]:
 
 
 def mean_attitudes(R_WB: Any, samples: Sequence[int] | None = None) -> Array:
-    """Return the mean attitudes (m, 3, 3) of bodies (n, m, 3, 3) at each sample; bodies that are not finite are left out."""
+    """Return the mean attitudes (m, 3, 3) of bodies (n, m, 3, 3) at each sample, without those that are not finite."""
     total = sum(np.nansum(block, axis=0) for block in blocks(R_WB, samples))
     U, _, Vt = np.linalg.svd(np.asarray(total))
     U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
@@ -51,7 +50,8 @@ def mean_attitudes(R_WB: Any, samples: Sequence[int] | None = None) -> Array:
 def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = None) -> Array:
     """Return `QUANTILES` (m, 3) of the angles, rad, of bodies (n, m, 3, 3) from attitudes (m, 3, 3), one for each sample.
 
-    Right to a quarter of a percent, or to 1e-9 rad. Bodies that are not finite are left out; of none, not a number.
+    The relative error is a quarter of a percent, or 1e-9 rad. Bodies that are not finite are left out; without bodies the
+    result is nan.
     """
     counts = np.zeros((len(centre), _BINS + 1), dtype=np.int64)
     for block in blocks(R_WB, samples):
@@ -64,7 +64,7 @@ def angle_quantiles(R_WB: Any, centre: Array, samples: Sequence[int] | None = No
 
 
 def _count_angles(R_WB: Array, centre: Array) -> Any:
-    """Return how many angles lie in each bin, (m, bins): the first has those below `_LEAST`."""
+    """Return the number of angles in each bin, (m, bins). The first bin has those below `_LEAST`."""
     off = R_WB - centre
     square = np.einsum("nsij,nsij->ns", off, off)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -77,26 +77,26 @@ def _count_angles(R_WB: Array, centre: Array) -> Any:
 
 
 def directions(R_WB: Any, axis_B: Array, samples: Sequence[int]) -> Array:
-    """Return where a unit vector (3,) of the body points, world axes: one (n, 3) for each sample chosen of (n, m, 3, 3).
+    """Return a unit vector (3,) of the body in world axes: (k, n, 3) for k given samples of attitudes (n, m, 3, 3).
 
-    Bodies that are not finite at one of them are left out.
+    Bodies that are not finite at one of these samples are left out.
     """
-    found = np.concatenate([block @ axis_B for block in blocks(R_WB, samples)])
-    return np.asarray(np.moveaxis(found[np.isfinite(found).all(axis=(1, 2))], 1, 0))
+    vectors_W = np.concatenate([block @ axis_B for block in blocks(R_WB, samples)])
+    return np.asarray(np.moveaxis(vectors_W[np.isfinite(vectors_W).all(axis=(1, 2))], 1, 0))
 
 
 def project(directions_W: Array) -> tuple[Array, Array]:
     """Return unit vectors (n, 3) as points (n, 2) of a disc, and their mean direction (3,), which is its centre.
 
-    The disc is Lambert's equal-area projection of the sphere, seen from outside with the world's z axis up (x, where the mean
-    is near z): a point at an angle a from the mean is 2 sin(a/2) from the centre, dimensionless.
+    The disc is Lambert's equal-area projection of the sphere, seen from outside with the world's z axis up, or the x axis if
+    the mean is near z. A point at an angle a from the mean is 2 sin(a/2) from the centre, dimensionless.
     """
     mean = directions_W.sum(axis=0)
     size = np.linalg.norm(mean)
     mean = mean / size if size > 0 else np.array([0.0, 0.0, 1.0])
-    beside = np.eye(3)[2 if abs(mean[2]) < 0.99 else 0]
-    up = beside - beside @ mean * mean
+    other = np.eye(3)[2 if abs(mean[2]) < 0.99 else 0]
+    up = other - other @ mean * mean
     up /= np.linalg.norm(up)
     across = directions_W @ np.stack([np.cross(up, mean), up], axis=1)
-    # 2 sin(a/2) over sin(a): finite for all but the point opposite the centre
+    # 2 sin(a/2) / sin(a) is finite except opposite the centre
     return across / np.sqrt(np.maximum((1 + directions_W @ mean) / 2, 1e-30))[:, None], mean

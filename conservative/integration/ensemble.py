@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..attitude import Array
 from ..batch import Batch
 from ..check import choice as require_choice
-from ..drifts import arrange_drifts, find_reference, list_drifts
+from ..drifts import arrange_drifts, list_drifts, scene_reference
 from ..errors import IntegrationFailed, require_extra
 from ..grid import Grid
 from ..outcome import OK, Choice, Counters, Outcome
@@ -25,21 +25,22 @@ from ..presentation import samples as sample_rows
 from ..scene import Scene
 from ..trajectory import Trajectory
 from .blocks import BlockResult
-from .store import read_store, write_store
+from .store import open_store, write_store
 
 if TYPE_CHECKING:
     import altair
     import pandas
 
 MOST_LISTED = 5
-"""Failed bodies that are named at most."""
+"""Largest number of failed bodies in a text."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
     """Samples of the motions of n independent bodies at the same m times.
 
-    `len` is the number of bodies, `ensemble[i]` the trajectory of body i, and `ensemble[:10]` an ensemble of the first ten.
+    `len(ensemble)` is the number of bodies, `ensemble[i]` the trajectory of body i, and `ensemble[:10]` an ensemble of the
+    first ten.
 
     Attributes
     ----------
@@ -52,8 +53,8 @@ class Ensemble:
     w_WB_B
         Angular velocities (n, m, 3), rad/s, body axes; nan after a failure.
     drifts
-        Largest drift (n,) of each body, dimensionless, by name: orthonormality and the invariants of the scene. nan if a
-        body has no such invariant, or failed.
+        Largest drifts (n,), dimensionless, by name: orthonormality and the invariants of the scene. nan for a body that has no
+        such invariant, or failed.
     label
         Method with version and setting.
     failures
@@ -79,9 +80,9 @@ class Ensemble:
     @property
     def ok(self) -> Any:
         """Whether the run of each body (n,) reached its end."""
-        found = np.ones(len(self), dtype=bool)
-        found[list(self.failures)] = False
-        return found
+        ok = np.ones(len(self), dtype=bool)
+        ok[list(self.failures)] = False
+        return ok
 
     def outcome(self, i: int) -> Outcome:
         """Return the outcome of body i."""
@@ -95,13 +96,12 @@ class Ensemble:
         ----------
         rows
             "samples": index of the body, t, R_WB (by rows), w_WB_B, energy, momentum_W, without samples after a failure. A
-            million rows take about 140 MB; `ensemble[:100].to_pandas()` is a part. "bodies": outcome, time reached, s, and
-            largest drifts, with the index of the body.
+            million rows take about 140 MB. "bodies": outcome, time reached, s, and largest drifts, with the index of the body.
 
         Raises
         ------
         BadInput
-            rows is something else.
+            rows has another value.
         MissingExtra
             pandas, of the extra `report`, is not installed.
         """
@@ -156,7 +156,7 @@ class Ensemble:
         return f"<table><caption>Ensemble</caption>{body}</table>"
 
     def _describe_outcomes(self) -> str:
-        """Return how many runs ended in which way, and the numbers of some bodies that failed."""
+        """Return the number of runs of each outcome, and the numbers of some bodies that failed, as text."""
         failed = sorted(self.failures)
         kinds = Counter(self.failures[i].outcome.kind.value for i in failed)
         counts = [f"{len(self) - len(failed)} ok", *(f"{count} {kind}" for kind, count in kinds.most_common())]
@@ -170,24 +170,21 @@ class Ensemble:
     def __getitem__(self, i: slice) -> Ensemble: ...
 
     def __getitem__(self, i: int | slice) -> Trajectory | Ensemble:
-        return self._take_part(i) if isinstance(i, slice) else self._take(range(len(self))[i])
-
-    def _take(self, i: int) -> Trajectory:
+        if isinstance(i, slice):
+            numbers = range(len(self))[i]
+            return replace(
+                self,
+                bodies=self.bodies[i],
+                R_WB=self.R_WB[i],
+                w_WB_B=self.w_WB_B[i],
+                drifts={name: values[i] for name, values in self.drifts.items()},
+                failures={k: self.failures[number] for k, number in enumerate(numbers) if number in self.failures},
+            )
+        i = range(len(self))[i]
         failure, R_WB, w_WB_B = self.failures.get(i), np.asarray(self.R_WB[i]), np.asarray(self.w_WB_B[i])
         m = len(self.t) if failure is None else int(np.isfinite(w_WB_B).all(axis=1).sum())
         counters = Counters(self.grid.n_steps if failure is None else max(0, m - 1) * self.grid.every)
         return Trajectory(self.bodies.take(i), self.t[:m], R_WB[:m], w_WB_B[:m], self.label, counters, failure, self.choice)
-
-    def _take_part(self, part: slice) -> Ensemble:
-        numbers = range(len(self))[part]
-        return replace(
-            self,
-            bodies=self.bodies[part],
-            R_WB=self.R_WB[part],
-            w_WB_B=self.w_WB_B[part],
-            drifts={name: values[part] for name, values in self.drifts.items()},
-            failures={k: self.failures[i] for k, i in enumerate(numbers) if i in self.failures},
-        )
 
     def to_zarr(self, path: str | Path) -> None:
         """Write the ensemble to a new folder, from which `open_ensemble(path)` reads it: see `conservative.integration.store`.
@@ -211,7 +208,7 @@ class Ensemble:
         return len(self.bodies)
 
     def __iter__(self) -> Iterator[Trajectory]:
-        return map(self._take, range(len(self)))
+        return (self[i] for i in range(len(self)))
 
     def __repr__(self) -> str:
         name, samples = self.bodies.scene.name, f"{len(self.t)} samples to {self.t[-1]:g} s"
@@ -219,37 +216,38 @@ class Ensemble:
 
 
 def open_ensemble(path: str | Path, scene: Scene | None = None) -> Ensemble:
-    """Return the ensemble that `integrate_many(..., path=...)` or `Ensemble.to_zarr` has written.
+    """Return the ensemble in a folder that `integrate_many(..., path=...)` or `Ensemble.to_zarr` has written.
 
-    Samples stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, and `ensemble.R_WB[:1000, -1]` reads
-    only the blocks of the first 1000 bodies. Initial states stay there as well. Drifts and outcomes are read at once. Missing
-    and truncated blocks are noticed here, other damage when Zarr reads it (`ValueError`).
+    Samples and initial states stay on the disk: `ensemble.R_WB` and `ensemble.w_WB_B` are arrays of Zarr, and
+    `ensemble.R_WB[:1000, -1]` reads only the blocks of the first 1000 bodies. Drifts and outcomes are read at once. Missing and
+    truncated blocks raise an error here, other damage when Zarr reads it (`ValueError`).
 
     Parameters
     ----------
     path
         The folder.
     scene
-        The scene of the run, needed only if it has functions of its own, as with `FunctionPotential` or `extra_invariants`.
+        The scene of the run, needed only if it contains functions, as in `FunctionPotential` or `extra_invariants`.
 
     Raises
     ------
     BadInput
-        The folder is not an ensemble, or some of its blocks are missing or damaged; or the scene is missing, or another one.
+        The folder contains no ensemble, or blocks are missing or damaged; or the scene is missing, or another one.
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
     """
-    return Ensemble(**read_store(path, scene))
+    store = open_store(path)
+    bodies, (drifts, failures), record = store.read_bodies(scene), store.read_results(), store.record
+    grid = Grid(record["dt"], record["n_steps"], record["sample_every"])
+    return Ensemble(bodies, grid, store.arrays["R_WB"], store.arrays["w_WB_B"], drifts, record["method"], failures)
 
 
-def ensemble_of_one(bodies: Batch, grid: Grid, found: Trajectory, choice: Choice | None) -> Ensemble:
-    """Return the ensemble of one body whose trajectory is known."""
-    R_WB, w_WB_B, failures = found.R_WB[None], found.w_WB_B[None], {}
-    if found.failure is not None:
-        missing = ((0, 0), (0, grid.n_samples - len(found)))
-        R_WB = np.pad(R_WB, (*missing, (0, 0), (0, 0)), constant_values=np.nan)
-        w_WB_B = np.pad(w_WB_B, (*missing, (0, 0)), constant_values=np.nan)
-        failures[0] = found.failure
-    measured = find_reference(bodies).measure(grid, grid.t, R_WB, w_WB_B)
+def ensemble_of_one(bodies: Batch, grid: Grid, trajectory: Trajectory, choice: Choice | None) -> Ensemble:
+    """Return the ensemble of one body with this trajectory."""
+    n, failure = len(trajectory), trajectory.failure
+    R_WB, w_WB_B = np.full((1, grid.n_samples, 3, 3), np.nan), np.full((1, grid.n_samples, 3), np.nan)
+    R_WB[0, :n], w_WB_B[0, :n] = trajectory.R_WB, trajectory.w_WB_B
+    reference = bodies.first.derive(scene_reference, frozenset())
+    measured = reference.measure(grid, grid.t, R_WB, w_WB_B)
     drifts = dict(zip(list_drifts(bodies), arrange_drifts(bodies, measured, R_WB, w_WB_B).T, strict=True))
-    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, found.label, failures, choice)
+    return Ensemble(bodies, grid, R_WB, w_WB_B, drifts, trajectory.label, {0: failure} if failure else {}, choice)

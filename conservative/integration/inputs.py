@@ -28,14 +28,12 @@ RATES = "three finite rates (3,), rad/s"
 def read_bodies(
     scene: Scene, R_WB0: Any, w_WB_B0: ArrayLike | None, inertia: ArrayLike | None, parameters: Mapping[str, ArrayLike] | None
 ) -> Batch:
-    """Return n bodies, with the values of the scene for everything that is None.
-
-    Attitudes are (n, 3, 3), rates (n, 3), rad/s, inertia (n, 3) or (n, 3, 3), kg m^2, and parameters those of the potential.
+    """Return n bodies from the arguments of `integrate_many`, with the values of the scene for everything that is None.
 
     Raises
     ------
     BadInput
-        An argument has another shape, or a body is one that `Scene` or its parts refuse.
+        An argument has the wrong shape, or `Scene` or one of its parts rejects a body.
     """
     with suppress(Exception):  # not a Rotation: the checks below report the error
         R_WB0 = R_WB0.as_matrix()
@@ -59,15 +57,15 @@ def read_bodies(
         _refuse_first("w_WB_B0", w, ~_are_in_range(w), lambda each: finite_array("w_WB_B0", each, ((3,),), RATES))
     J = _read_inertia(given["inertia"]) if "inertia" in given else None
     if J is not None and hasattr(static_part(scene.potential), "inertia") and "inertia" not in values:
-        allowed = "{'inertia': ...} too: the field has an inertia of its own, which should be that of the body"
+        allowed = "{'inertia': ...} too, because the field has an inertia, which should be that of the body"
         raise BadInput("parameters", describe(parameters), allowed)
     if (J is not None or values) and scene.extra_invariants:
-        scene = scene.rename(scene.name, extra_invariants=())  # which are of the scene's own body and field
+        scene = scene.rename(scene.name, extra_invariants=())  # those hold for the scene's own body and field
     return Batch(scene, R, w, J, values)
 
 
 def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Mapping[str, Array]) -> Array:
-    """Return an argument as a new array (n, ...), where n is that of the arguments given before it."""
+    """Return an argument as a new array (n, ...), with the n of the arguments before it."""
     array = real_array(value)
     other = next(iter(given), None)
     n = "n" if other is None else str(len(given[other]))
@@ -81,7 +79,7 @@ def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Map
 
 
 def _refuse_first(name: str, values: Array, bad: Any, check: Callable[[Any], object]) -> None:
-    """Raise what `check` raises for the first bad one of `values` (n, ...), with its number."""
+    """Raise the error of `check` for the first bad row of `values` (n, ...), with its number."""
     for i in np.flatnonzero(bad).tolist():
         try:
             check(values[i])
@@ -90,13 +88,13 @@ def _refuse_first(name: str, values: Array, bad: Any, check: Callable[[Any], obj
 
 
 def _are_in_range(values: Array) -> Any:
-    """Return which of n arrays (n, ...), of any unit, are finite and in the range that all numbers with a unit have."""
+    """Return which of n arrays (n, ...) are finite, and 0 or of magnitude `SMALLEST` to `LARGEST`."""
     largest = np.abs(values.reshape(len(values), -1)).max(axis=1)
     return (largest == 0) | ((largest >= SMALLEST) & (largest <= LARGEST))
 
 
 def _read_inertia(value: Array) -> Array:
-    """Return tensors (n, 3, 3), kg m^2, of moments (n, 3) or tensors, as `RigidBody` has them."""
+    """Return checked tensors (n, 3, 3) from moments (n, 3) or tensors, kg m^2."""
     tensors = value if value.ndim == 3 else value[:, :, None] * np.eye(3)
     with np.errstate(all="ignore"):
         skew = np.abs(tensors - np.swapaxes(tensors, 1, 2)).max(axis=(1, 2))
@@ -104,30 +102,30 @@ def _read_inertia(value: Array) -> Array:
         moments = np.full((len(tensors), 3), -1.0)
         moments[good] = np.linalg.eigvalsh(tensors[good])
     good &= (moments[:, 0] > 0) & (moments[:, 2] <= 1e12 * moments[:, 0])
-    _refuse_first("inertia", value, ~good, RigidBody)  # which looks closer, and takes most of them
+    _refuse_first("inertia", value, ~good, RigidBody)  # its checks are exact, and accept most of them
     return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
 
 
 def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> dict[str, Array]:
-    """Return parameters (n, ...) by name, checked; `given` gets one of them where nothing else is given."""
+    """Return checked parameters (n, ...) by name. If `given` is empty, one of them is added to it."""
     if parameters is None:
         return {}
     if not isinstance(parameters, Mapping):
         raise BadInput("parameters", describe(parameters), "a mapping of names of the potential's numbers to arrays (n, ...)")
     known = list_parameters(static_part(scene.potential))
-    found = {}
+    values = {}
     for name, value in parameters.items():
         if name not in known:
             allowed = nearest(str(name), known) if known else f"none: the scene {scene.name!r} has no potential with numbers"
             raise BadInput("parameters", describe(name), allowed)
         key = f"parameters[{name!r}]"
-        found[name] = _read(key, value, (known[name],), given)
-        given.setdefault(key, found[name])
-    return _check_potentials(scene, found) if found else {}
+        values[name] = _read(key, value, (known[name],), given)
+        given.setdefault(key, values[name])
+    return _check_potentials(scene, values) if values else {}
 
 
 def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
-    """Return the numbers of a potential by the names of its fields, with their shapes."""
+    """Return the shapes of the numbers of a potential by the names of its fields."""
     if not is_dataclass(potential) or isinstance(potential, type):
         return {}
     values = {field.name: getattr(potential, field.name) for field in fields(potential)}
@@ -136,19 +134,19 @@ def list_parameters(potential: object) -> dict[str, tuple[int, ...]]:
 
 
 def _check_potentials(scene: Scene, parameters: dict[str, Array]) -> dict[str, Array]:
-    """Return parameters (n, ...) as potentials have them. Raise `BadInput` for the first that none can be made of."""
+    """Return parameters (n, ...) as the constructor of the potential converts them. Raise `BadInput` for the first bad one."""
     n = len(next(iter(parameters.values())))
     bodies = Batch(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
     suspects = getattr(static_part(scene.potential), "suspects", None)
     bad = np.ones(n, dtype=bool) if suspects is None else np.zeros(n, dtype=bool) | suspects(parameters)
     for values in parameters.values():
         bad |= ~_are_in_range(values)
-    found = {name: values.copy() for name, values in parameters.items()} if bad.any() else parameters
+    converted = {name: values.copy() for name, values in parameters.items()} if bad.any() else parameters
     for i in np.flatnonzero(bad).tolist():
         try:
             potential: Any = static_part(bodies.take_potential(i))
         except BadInput as refusal:
             raise BadInput(f"parameters[{refusal.argument!r}][{i}]", refusal.got, refusal.allowed) from None
-        for name, values in found.items():
-            values[i] = getattr(potential, name)  # which may be of another length, such as a direction
-    return {name: read_only(values) for name, values in found.items()}
+        for name, values in converted.items():
+            values[i] = getattr(potential, name)  # a direction is normalized
+    return {name: read_only(values) for name, values in converted.items()}

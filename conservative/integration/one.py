@@ -14,7 +14,7 @@ from ..errors import BadInput, Unsupported
 from ..grid import MOST_STEPS, grid_for
 from ..method import Method
 from ..methods.automatic import integrate_to_error
-from ..methods.between import Samples, grid_before, read_times, sample_between
+from ..methods.between import SampleTimes, grid_before, read_times, sample_between
 from ..methods.reduced import Reduced
 from ..methods.search import candidates
 from ..outcome import Progress
@@ -129,7 +129,8 @@ def integrate(
         at = read_times(t_eval, read_end(scene, t_end))
     try:
         if error is not None:
-            trajectory = _integrate_to(error, scene, method, dt, read_end(scene, t_end), sample_every, at, progress)
+            end, samples = read_target(scene, error, method, dt, t_end, sample_every, at)
+            trajectory = integrate_to_error(scene, error, end, samples, progress)
         else:
             method = read_method(method, scene)
             grid = grid_for(scene, DEFAULT_DT if dt is None else dt, t_end, sample_every if at is None else MOST_STEPS)
@@ -159,23 +160,29 @@ def read_end(scene: Scene, t_end: float | None) -> float:
     return scene.t_end if t_end is None else positive_number("t_end", t_end, "a finite duration above 0, s")
 
 
-def _integrate_to(
-    error: float,
+def read_target(
     scene: Scene,
-    method: Method | str | None,
+    error: object,
+    method: object,
     dt: float | None,
-    end: float,
+    t_end: float | None,
     sample_every: int,
-    at: Array | None,
-    progress: Callable[[Progress], object] | None,
-) -> Trajectory:
-    """Return the trajectory for a target error, rad, up to the time `end`, s."""
+    at: Array | None = None,
+) -> tuple[float, SampleTimes]:
+    """Return the duration, s, and the samples of a run with a target error, rad; `at` are the times of the samples, s.
+
+    Raises
+    ------
+    BadInput
+        An argument is invalid, or given together with an error that determines it.
+    """
     positive_number("error", error, "a finite attitude error above 0, rad")
     if method is not None:
         raise BadInput("method", describe(method), "None together with error, which chooses the method")
     if dt is not None and at is not None:
         allowed = "None together with error, which chooses the step, and t_eval, which has the samples"
         raise BadInput("dt", describe(dt), allowed)
+    end = read_end(scene, t_end)
     spacing = None if dt is None else grid_for(scene, dt, end).dt
-    samples = Samples(spacing, positive_integer("sample_every", sample_every), at)
-    return integrate_to_error(scene, error, end if at is None else at[-1] or end, samples, progress)
+    samples = SampleTimes(spacing, positive_integer("sample_every", sample_every), at)
+    return (end if at is None else float(at[-1]) or end), samples

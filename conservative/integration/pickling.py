@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ..attitude import Array
-from ..errors import require_extra
+from ..check import read_only
+from ..errors import require_extra, restore
 
 LOCK = threading.Lock()
-"""Held by `dump`: which modules are pickled by value is a setting of the whole process."""
+"""Held by `dump`, because the list of modules that are pickled by value belongs to the whole process."""
 
 
 class NotTransferable(TypeError):
@@ -34,11 +34,11 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
     Parameters
     ----------
     value
-        Anything.
+        Any value.
     shared
-        Objects that the other side has as well. The bytes only contain their places in this list.
+        Objects that the other side has as well. The bytes contain their places in this list instead.
     by_value
-        Modules that the other side cannot import: the bytes contain the functions and classes that the value takes from them.
+        Modules that the other side cannot import. The bytes contain their functions and classes that the value uses.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def dump(value: object, shared: Sequence[object] = (), by_value: Sequence[str] =
 
 
 def load(content: bytes, shared: Sequence[object] = ()) -> Any:
-    """Return the value of `dump`, with the objects `shared` in their places."""
+    """Return the value of bytes that `dump` returned, with the objects `shared` in their places."""
     return _Unpickler(io.BytesIO(content), shared).load()
 
 
@@ -102,30 +102,17 @@ def _reduce(value: Any) -> Any:
     if isinstance(value, type):
         return NotImplemented
     if type(value) is np.ndarray and not value.flags.writeable and not value.dtype.hasobject:
-        return _close_array, (value.copy(order="K"),)
-    if isinstance(value, BaseException):  # as it was, whatever arguments its constructor takes
-        return _make, (type(value), value.args, vars(value))
+        return read_only, (value.copy(order="K"),)
+    if isinstance(value, BaseException):  # whatever arguments its constructor takes
+        return restore, (type(value), value.args, vars(value))
     kind: Any = type(value)
-    kept = _names_kept(kind)
-    if not kept.isdisjoint(getattr(value, "__dict__", ())):
-        return _make, (kind, (), {name: part for name, part in vars(value).items() if name not in kept})
+    cached = _cached_names(kind)
+    if not cached.isdisjoint(getattr(value, "__dict__", ())):
+        return restore, (kind, (), {name: part for name, part in vars(value).items() if name not in cached})
     return NotImplemented
 
 
 @cache
-def _names_kept(kind: Any) -> frozenset[str]:
+def _cached_names(kind: Any) -> frozenset[str]:
     """Return the names of the cached properties of a class."""
     return frozenset(name for base in kind.__mro__ for name, what in vars(base).items() if isinstance(what, cached_property))
-
-
-def _close_array(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
-
-
-def _make(kind: type, args: tuple[Any, ...], state: dict[str, Any]) -> Any:
-    made: Any = kind.__new__(kind, *args)
-    if isinstance(made, BaseException):
-        made.args = args
-    vars(made).update(state)
-    return made

@@ -1,7 +1,7 @@
-"""Pictures of an ensemble: where a body axis points, how far attitudes are apart over time, and the drifts.
+"""Charts of an ensemble: the directions of a body axis, the spread of attitudes over time, and the drifts.
 
-Charts have a few thousand rows at most, for any number of bodies: counts and quantiles, found block by block. Directions are
-drawn on a disc by J. H. Lambert's equal-area projection (1772), so that equal areas are equal parts of the sphere.
+Charts have at most a few thousand rows for any number of bodies: counts and quantiles, computed block by block. Directions are
+drawn on a disc in J. H. Lambert's equal-area projection (1772).
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from .distributions import angle_quantiles, directions, mean_attitudes, project
 
 BLUE = "#0072B2"
 MOST_POINTS = 1000
-"""Largest number of bodies that are drawn as points; more are counted in cells."""
+"""Largest number of bodies that are drawn as points; more are drawn as counts in cells."""
 _CELLS, _SIDE = 41, 230
 _RINGS = (*(m * 10.0**k for k in range(-9, 1) for m in (1, 2, 5)), 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
 """Angles between rings, degrees."""
 _LEAST_EXTENT = 1e-7
-"""Smallest half side of a disc, rad: closer directions are one point."""
+"""Smallest half side of a disc, rad."""
 LEAST_DRAWN = 1e-17
-"""Relative drift at which smaller ones, including 0, are drawn: a tenth of the round-off of one number."""
+"""Relative drift at which smaller ones, including 0, are drawn."""
 MOST_TIMES = 200
-"""Largest number of samples of a line over time, evenly chosen."""
+"""Largest number of samples of a line over time."""
 _PER_DECADE = 4
 _WIDTH, _HEIGHT = 560, 170
 _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
@@ -39,31 +39,18 @@ _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
 
 
 def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcatChart:
-    """Return where a body axis points at the start and at the end, the spread of attitudes over time, and the drifts.
-
-    Parameters
-    ----------
-    ensemble
-        An `Ensemble`.
-    axis_B
-        The axis, a direction (3,) in body axes; default the axis of symmetry of body and field, else the third axis.
-
-    Raises
-    ------
-    BadInput
-        The axis is not a direction.
-    """
+    """Return the chart of an `Ensemble`; see `Ensemble.plot`."""
     axis, m = _read_axis(ensemble, axis_B), len(ensemble.t)
     along = np.flatnonzero(axis == 1)
     named = f"{along[0] + 1}" if len(along) else f"({', '.join(f'{each:.3g}' for each in axis)})"
     ends, shown = sorted({0, m - 1}), np.unique(np.linspace(0, m - 1, MOST_TIMES).astype(int)).tolist()
     discs = [
-        draw_pointing(found, f"Body axis {named} at t = {ensemble.t[sample]:.6g} s")
-        for sample, found in zip(ends, directions(ensemble.R_WB, axis, ends), strict=True)
+        draw_pointing(directions_W, f"Body axis {named} at t = {ensemble.t[sample]:.6g} s")
+        for sample, directions_W in zip(ends, directions(ensemble.R_WB, axis, ends), strict=True)
     ]
     quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, shown), shown)
-    beside = alt.hconcat(*discs, spacing=40).resolve_scale(color="independent")
-    rows = [beside, draw_spread(ensemble.t[shown], quantiles), draw_drifts(ensemble.drifts)]
+    first_row = alt.hconcat(*discs, spacing=40).resolve_scale(color="independent")
+    rows = [first_row, draw_spread(ensemble.t[shown], quantiles), draw_drifts(ensemble.drifts)]
     failed = f", {len(ensemble.failures):,} failed" if ensemble.failures else ""
     title = alt.Title(ensemble.bodies.scene.name, subtitle=[f"{len(ensemble):,} bodies{failed}", ensemble.label])
     chart: alt.VConcatChart = alt.vconcat(*rows, title=title, spacing=24).resolve_scale(color="independent")
@@ -72,8 +59,8 @@ def draw_ensemble(ensemble: Any, axis_B: ArrayLike | None = None) -> alt.VConcat
 
 def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
     if axis_B is None:
-        found = ensemble.bodies.take(0).symmetry_axis_B
-        return np.array([0.0, 0.0, 1.0]) if found is None else found
+        symmetry_axis_B = ensemble.bodies.take(0).symmetry_axis_B
+        return np.array([0.0, 0.0, 1.0]) if symmetry_axis_B is None else symmetry_axis_B
     allowed = "a direction of three finite numbers (3,), body axes, not all 0"
     axis = finite_array("axis_B", axis_B, ((3,),), allowed)
     if not axis.any():
@@ -82,7 +69,7 @@ def _read_axis(ensemble: Any, axis_B: ArrayLike | None) -> Array:
 
 
 def draw_spread(t: Array, quantiles: Array) -> alt.LayerChart:
-    """Return the median and the band of 90 % of angles from the mean attitude, (s, 3), rad, over times (s,), s."""
+    """Return a chart of the median and the 90 % band of angles from the mean attitude, (s, 3), rad, over times (s,), s."""
     low, middle, high = np.degrees(quantiles).T
     data = pd.DataFrame({"t": t, "low": low, "middle": middle, "high": high})
     positive = low[low > 0]
@@ -120,30 +107,30 @@ def draw_drifts(drifts: Mapping[str, Array]) -> alt.Chart:
 
 
 def _power_axis(low: float, high: float, form: str) -> Any:
-    """Return a logarithmic axis with a label at each power of ten, or at every second or third where they are many."""
+    """Return a logarithmic axis with a label at each power of ten, or fewer labels on a long axis."""
     first, last = math.floor(math.log10(low) + 1e-9), math.floor(math.log10(high) + 1e-9)
     return alt.Axis(format=form, values=[10.0**k for k in range(first, last + 1, 1 + (last - first) // 12)])
 
 
 def _edges(drifts: Iterable[Array]) -> Array:
-    """Return edges of bins, `_PER_DECADE` in each, of whole decades that all drifts (n,) are in."""
-    found = [np.maximum(values[np.isfinite(values)], LEAST_DRAWN) for values in drifts]
-    least = min((values.min() for values in found if len(values)), default=LEAST_DRAWN)
-    most = max((values.max() for values in found if len(values)), default=LEAST_DRAWN)
+    """Return the edges of bins, `_PER_DECADE` per decade, over the decades of all drifts (n,)."""
+    finite = [np.maximum(values[np.isfinite(values)], LEAST_DRAWN) for values in drifts]
+    least = min((values.min() for values in finite if len(values)), default=LEAST_DRAWN)
+    most = max((values.max() for values in finite if len(values)), default=LEAST_DRAWN)
     first = math.floor(math.log10(least))
     last = max(math.floor(math.log10(most)) + 1, first + 1)
     return np.asarray(10.0 ** np.linspace(first, last, (last - first) * _PER_DECADE + 1))
 
 
 def _drift_rows(name: str, values: Array, edges: Array) -> pd.DataFrame:
-    """Return the number of bodies in each bin; half a body, below the axis, for an empty one."""
+    """Return the number of bodies in each bin. An empty bin gets half a body, which is below the axis."""
     finite = np.clip(values[np.isfinite(values)], edges[0], edges[-1])
     counts, _ = np.histogram(finite, edges)
     return pd.DataFrame({"of": name, "drift": edges, "bodies": np.maximum([*counts, 0], 0.5)})
 
 
 def draw_pointing(directions_W: Array, title: str) -> Any:
-    """Return where n bodies point, unit vectors (n, 3), world axes: as points, or counted in cells of a disc, with rings."""
+    """Return a disc with the directions of n bodies, unit vectors (n, 3), world axes, as points or as counts in cells."""
     points, mean = project(directions_W)
     extent = max(float(np.linalg.norm(points, axis=1).max(initial=0.0)) * 1.06, _LEAST_EXTENT)  # all points are in the square
     if len(points) <= MOST_POINTS:

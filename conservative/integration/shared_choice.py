@@ -1,9 +1,9 @@
 """Choose one method and one step for many bodies: chosen on a few of them, verified on others.
 
-All bodies share the step, so the most demanding body determines it. The measure is the fastest rotation that the energy of a
-body allows, sqrt(2 E / J_min): the truncation error of a step grows with a power of its angle. Random bodies may show what this
-measure misses, such as a start near a separatrix, which amplifies errors without faster rotation. Nothing is known about bodies
-that are not tried.
+All bodies share the step, so the most demanding body determines it: the one whose energy allows the fastest rotation,
+sqrt(2 E / J_min), because the truncation error of a step grows with a power of its angle. Random bodies may show other causes,
+such as an initial state near a separatrix, which amplifies errors without faster rotation. Nothing is known about bodies that
+are not tried.
 
 1. The automatic choice (`conservative.methods.search`) finds method and step for the most demanding body.
 2. The step is cut until the estimates of the `HARDEST` and of `RANDOM` other bodies are within the error, or stall.
@@ -23,7 +23,7 @@ from ..errors import AccuracyNotReached
 from ..grid import Grid
 from ..method import Method
 from ..methods.automatic import cut_step, grid_of
-from ..methods.between import Samples
+from ..methods.between import SampleTimes
 from ..methods.search import find_cheapest
 from ..methods.trials import Estimate, trials_of
 from ..outcome import ChoiceForMany
@@ -34,10 +34,10 @@ SEED = 14
 """Seed of the random bodies, so that the same ensemble gets the same step."""
 ROUNDS = 3
 LONGEST = 0.8
-"""Share of the longest step of the bodies that are tried, if accuracy does not depend on the step."""
+"""Step as a share of the longest possible one, for methods whose accuracy does not depend on the step."""
 
 
-def choose_for_all(bodies: Batch, error: float, t_end: float, samples: Samples) -> ChoiceForMany:
+def choose_for_all(bodies: Batch, error: float, t_end: float, samples: SampleTimes) -> ChoiceForMany:
     """Return a method and a step for all bodies, for an attitude error, rad, of a run to t_end, s, with these samples.
 
     The warning `AccuracyNotReached` is given if a body that was tried has a larger error.
@@ -69,7 +69,7 @@ def choose_for_all(bodies: Batch, error: float, t_end: float, samples: Samples) 
         chosen, verified = [*chosen, number], [i for i in verified if i != number]
     choice = ChoiceForMany(method, dt, error, max(worst.total, estimate), attempts, len(numbers), grid)
     if not choice.reached:
-        warnings.warn(AccuracyNotReached(error, choice.estimate), stacklevel=4)
+        warnings.warn(AccuracyNotReached(error, choice.estimate), stacklevel=3)
     return choice
 
 

@@ -1,8 +1,8 @@
 """Random initial states and bodies near those of a scene, for `integrate_many`.
 
 Every quantity has its own stream of random numbers, drawn body by body. So the first bodies of a large ensemble are those of a
-small one, and the spread of one quantity changes no other. Attitudes distributed evenly over all rotations are drawn as in
-K. Shoemake, Uniform random rotations (1992).
+small one, and the spread of one quantity does not change another. Uniformly distributed attitudes are drawn as in K. Shoemake,
+Uniform random rotations (1992).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from ..scene import Scene
 from . import inputs
 
 START_BYTES = 400
-"""Memory that a body takes with its inertia, bytes, where its start is drawn and then read."""
+"""Memory for drawing and checking the initial values of a body, bytes."""
 _PIECE = 1 << 16
-"""Bodies whose attitudes are computed at once: what that takes besides stays below 50 MB."""
+"""Number of attitudes that are computed at once, which limits the intermediate results to 50 MB."""
 _ROUND_OFF = 1e-12
-"""What a second moment of mass may be below 0, relative to the largest moment of inertia: a plate's is 0."""
+"""Limit on a negative second moment of mass, relative to the largest moment of inertia: that of a plate is 0."""
 
 _ANY = "any"
-"""Text for directions or attitudes that are evenly distributed instead."""
+"""Value for uniformly distributed directions or attitudes."""
 _TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s]\S*)?\s*")
 _ANGLES = {"": 1.0, "rad": 1.0, "deg": math.pi / 180}
 _RATES = {"": 1.0, "rad/s": 1.0, "deg/s": math.pi / 180, "%": 0.01}
@@ -43,7 +43,7 @@ _SHARE = "a standard deviation above 0% and up to 100%, such as 1%"
 
 
 class Starts(TypedDict, total=False):
-    """What `integrate_many` is given: attitudes and rates, and where they vary inertia and numbers of the potential."""
+    """Arguments of `integrate_many`: attitudes and rates, and inertia and numbers of the potential if they vary."""
 
     R_WB0: Array
     w_WB_B0: Array
@@ -107,23 +107,23 @@ def spread(
     checked: object = seed
     if isinstance(checked, bool) or not isinstance(checked, Integral) or checked < 0:
         raise BadInput("seed", describe(seed), "an integer of 0 or more")
-    found = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
+    starts = Starts(R_WB0=_draw_attitudes(scene, count, attitude, seed), w_WB_B0=_draw_rates(scene, count, rate, seed))
     varied = {name: _draw_parameter(scene, name, count, value, seed) for name, value in (parameters or {}).items()}
     if inertia is not None:
-        found["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
-        varied |= _follow_inertia(scene, found["inertia"])
+        starts["inertia"] = _draw_inertia(scene, count, _read_share("inertia", inertia), seed)
+        varied |= _follow_inertia(scene, starts["inertia"])
     if varied:
-        found["parameters"] = varied
-    return found
+        starts["parameters"] = varied
+    return starts
 
 
 def list_parameters(scene: Scene) -> list[str]:
-    """Return the names of what `spread` can vary of a scene's potential: its numbers and vectors."""
+    """Return the names of the numbers and vectors of a scene's potential, which `spread` can vary."""
     return [name for name, shape in inputs.list_parameters(scene.potential).items() if shape in ((), (3,))]
 
 
 def _read(argument: str, value: object, units: Mapping[str, float], allowed: str) -> tuple[float, bool]:
-    """Return a standard deviation, given as a number or a text with one of the units, and whether it is relative."""
+    """Return a standard deviation from a number or a text with one of the units, and whether it is relative."""
     match = _TEXT.fullmatch(value) if isinstance(value, str) else None
     number, unit = (float(match[1]), match[2] or "") if match else (real_number(value), "")
     if number is None or unit not in units or not 0 < number * units[unit] < math.inf:
@@ -140,7 +140,7 @@ def _read_share(argument: str, value: object) -> float:
 
 
 def _find_size(argument: str, value: object, centre: Array, unit: str) -> float:
-    """Return the size of a number () or a vector (3,) in `unit`, to which `value` is relative. Raise `BadInput` if it is 0."""
+    """Return the magnitude of a number () or a vector (3,), to which `value` is relative. Raise `BadInput` if it is 0."""
     size = float(np.linalg.norm(centre))
     if size == 0:
         raise BadInput(argument, f"{describe(value)} of 0", f"a standard deviation in {unit}, such as 0.1")
@@ -152,32 +152,28 @@ def _is_any(value: object) -> bool:
 
 
 def _stream(seed: int, name: str, again: int = 0) -> np.random.Generator:
-    """Return the random numbers of one quantity; `again` says how often some were drawn before."""
+    """Return the random numbers of a quantity; `again` is the number of earlier draws."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(*name.encode(), again)))
 
 
 def _draw_attitudes(scene: Scene, n: int, value: object, seed: int) -> Array:
     """Return attitudes (n, 3, 3), body to world."""
-    found = np.empty((n, 3, 3))
-    found[:] = scene.R_WB0
+    R_WB0 = np.empty((n, 3, 3))
+    R_WB0[:] = scene.R_WB0
     if value is None:
-        return found
-    even, stream = _is_any(value), _stream(seed, "attitude")
-    deviation = 0.0 if even else _read("attitude", value, _ANGLES, _ANGLE)[0]
+        return R_WB0
+    uniform, stream = _is_any(value), _stream(seed, "attitude")
+    deviation = 0.0 if uniform else _read("attitude", value, _ANGLES, _ANGLE)[0]
     for start in range(0, n, _PIECE):
-        part = found[start : start + _PIECE]
-        if even:
+        part = R_WB0[start : start + _PIECE]
+        if uniform:
             q = stream.standard_normal((len(part), 4))
             part[:] = from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
         else:
-            part[:] = scene.R_WB0 @ _turns(deviation * stream.standard_normal((len(part), 3)))
-    return found
-
-
-def _turns(vectors: Array) -> Array:
-    """Return the rotations (n, 3, 3) of rotation vectors (n, 3), rad."""
-    half = np.linalg.norm(vectors, axis=1, keepdims=True) / 2
-    return from_quaternion(np.hstack([np.cos(half), np.sinc(half / math.pi) / 2 * vectors]))
+            turns = deviation * stream.standard_normal((len(part), 3))
+            half = np.linalg.norm(turns, axis=1, keepdims=True) / 2
+            part[:] = scene.R_WB0 @ from_quaternion(np.hstack([np.cos(half), np.sinc(half / math.pi) / 2 * turns]))
+    return R_WB0
 
 
 def _draw_rates(scene: Scene, n: int, value: object, seed: int) -> Array:
@@ -195,30 +191,30 @@ def _draw_rates(scene: Scene, n: int, value: object, seed: int) -> Array:
 
 
 def _draw_shares(seed: int, name: str, shape: tuple[int, ...], deviation: float) -> Array:
-    """Return shares (n, ...), normally distributed about 1; those that are not above 0 are drawn again."""
-    found, again = 1 + deviation * _stream(seed, name).standard_normal(shape), 0
-    while (wrong := found <= 0).any():
+    """Return shares (n, ...), normally distributed about 1. Shares of 0 or less are drawn again."""
+    shares, again = 1 + deviation * _stream(seed, name).standard_normal(shape), 0
+    while (wrong := shares <= 0).any():
         again += 1
-        found[wrong] = 1 + deviation * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
-    return found
+        shares[wrong] = 1 + deviation * _stream(seed, name, again).standard_normal(np.count_nonzero(wrong))
+    return shares
 
 
 def _draw_inertia(scene: Scene, n: int, deviation: float, seed: int) -> Array:
-    """Return principal moments (n, 3), where the body axes are the principal ones, or tensors (n, 3, 3), kg m^2."""
+    """Return principal moments (n, 3) if the body axes are the principal ones, otherwise tensors (n, 3, 3), kg m^2."""
     moments, R_BP = scene.body.moments, scene.body.R_BP
     planes = moments.sum() / 2 - moments
     if planes.min() < -_ROUND_OFF * moments.max():
         got = f"a spread for principal moments {moments.tolist()}"
-        raise BadInput("inertia", got, "moments of a body, of which none is larger than the sum of the others")
+        raise BadInput("inertia", got, "moments of a body: none is larger than the sum of the others")
     varied = planes * _draw_shares(seed, "inertia", (n, 3), deviation)
     drawn = varied.sum(axis=1, keepdims=True) - varied
     return drawn if np.array_equal(R_BP, np.eye(3)) else (R_BP * drawn[:, None, :]) @ R_BP.T
 
 
 def _follow_inertia(scene: Scene, inertia: Array) -> dict[str, Array]:
-    """Return the inertia for a potential that has the body's, as tensors (n, 3, 3), kg m^2."""
+    """Return the inertia, as tensors (n, 3, 3), kg m^2, by its name if it is also a number of the potential."""
     if scene.potential is not static_part(scene.potential) and hasattr(static_part(scene.potential), "inertia"):
-        got = "a spread in a field that turns, and has the inertia of the scene's body itself"
+        got = "a spread in a turning field with the inertia of the scene's body"
         raise BadInput("inertia", got, "none: all bodies of such a field have the scene's inertia")
     if not hasattr(scene.potential, "inertia"):
         return {}
@@ -237,12 +233,12 @@ def _draw_parameter(scene: Scene, name: str, n: int, value: object, seed: int) -
         deviation *= _find_size(argument, value, centre, "its unit")
         if not centre.ndim:
             return np.asarray(centre * _draw_shares(seed, argument, (n,), _read_share(argument, value)))
-    found = centre + deviation * _stream(seed, argument).standard_normal((n, *centre.shape))
-    return found / np.linalg.norm(found, axis=1, keepdims=True) if _is_direction(scene, name) else found
+    numbers = centre + deviation * _stream(seed, argument).standard_normal((n, *centre.shape))
+    return numbers / np.linalg.norm(numbers, axis=1, keepdims=True) if _is_direction(scene, name) else numbers
 
 
 def _is_direction(scene: Scene, name: str) -> bool:
-    """Return whether the potential makes a unit vector of what it is given for a field."""
+    """Return whether the potential normalizes this vector."""
     potential: Any = scene.potential
     value = getattr(potential, name)
     return np.ndim(value) == 1 and np.allclose(getattr(replace(potential, **{name: 2 * value}), name), value, rtol=1e-12)

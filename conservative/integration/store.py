@@ -14,9 +14,8 @@ checksums match, and a run that is resumed computes every other block: those it 
 damaged since. Zarr writes a chunk under another name and renames it, so a kill or a full disk leaves no partial chunk. Chunks
 are not forced to the disk one by one; a power failure can lose some, which a resumed run then computes again.
 
-The attributes of the group describe the run, with a digest of the numbers that differ from body to body. The scene is stored as
-numbers and texts. Functions in it, such as those of `FunctionPotential`, cannot be stored: a digest of their code shows whether
-a scene is the same.
+The attributes of the group describe the run, including the scene (`scene_record`) and digests of the numbers that differ from
+body to body.
 
 Source: Zarr's specification, version 3.
 """
@@ -29,12 +28,9 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
-from functools import partial
-from importlib import import_module
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from types import CodeType, FunctionType, MethodType
 from typing import Any
 
 import numpy as np
@@ -42,7 +38,7 @@ import numpy as np
 from .. import files
 from ..attitude import Array
 from ..batch import Batch
-from ..check import build_unchecked, describe, read_only
+from ..check import read_only
 from ..drifts import list_drifts
 from ..errors import (
     BadInput,
@@ -60,13 +56,13 @@ from ..grid import Grid
 from ..outcome import Outcome, OutcomeKind
 from ..scene import Scene
 from ..version import VERSION
-from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, count_bodies
+from .blocks import MOST_BYTES, SAMPLE_BYTES, BlockResult, list_blocks
+from .scene_record import find_scene, is_same_motion, record_scene
 
 FORMAT, FORMAT_VERSION = "conservative ensemble", 1
 NEW_FOLDER = "a folder that is not there yet, in one that can be written, on a disk with room for it"
-_ROOM = "a disk with room for it; blocks that are done are kept, and resume=True goes on from there"
-_WHOLE = "one that is whole: integrate_many with the same arguments and resume=True computes the rest"
-_UNREADABLE = "an ensemble that can be read, or a new folder"
+_ROOM = "a disk with room for it; finished blocks stay there, and resume=True computes the others"
+_WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest"
 _RESULTS = ("R_WB", "w_WB_B", "drifts", "outcome", "failure")
 _CHECKSUM_BYTES = 4
 _KINDS = tuple(str(kind) for kind in OutcomeKind)
@@ -75,14 +71,14 @@ _FAILURES = {kind.__name__: kind for kind in (NotConverged, WrongBranch, Diverge
 
 @dataclass(frozen=True, eq=False)
 class Store:
-    """An ensemble in a folder, open for reading and perhaps for writing.
+    """An open ensemble in a folder.
 
     Attributes
     ----------
     place, record
-        The folder, and the attributes of its group, as `describe_run` returns them.
+        The folder, and the attributes of its group (`describe_run`).
     arrays
-        The arrays of Zarr that have a row for each body, by their names.
+        The arrays of Zarr with a row for each body, by name.
     """
 
     place: Path
@@ -109,7 +105,7 @@ class Store:
         return True
 
     def is_whole(self, first: int) -> bool:
-        """Return whether all chunks of the block are there and have the checksums that they were written with."""
+        """Return whether all chunks of the block are there and have the right checksums."""
         if not self.is_there(first):
             return False
         try:
@@ -125,7 +121,7 @@ class Store:
         Raises
         ------
         NotWritten
-            The disk is full, or the folder cannot be written any more. Blocks that are done stay done.
+            The disk is full, or the folder cannot be written any more. Finished blocks stay there.
         """
         kinds, failures = np.full(len(result), _KINDS.index(OutcomeKind.OK), np.uint8), np.full(len(result), "", object)
         for i, failure in result.failures.items():
@@ -137,19 +133,47 @@ class Store:
         except OSError as error:
             raise NotWritten("path", self.place, error, _ROOM) from None
 
-    def read_failures(self) -> dict[int, IntegrationFailed]:
-        """Return the failures by the numbers of the bodies."""
-        failed = np.flatnonzero(self.arrays["outcome"][:] != _KINDS.index(OutcomeKind.OK)).tolist()
-        texts = self.arrays["failure"][:] if failed else ()
-        return {i: _restore_failure(texts[i]) for i in failed}
+    def read_results(self) -> tuple[dict[str, Array], dict[int, IntegrationFailed]]:
+        """Return the drifts (n,) by name, and the failures by the numbers of the bodies.
+
+        Raises
+        ------
+        BadInput
+            A block is damaged.
+        """
+        try:
+            drifts, kinds = self.arrays["drifts"][:], self.arrays["outcome"][:]
+            failed = np.flatnonzero(kinds != _KINDS.index(OutcomeKind.OK)).tolist()
+            texts = self.arrays["failure"][:] if failed else ()
+        except ValueError as error:  # a checksum
+            raise BadInput("path", f"{str(self.place)!r}, an ensemble that is damaged ({error})", _WHOLE) from None
+        names = self.arrays["drifts"].attrs["names"]
+        return dict(zip(names, drifts.T, strict=True)), {i: _restore_failure(texts[i]) for i in failed}
+
+    def read_bodies(self, scene: Scene | None) -> Batch:
+        """Return the bodies. Their initial states and parameters stay on the disk. See `open_ensemble` for the scene.
+
+        Raises
+        ------
+        BadInput
+            The scene is missing, or another one.
+        """
+        inputs: dict[str, dict[str, Any]] = {"start": {}, "parameters": {}}
+        for name in self.record["digests"]:
+            group, _, own = name.partition("/")
+            inputs[group][own] = _OnDisk(self.arrays[name])
+        scene, start, n = find_scene(self.record["scene"], scene), inputs["start"], self.record["bodies"]
+        R_WB0 = start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3)))
+        w_WB_B0 = start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3)))
+        return Batch(scene, R_WB0, w_WB_B0, start.get("inertia"), inputs["parameters"])
 
 
 def _record_failure(failure: IntegrationFailed) -> str:
+    """Return a failure as JSON: the arguments of its class, or the outcome of a class of the user's."""
     name = type(failure).__name__
     known = _FAILURES.get(name) is type(failure)
-    values = vars(failure if known else failure.outcome)
-    kept = {key: value for key, value in values.items() if key != "outcome"}
-    return json.dumps({"type": name if known else "", **kept}, default=lambda number: number.item())
+    values = {key: value for key, value in vars(failure if known else failure.outcome).items() if key != "outcome"}
+    return json.dumps({"type": name if known else "", **values}, default=lambda number: number.item())
 
 
 def _restore_failure(text: str) -> IntegrationFailed:
@@ -164,42 +188,41 @@ def _restore_failure(text: str) -> IntegrationFailed:
 
 @contextmanager
 def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume: bool = False) -> Iterator[Store]:
-    """Yield the store of a run, a new one unless it is there. No other process can write to it in the block.
+    """Yield the store of a run, which no other process can write to in the block.
 
-    Parameters
-    ----------
-    path
-        Its folder.
-    label, bodies, grid
-        The label of the method, the n bodies, and the steps in s.
-    resume
-        Whether the folder may be there, with some blocks of the same run.
+    The folder is created or, with `resume`, may contain some blocks of the same run. `label` is that of the method.
 
     Raises
     ------
     BadInput
-        The folder is there and `resume` is False, or it is something else or of another run, or another process writes to it.
+        The folder contains something else, another run, or an ensemble although `resume` is False; or another process writes
+        to it.
     NotWritten
-        The folder cannot be made or written.
+        The folder cannot be created or written.
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
     """
-    place, record, there = Path(path).absolute(), describe_run(label, bodies, grid), find_ensemble(path, resume)
-    if there is None:
+    place, record, stored = Path(path).absolute(), describe_run(label, bodies, grid), find_ensemble(path, resume)
+    if stored is None:
+
+        def make_folder(fresh: Path) -> int:
+            fresh.mkdir()
+            return os.open(fresh, os.O_RDONLY)
+
         try:
-            with files.temporary(place, _make_folder) as (fresh, _):
+            with files.temporary(place, make_folder) as (fresh, _):
                 _create(fresh, record, bodies, grid)
                 fresh.rename(place)
         except OSError as error:
             raise NotWritten("path", place, error, NEW_FOLDER) from None
-    elif differing := _list_differences(there, record):
-        got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differing)}"
+    elif differences := _list_differences(stored, record):
+        got = f"{str(place)!r}, an ensemble of another run: {'; '.join(differences)}"
         raise BadInput("path", got, "an ensemble of the same run")
     handle = os.open(place, os.O_RDONLY)
     try:
         if not files.try_lock(handle):
             raise BadInput("path", f"{str(place)!r}, which another process writes to", "a folder of its own")
-        for leftover in place.rglob("*.partial"):  # what a kill has left of a chunk
+        for leftover in place.rglob("*.partial"):  # of a chunk, after a kill
             files.remove(leftover)
         yield _open(place, record, "r+")
     finally:
@@ -207,21 +230,22 @@ def write_store(path: str | Path, label: str, bodies: Batch, grid: Grid, resume:
 
 
 def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
-    """Return the attributes of the ensemble in a folder to write to, None for a folder that is empty or not there yet.
+    """Return the attributes of the ensemble in a folder to write to; None if the folder is empty or does not exist.
 
     Raises
     ------
     BadInput
-        There is an ensemble and `resume` is False, or something else.
+        The folder contains an ensemble and `resume` is False, or something else.
     NotWritten
-        The folder cannot be made.
+        The folder cannot be created.
     MissingExtra
         Zarr, of the extra `ensembles`, is not installed.
     """
     require_extra("path", "ensembles")
     place = Path(path).absolute()
     try:
-        there = os.listdir(place)  # noqa: PTH208  # which says whether it is a folder, too
+        if not any(place.iterdir()):
+            return None
     except FileNotFoundError as error:
         if not place.parent.is_dir():
             raise NotWritten("path", place, error, NEW_FOLDER) from None
@@ -230,22 +254,14 @@ def find_ensemble(path: str | Path, resume: bool) -> dict[str, Any] | None:
         raise BadInput("path", f"{str(place)!r}, a file", NEW_FOLDER) from None
     except (OSError, ValueError) as error:
         raise NotWritten("path", place, error, NEW_FOLDER) from None
-    if not there:
-        return None
-    found = read_record(place)
+    record = read_record(place)
     if not resume:
-        got = f"{str(place)!r}, where an ensemble is"
-        raise BadInput("path", got, "a new folder, or resume=True to go on with this one")
-    return found
-
-
-def _make_folder(fresh: Path) -> int:
-    fresh.mkdir()
-    return os.open(fresh, os.O_RDONLY)
+        raise BadInput("path", f"{str(place)!r}, where an ensemble is", "a new folder, or resume=True to go on with this one")
+    return record
 
 
 def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) -> None:
-    """Make the group with no block in it."""
+    """Create the group, without blocks."""
     import zarr
     from zarr.codecs import Crc32cCodec
 
@@ -254,7 +270,7 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
     options: Any = {"compressors": (Crc32cCodec(),)}
 
     def add(name: str, shape: tuple[int, ...], axes: tuple[str, ...], kind: str = "float64", fill: Any = np.nan) -> Any:
-        # one block of bodies, and of a run with many samples so many that a chunk is not larger than a block is otherwise
+        # A chunk has one block of bodies, and at most as many samples as fit in the size of a block.
         samples = (min(m, max(1, MOST_BYTES // (SAMPLE_BYTES * block))),) if axes[1:2] == ("sample",) else ()
         chunks = (block, *samples, *shape[1 + len(samples) :])
         return group.create_array(
@@ -272,13 +288,10 @@ def _create(folder: Path, record: Mapping[str, Any], bodies: Batch, grid: Grid) 
 
 
 def list_inputs(bodies: Batch) -> dict[str, Array]:
-    """Return what differs from body to body, by the name of its array.
-
-    Attitudes are (n, 3, 3), body to world, rates (n, 3), rad/s, inertia (n, 3, 3), kg m^2, parameters (n, ...) in SI units.
-    """
+    """Return the initial values and parameters (n, ...) that differ from body to body, by the names of their arrays."""
     start = {"R_WB0": bodies.R_WB0, "w_WB_B0": bodies.w_WB_B0, "inertia": bodies.inertia}
-    found = {f"start/{name}": values for name, values in start.items() if values is not None and values.strides[0] != 0}
-    return found | {f"parameters/{name}": values for name, values in bodies.parameters.items()}
+    own = {f"start/{name}": values for name, values in start.items() if values is not None and values.strides[0] != 0}
+    return own | {f"parameters/{name}": values for name, values in bodies.parameters.items()}
 
 
 def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
@@ -293,20 +306,21 @@ def describe_run(label: str, bodies: Batch, grid: Grid) -> dict[str, Any]:
         "n_steps": grid.n_steps,
         "sample_every": grid.every,
         "bodies": len(bodies),
-        "block": min(count_bodies(grid), len(bodies)),
-        "scene": _record(bodies.scene),
+        "block": min(list_blocks(len(bodies), grid).step, len(bodies)),
+        "scene": record_scene(bodies.scene),
         "digests": {name: hashlib.sha256(values.data).hexdigest()[:16] for name, values in inputs.items()},
     }
 
 
-def _list_differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """Return how the attributes of an ensemble on the disk differ from those of a run, in words."""
+def _list_differences(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Return the differences between the attributes of a stored ensemble and those of a run, in words."""
     plain = ("version", "method", "dt", "n_steps", "sample_every", "bodies", "block")
-    found = [f"{name} {there.get(name)!r} there, {wanted[name]!r} here" for name in plain if there.get(name) != wanted[name]]
-    if not _is_same_scene(there["scene"], wanted["scene"]):
-        found.append("another scene")
-    before, now = there["digests"], wanted["digests"]
-    return found + [f"another {name.partition('/')[2]}" for name in before | now if before.get(name) != now.get(name)]
+    values = ((name, stored.get(name), wanted[name]) for name in plain)
+    differences = [f"{name} {before!r} there, {now!r} here" for name, before, now in values if before != now]
+    if not is_same_motion(stored["scene"], wanted["scene"]):
+        differences.append("another scene")
+    before, now = stored["digests"], wanted["digests"]
+    return differences + [f"another {name.partition('/')[2]}" for name in before | now if before.get(name) != now.get(name)]
 
 
 def read_record(place: Path, allowed: str = NEW_FOLDER) -> dict[str, Any]:
@@ -315,20 +329,20 @@ def read_record(place: Path, allowed: str = NEW_FOLDER) -> dict[str, Any]:
     Raises
     ------
     BadInput
-        There is no ensemble in this folder, or one of another version of the format.
+        The folder contains no ensemble, or one in another version of the format.
     """
     import zarr
 
     try:
-        found = zarr.open_group(place, mode="r", zarr_format=3).attrs.asdict()
+        record = zarr.open_group(place, mode="r", zarr_format=3).attrs.asdict()
     except Exception:  # not a Zarr group, or one that cannot be read
-        found = {}
-    if found.get("format") != FORMAT:
+        record = {}
+    if record.get("format") != FORMAT:
         raise BadInput("path", f"{str(place)!r}, which is not an ensemble", allowed)
-    if found.get("format_version") != FORMAT_VERSION:
-        got = f"{str(place)!r}, an ensemble in version {found.get('format_version')} of its format"
+    if record.get("format_version") != FORMAT_VERSION:
+        got = f"{str(place)!r}, an ensemble in version {record.get('format_version')} of its format"
         raise BadInput("path", got, f"version {FORMAT_VERSION}")
-    return found
+    return record
 
 
 def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
@@ -338,22 +352,13 @@ def _open(place: Path, record: Mapping[str, Any], mode: Any) -> Store:
         with zarr.config.set({"array.write_empty_chunks": True}):
             group = zarr.open_group(place, mode=mode, zarr_format=3)
             return Store(place, record, {name: group[name] for name in (*_RESULTS, *record["digests"])})
-    except Exception as error:  # KeyError where one is missing, and whatever else Zarr raises for metadata
-        raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", _UNREADABLE) from None
+    except Exception as error:  # KeyError for a missing array, and anything for damaged metadata
+        allowed = "an ensemble that can be read, or a new folder"
+        raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", allowed) from None
 
 
-def read_store(path: str | Path, scene: Scene | None = None) -> dict[str, Any]:
-    """Return the fields of the `Ensemble` in a folder; samples, starts and parameters stay on the disk.
-
-    The scene is the one of the run, needed only if it has functions of its own.
-
-    Raises
-    ------
-    BadInput
-        The folder is not an ensemble, or some of its blocks are missing or damaged; or the scene is missing, or another one.
-    MissingExtra
-        Zarr, of the extra `ensembles`, is not installed.
-    """
+def open_store(path: str | Path) -> Store:
+    """Return a complete store for reading. Raise `BadInput` or `MissingExtra` as `open_ensemble` does."""
     require_extra("open_ensemble", "ensembles")
     place = Path(path).absolute()
     record = read_record(place, "the folder of an ensemble that integrate_many has written")
@@ -362,35 +367,11 @@ def read_store(path: str | Path, scene: Scene | None = None) -> dict[str, Any]:
     if left > 0:
         got = f"{str(place)!r}, an ensemble of {n} bodies of which {left} were not integrated, or are missing or damaged"
         raise BadInput("path", got, _WHOLE)
-    try:
-        drifts, failures = store.arrays["drifts"][:], store.read_failures()
-    except ValueError as error:  # a checksum
-        raise BadInput("path", f"{str(place)!r}, an ensemble that is damaged ({error})", _WHOLE) from None
-    start: dict[str, Any] = {}
-    parameters: dict[str, Any] = {}
-    for name in record["digests"]:
-        group, _, own = name.partition("/")
-        (start if group == "start" else parameters)[own] = _OnDisk(store.arrays[name])
-    scene = _find_scene(record["scene"], scene)
-    return {
-        "bodies": Batch(
-            scene,
-            start.get("R_WB0", np.broadcast_to(scene.R_WB0, (n, 3, 3))),
-            start.get("w_WB_B0", np.broadcast_to(scene.w_WB_B0, (n, 3))),
-            start.get("inertia"),
-            parameters,
-        ),
-        "grid": Grid(record["dt"], record["n_steps"], record["sample_every"]),
-        "R_WB": store.arrays["R_WB"],
-        "w_WB_B": store.arrays["w_WB_B"],
-        "drifts": dict(zip(store.arrays["drifts"].attrs["names"], drifts.T, strict=True)),
-        "label": record["method"],
-        "failures": failures,
-    }
+    return store
 
 
 class _OnDisk:
-    """An array of Zarr whose parts are read-only NumPy arrays; of a row of numbers, numbers."""
+    """An array of Zarr. Its parts are read-only NumPy arrays or numbers."""
 
     def __init__(self, array: Any) -> None:
         self._array, self.shape = array, array.shape
@@ -399,110 +380,8 @@ class _OnDisk:
         return int(self.shape[0])
 
     def __getitem__(self, part: Any) -> Any:
-        found = np.asarray(self._array[part])
-        return read_only(found) if found.ndim else found[()]
+        values = np.asarray(self._array[part])
+        return read_only(values) if values.ndim else values[()]
 
     def __array__(self, *options: Any, **more: Any) -> Array:
         return np.asarray(self._array[:])
-
-
-_PACKAGE = __name__.partition(".")[0]
-_NOT_OF_MOTION = ("t_end", "dt", "group", "source")
-"""Fields of a scene that do not change the motion of its bodies on a given grid."""
-
-
-def _find_scene(record: Mapping[str, Any], scene: object) -> Scene:
-    """Return the scene of an ensemble, which is the one that is given, if one is."""
-    if scene is None:
-        try:
-            found = _restore(record)
-        except BadInput:
-            raise
-        except Exception:  # whatever is wrong with it
-            found = None
-        if not isinstance(found, Scene):
-            raise BadInput("path", "a scene that cannot be read", "an ensemble as `integrate_many` wrote it")
-        return found
-    if not isinstance(scene, Scene):
-        raise BadInput("scene", describe(scene), "None, or the Scene of the run")
-    if not record["fields"]["extra_invariants"]["tuple"]:
-        scene = scene.rename(scene.name, extra_invariants=())  # as they are of one body, integrate_many drops them for many
-    if not _is_same_scene(record, _record(scene)):
-        raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
-    return scene
-
-
-def _is_same_scene(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    a, b = (json.loads(json.dumps({**each["fields"], **dict.fromkeys(_NOT_OF_MOTION)})) for each in (one, other))
-    return bool(a == b)
-
-
-def _record(value: Any) -> Any:
-    """Return a value of this package as JSON, with a digest in place of functions and other objects."""
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, np.ndarray) and value.dtype == np.float64:
-        return {"array": value.tolist()}
-    if isinstance(value, tuple):
-        return {"tuple": [_record(each) for each in value]}
-    kind = type(value)
-    if is_dataclass(value) and kind.__module__.partition(".")[0] == _PACKAGE and "<" not in kind.__qualname__:
-        named = {field.name: _record(getattr(value, field.name)) for field in fields(value)}
-        return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
-    return {"digest": hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()[:16]}
-
-
-def _restore(record: Any) -> Any:
-    if not isinstance(record, dict):
-        return record
-    if "array" in record:
-        return read_only(np.array(record["array"], dtype=float))
-    if "tuple" in record:
-        return tuple(_restore(each) for each in record["tuple"])
-    if "digest" in record:
-        raise BadInput("scene", "None", "the scene of the run, by scene=: it has functions of its own, which are not stored")
-    module, _, name = record["type"].partition(":")
-    kind = getattr(import_module(module), name) if module.partition(".")[0] == _PACKAGE else None
-    if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise TypeError(f"no value of {record['type']}")
-    if record["fields"].keys() != {field.name for field in fields(kind)}:
-        raise TypeError(f"not the fields of {record['type']}")
-    return build_unchecked(kind, **{field: _restore(value) for field, value in record["fields"].items()})
-
-
-def _list_parts(value: Any, above: list[object]) -> Any:
-    """Return nested lists whose `repr` is the same in every process for a value that does the same.
-
-    A function is taken apart into its code and the values that it uses, because pickle's bytes of equal functions can differ
-    from one process to the next. `above` are the values that this one is a part of, and which may be parts of it.
-    """
-    value = getattr(value, "py_func", value)  # a function that numba has compiled
-    kind, inner = f"{type(value).__module__}.{type(value).__qualname__}", [*above, value]
-    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
-        return [kind, repr(value)]
-    if isinstance(value, np.ndarray | np.generic):
-        return [kind, value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
-    if any(each is value for each in above):
-        return [kind]
-    if isinstance(value, CodeType):
-        parts: list[Any] = [value.co_code, value.co_names, value.co_varnames, value.co_consts]
-    elif isinstance(value, FunctionType):
-        plain, known = (bool, int, float, complex, str, bytes, np.ndarray), value.__globals__
-        used = {name: known[name] for name in value.__code__.co_names if isinstance(known.get(name), plain)}
-        cells = [cell.cell_contents for cell in value.__closure__ or ()]
-        parts = [value.__code__, value.__defaults__, value.__kwdefaults__, used, cells]
-    elif isinstance(value, MethodType):
-        parts = [value.__func__, value.__self__]
-    elif isinstance(value, partial):
-        parts = [value.func, value.args, value.keywords]
-    elif isinstance(value, Mapping):
-        parts = [[key, value[key]] for key in sorted(value, key=repr)]
-    elif isinstance(value, set | frozenset):
-        parts = sorted(value, key=repr)
-    elif isinstance(value, list | tuple):
-        parts = list(value)
-    elif is_dataclass(value) and not isinstance(value, type):
-        parts = [[field.name, getattr(value, field.name)] for field in fields(value)]
-    else:  # a class, a function of C, or an object
-        parts = [getattr(value, "__qualname__", ""), {} if isinstance(value, type) else dict(getattr(value, "__dict__", {}))]
-    return [kind, [_list_parts(part, inner) for part in parts]]

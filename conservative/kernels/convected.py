@@ -24,14 +24,15 @@ def skew(a):
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-@brief
+@kernel
 def G(q):
     """(8): w = -1/2 G(q) qdot and G(q) p = -L, (3, 9). Linear in q, with G(a) b = -G(b) a."""
     out = np.zeros((3, 9))
-    q1, q2, q3 = q[0:3], q[3:6], q[6:9]
-    out[0, 3:6], out[0, 6:9] = -q3, q2
-    out[1, 0:3], out[1, 6:9] = q3, -q1
-    out[2, 0:3], out[2, 3:6] = -q2, q1
+    for i in range(3):
+        q1, q2, q3 = q[i], q[3 + i], q[6 + i]
+        out[0, 3 + i], out[0, 6 + i] = -q3, q2
+        out[1, i], out[1, 6 + i] = q3, -q1
+        out[2, i], out[2, 3 + i] = -q2, q1
     return out
 
 
@@ -39,11 +40,12 @@ def G(q):
 def C(q):
     """(5): derivative of the six Green strains by q, (6, 9). Linear in q, with C(a) b = C(b) a."""
     out = np.zeros((6, 9))
-    q1, q2, q3 = q[0:3], q[3:6], q[6:9]
-    out[0, 0:3], out[1, 3:6], out[2, 6:9] = q1, q2, q3
-    out[3, 3:6], out[3, 6:9] = q3, q2
-    out[4, 0:3], out[4, 6:9] = q3, q1
-    out[5, 0:3], out[5, 3:6] = q2, q1
+    for i in range(3):
+        q1, q2, q3 = q[i], q[3 + i], q[6 + i]
+        out[0, i], out[1, 3 + i], out[2, 6 + i] = q1, q2, q3
+        out[3, 3 + i], out[3, 6 + i] = q3, q2
+        out[4, i], out[4, 6 + i] = q3, q1
+        out[5, i], out[5, 3 + i] = q2, q1
     return out
 
 
@@ -71,11 +73,59 @@ def S(kappa):
     return times_identity(np.array([[k[0], k[5], k[4]], [k[5], k[1], k[3]], [k[4], k[3], k[2]]]))
 
 
-@brief
 def conjugate_momentum(q, L):
     """(12) on a rigid motion: [p1 p2 p3] = 1/2 Q hat(L), for which G(q) p = -L and (17) C(q) p = 0 hold, (9,)."""
-    Q = q.copy().reshape(3, 3).T
-    return (0.5 * (Q @ skew(L))).T.copy().reshape(9)
+    return (0.5 * (q.reshape(3, 3).T @ skew(L))).T.flatten()
+
+
+@kernel
+def multiply(A, B):
+    """A B (n, m). NumPy's product compiles in half a second for each kind of argument, and its `solve` in two."""
+    out = np.zeros((len(A), B.shape[1]))
+    for i in range(out.shape[0]):
+        for k in range(len(B)):
+            for j in range(out.shape[1]):
+                out[i, j] += A[i, k] * B[k, j]
+    return out
+
+
+@kernel
+def transpose(A):
+    """A' as an array of the same layout."""
+    out = np.empty((A.shape[1], len(A)))
+    for i in range(len(A)):
+        for j in range(A.shape[1]):
+            out[j, i] = A[i, j]
+    return out
+
+
+@kernel
+def apply(A, x):
+    """A x (n,)"""
+    out = np.zeros(len(A))
+    for i in range(len(A)):
+        for k in range(len(x)):
+            out[i] += A[i, k] * x[k]
+    return out
+
+
+@kernel
+def invert(A):
+    """The inverse of a positive definite matrix, for which elimination needs no pivots; not finite if it is singular."""
+    n = len(A)
+    left, out = A.copy(), np.eye(n)
+    for k in range(n):
+        over = 1.0 / left[k, k]
+        for j in range(n):
+            left[k, j] *= over
+            out[k, j] *= over
+        for i in range(n):
+            factor = left[i, k]
+            if i != k:
+                for j in range(n):
+                    left[i, j] -= factor * left[k, j]
+                    out[i, j] -= factor * out[k, j]
+    return out
 
 
 @brief
@@ -87,41 +137,44 @@ def residual_and_tangent(dt, J_inverse, V_star, dV_star, q0, p0, q1, p1):
     The projection of V_star in (25) and the multipliers (26) enter as one vector of six, kappa = lam + (C C')^-1 C V_star.
     """
     qb, pb = 0.5 * (q0 + q1), 0.5 * (p0 + p1)
-    nu = J_inverse @ (0.5 * (G(q0) @ p0 + G(q1) @ p1))
+    nu = apply(J_inverse, 0.5 * (apply(G(q0), p0) + apply(G(q1), p1)))
     Hn, Cq, Cp = H(nu), C(qb), C(pb)
-    Hq, Hp = Hn @ qb, Hn @ pb
-    CC = Cq @ Cq.T
+    Hq, Hp = apply(Hn, qb), apply(Hn, pb)
+    Ct = transpose(Cq)
+    inverse = invert(multiply(Cq, Ct))
     # (26), with the sign that follows from mu = -mean(G(p) q)
-    rhs = -(Cq @ Hp + Cp @ Hq)
+    rhs = -(apply(Cq, Hp) + apply(Cp, Hq))
     if V_star is not None:
-        rhs += Cq @ V_star
-    kappa = np.linalg.solve(CC, rhs)
-    # (27a), (27b)
-    r = np.empty(18)
-    r[:9] = (q1 - q0) - dt * Hq
-    r[9:] = (p1 - p0) - dt * Hp - dt * (Cq.T @ kappa)
+        rhs += apply(Cq, V_star)
+    kappa = apply(inverse, rhs)
+    force = apply(Ct, kappa)
     # (29): d(qb)/dq1 = d(pb)/dp1 = 1/2, d(nu)/dq1 = -1/2 J^-1 G(p1), d(nu)/dp1 = 1/2 J^-1 G(q1)
-    nu_q, nu_p = -0.5 * J_inverse @ G(p1), 0.5 * J_inverse @ G(q1)
-    Gq, Gp = G(qb).T.copy(), G(pb).T.copy()
-    Sk = S(kappa)
-    by_nu = Cq @ Gp + Cp @ Gq
-    rhs_q = -0.5 * (C(Hp) + Cp @ Hn) - by_nu @ nu_q
-    rhs_p = -0.5 * (Cq @ Hn + C(Hq)) - by_nu @ nu_p
+    nu_q, nu_p = -0.5 * multiply(J_inverse, G(p1)), 0.5 * multiply(J_inverse, G(q1))
+    Gq, Gp, Sk = transpose(G(qb)), transpose(G(pb)), S(kappa)
+    by_nu = multiply(Cq, Gp) + multiply(Cp, Gq)
     # from d(C C') kappa + C C' d(kappa) = d(rhs)
-    rhs_q -= 0.5 * (C(Cq.T @ kappa) + Cq @ Sk)
+    rhs_q = -0.5 * (C(Hp) + multiply(Cp, Hn) + C(force) + multiply(Cq, Sk)) - multiply(by_nu, nu_q)
+    rhs_p = -0.5 * (multiply(Cq, Hn) + C(Hq)) - multiply(by_nu, nu_p)
     if V_star is not None:
-        rhs_q += 0.5 * C(V_star) + Cq @ dV_star
-    kappa_u = np.linalg.solve(CC, np.hstack((rhs_q, rhs_p)))
-    one = np.eye(9)
-    K = np.empty((18, 18))
-    K[:9, :9] = one - dt * (0.5 * Hn + Gq @ nu_q)
-    K[:9, 9:] = -dt * (Gq @ nu_p)
-    K[9:, :9] = -dt * (Gp @ nu_q + 0.5 * Sk)
-    K[9:, 9:] = one - dt * (0.5 * Hn + Gp @ nu_p)
-    K[9:, :] -= dt * (Cq.T @ kappa_u)
-    if V_star is not None:
-        r[9:] += dt * V_star
-        K[9:, :9] += dt * dV_star
+        rhs_q += 0.5 * C(V_star) + multiply(Cq, dV_star)
+    projector = multiply(Ct, inverse)
+    K_qq, K_qp = 0.5 * Hn + multiply(Gq, nu_q), multiply(Gq, nu_p)
+    K_pq = 0.5 * Sk + multiply(Gp, nu_q) + multiply(projector, rhs_q)
+    K_pp = 0.5 * Hn + multiply(Gp, nu_p) + multiply(projector, rhs_p)
+    r, K = np.empty(18), np.eye(18)
+    for i in range(9):
+        # (27a), (27b)
+        r[i] = (q1[i] - q0[i]) - dt * Hq[i]
+        r[9 + i] = (p1[i] - p0[i]) - dt * Hp[i] - dt * force[i]
+        for j in range(9):
+            K[i, j] -= dt * K_qq[i, j]
+            K[i, 9 + j] -= dt * K_qp[i, j]
+            K[9 + i, j] -= dt * K_pq[i, j]
+            K[9 + i, 9 + j] -= dt * K_pp[i, j]
+            if V_star is not None:
+                K[9 + i, j] += dt * dV_star[i, j]
+        if V_star is not None:
+            r[9 + i] += dt * V_star[i]
     return r, K
 
 

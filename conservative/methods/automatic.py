@@ -19,7 +19,7 @@ from ..method import Method
 from ..outcome import Progress
 from ..scene import Scene
 from ..trajectory import Choice, Trajectory
-from .between import Samples, divide_step, sample_between, spread
+from .between import SampleTimes, divide_step, sample_between, spread
 from .search import even_grid, find_cheapest, step_factor, stops_falling
 from .trials import ASYMPTOTIC, Estimate, trials_of
 
@@ -32,7 +32,7 @@ def integrate_to_error(
     scene: Scene,
     error: float,
     t_end: float,
-    samples: Samples,
+    samples: SampleTimes,
     progress: Callable[[Progress], object] | None = None,
 ) -> Trajectory:
     """Return the trajectory with the cheapest method and step for an attitude error, rad, up to t_end, s; see its `choice`.
@@ -66,7 +66,7 @@ def integrate_to_error(
     if samples.at is not None:
         trajectory = sample_between(trajectory, method, grid, samples.at)
     if trajectory.ok and not choice.reached:
-        warnings.warn(AccuracyNotReached(error, total), stacklevel=4)
+        warnings.warn(AccuracyNotReached(error, total), stacklevel=3)
     return replace(trajectory, choice=choice)
 
 
@@ -108,7 +108,7 @@ def cut_step(
             return attempts
 
 
-def grid_of(dt: float, t_end: float, samples: Samples) -> Grid:
+def grid_of(dt: float, t_end: float, samples: SampleTimes) -> Grid:
     """Return a grid of an even number of steps of at most dt to t_end, both in s, that contains the samples.
 
     Raises

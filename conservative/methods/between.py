@@ -1,4 +1,4 @@
-"""Samples at any times: from the step before each of them, on by short steps of high order, to round-off.
+"""SampleTimes at any times: from the step before each of them, on by short steps of high order, to round-off.
 
 So a sample is as good as the steps that lead to it: no polynomial is put through steps, and no invariant is lost. Source: the
 coefficients are Dormand and Prince's, as in `conservative.methods.coefficients.explicit`; the rest is our own.
@@ -37,7 +37,7 @@ MOST_KEPT = 10**6
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class SampleTimes:
     """Which samples of a run are kept.
 
     Attributes

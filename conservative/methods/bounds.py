@@ -14,6 +14,7 @@ from ..grid import Grid
 from ..scene import Scene
 from ..trajectory import Bounds
 
+EPSILON = sys.float_info.epsilon
 LOOSEST = 1e-3
 """With a larger drift no run of ours is called ok, whatever the tolerance, the body and the number of steps."""
 ROUNDING, SOLVER = 4.0, 10.0
@@ -27,6 +28,6 @@ def bounds_of(scene: Scene, grid: Grid, tol: float = 0.0, orthonormality: float 
 
     `orthonormality` is None where it is kept no better than the invariants.
     """
-    rounding = ROUNDING * sys.float_info.epsilon * (10 + grid.n_steps) * scene.body.condition
+    rounding = ROUNDING * EPSILON * (10 + grid.n_steps) * scene.body.condition
     drift = min(LOOSEST, rounding + SOLVER * tol * grid.n_steps)
     return Bounds(drift, drift if orthonormality is None else orthonormality)

@@ -12,6 +12,7 @@ import numpy as np
 from ..attitude import Array
 from ..card import Card
 from ..check import positive_number
+from ..deferred_imports import kernels
 from ..errors import NotConverged
 from ..grid import Grid
 from ..method import Method, Role, Run
@@ -63,19 +64,18 @@ class Convected(Method):
 
     @in_own_units
     def prepare(self, scene: Scene, grid: Grid) -> Run:
-        from ..kernels.convected import G, conjugate_momentum
-
         q0 = scene.R_WB0.T.flatten()  # a copy: read-only and writeable arrays would be compiled for one by one
-        u0 = np.concatenate([q0, conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
+        u0 = np.concatenate([q0, kernels("convected").conjugate_momentum(q0, scene.body.momentum(scene.w_WB_B0))])  # 1)
         J_inverse = np.ascontiguousarray(scene.body.inverse)
         linearise = _linearise(scene, grid.dt, J_inverse)
 
         def run() -> Trajectory:
             with np.errstate(all="ignore"):  # what overflows is no solution, and the step fails
                 u, corrections, failure = _march(linearise, u0, grid, self.tol)
-            q, p = u[:, :9].copy(), u[:, 9:].copy()
-            L = np.array([-G(q_i) @ p_i for q_i, p_i in zip(q, p, strict=True)])
-            R_WB = np.swapaxes(q.reshape(-1, 3, 3), 1, 2)
+            q, p = u[:, :9].reshape(-1, 3, 3), u[:, 9:].reshape(-1, 3, 3)
+            R_WB = np.swapaxes(q, 1, 2)
+            M = p @ R_WB  # p_i . q_j
+            L = np.stack([M[:, 1, 2] - M[:, 2, 1], M[:, 2, 0] - M[:, 0, 2], M[:, 0, 1] - M[:, 1, 0]], axis=1)  # (8)
             done = grid.n_steps if failure is None else failure.step - 1
             work = Counters(steps=done, stages=done, iterations=corrections)
             return Trajectory(scene, grid.t[: len(u)], R_WB, L @ J_inverse, self.label, work, failure)
@@ -85,8 +85,7 @@ class Convected(Method):
 
 def _linearise(scene: Scene, dt: float, J_inverse: Array) -> Linearisation:
     """Return the residual (27) and tangent (29) of a scene as a function of the state at both ends of a step."""
-    from ..kernels.convected import finite_gradient, residual_and_tangent
-
+    residual_and_tangent, finite_gradient = kernels("convected").residual_and_tangent, kernels("convected").finite_gradient
     if scene.potential is None:
         return lambda u0, u1: residual_and_tangent(dt, J_inverse, None, None, u0[:9], u0[9:], u1[:9], u1[9:])
     field = scene.potential.kernel_field(np.eye(3))

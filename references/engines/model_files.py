@@ -1,8 +1,8 @@
 """Bodies out of model files, read by the engines' own parsers: MJCF by MuJoCo, URDF by Pinocchio.
 
-A body turns about its joint. What is welded to it moves with it and is included; bodies on further joints are not. A free body
-turns about its centre of mass. Body axes are those of the MJCF body or of the URDF link. A file is read in a process of its own
-with limits, because an MJCF file of one line can ask for 10^5 copies of a body, and of those again.
+A body turns about its joint. Bodies welded to it are included; bodies on further joints are not. A free body turns about its
+centre of mass. Body axes are those of the MJCF body or of the URDF link. Another process with limits reads the file, because an
+MJCF file of one line can contain 10^5 copies of a body, and 10^5 copies of each copy.
 """
 
 from __future__ import annotations
@@ -82,7 +82,12 @@ def _read(kind: str, path: object, name: object) -> MassDistribution:
     """Return the body that another process reads. Raise its errors here, and `BadInput` if it exceeds its limits."""
     _, package, engine = ENGINES[kind]
     version(package, engine)
-    text = _text_of(path)
+    try:
+        text = os.fsdecode(path)  # type: ignore[arg-type]
+    except TypeError:
+        raise BadInput("path", describe(path), "the path of a file") from None
+    if "\0" in text:
+        raise BadInput("path", describe(text), "the path of a file, without NUL")
     request = {"kind": kind, "path": text, "name": printable_text("name", name, "the name of a body, a text")}
     worker = python_worker({"OPENBLAS_NUM_THREADS": "1"}, MEMORY)
     try:
@@ -98,16 +103,6 @@ def _read(kind: str, path: object, name: object) -> MassDistribution:
     if "missing" in answer:
         raise MissingEngine(*answer["missing"])
     return MassDistribution(answer["mass"], answer["com_B"], answer["inertia_com"])
-
-
-def _text_of(path: object) -> str:
-    try:
-        text = os.fsdecode(path)  # type: ignore[arg-type]
-    except TypeError:
-        raise BadInput("path", describe(path), "the path of a file") from None
-    if "\0" in text:
-        raise BadInput("path", describe(text), "the path of a file, without NUL")
-    return text
 
 
 # ------------------------------------------------------------------------------------------------ in the other process
@@ -136,21 +131,24 @@ def read_mjcf(path: str, name: str) -> MassDistribution:
         raise _unusable(path, error, "an MJCF file that MuJoCo compiles") from None
     names = [model.body(number).name for number in range(1, model.nbody)]
     _require_name(path, name, names)
-    data = mj.MjData(model)
+    data = mj.MjData(model)  # in the reference configuration
     mj.mj_kinematics(model, data)
-    return _mujoco_body(mj, model, data, model.body(name).id)
-
-
-def _mujoco_body(mj: Any, model: Any, data: Any, body: int) -> MassDistribution:
-    """Return the body with everything welded to it, in the model's reference configuration."""
+    body = model.body(name).id
     origin, R_WB = data.xpos[body], data.xmat[body].reshape(3, 3)
     parts = []
     for part in np.flatnonzero(model.body_weldid == body):
         R_BI = R_WB.T @ data.ximat[part].reshape(3, 3)
         inertia = R_BI @ np.diag(model.body_inertia[part]) @ R_BI.T
         parts.append((float(model.body_mass[part]), R_WB.T @ (data.xipos[part] - origin), inertia))
+    mass = sum(m for m, _, _ in parts)
+    com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for m, c, J in parts:
+        d = c - com
+        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
     fixed_point = _mujoco_fixed_point(mj, model, data, body)
-    return _combine(parts, None if fixed_point is None else R_WB.T @ (fixed_point - origin))
+    lever = np.zeros(3) if fixed_point is None else com - R_WB.T @ (fixed_point - origin)
+    return MassDistribution(mass, lever, inertia)
 
 
 def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | None:
@@ -162,21 +160,14 @@ def _mujoco_fixed_point(mj: Any, model: Any, data: Any, body: int) -> Array | No
     turning = (int(mj.mjtJoint.mjJNT_BALL), int(mj.mjtJoint.mjJNT_HINGE))  # NumPy's integers never equal the enumeration's
     anchors = np.array([data.xanchor[joint] for joint in joints if model.jnt_type[joint] in turning])
     if not len(anchors):
-        others = [
-            model.body(b).name for b in range(1, model.nbody) if np.isin(model.jnt_type[_joints(model, b)], turning).any()
-        ]
-        raise _not_turning(model.body(body).name, others)
+        owners = model.jnt_bodyid[np.isin(model.jnt_type, turning)]
+        raise _not_turning(model.body(body).name, [model.body(owner).name for owner in np.unique(owners)])
     spread = np.abs(anchors - anchors[0]).max()
     if spread > _SAME_POINT * max(1.0, float(np.abs(anchors - data.xpos[body]).max())):
         allowed = "a body whose ball joint or hinges go through one point"
         raise BadInput("name", f"{model.body(body).name!r}, whose joints turn about points {spread:.3g} m apart", allowed)
     fixed_point: Array = anchors[0]
     return fixed_point
-
-
-def _joints(model: Any, body: int) -> slice:
-    first = int(model.body_jntadr[body])
-    return slice(first, first + int(model.body_jntnum[body]))
 
 
 def read_urdf(path: str, name: str) -> MassDistribution:
@@ -187,11 +178,7 @@ def read_urdf(path: str, name: str) -> MassDistribution:
         model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
     except ValueError as error:
         raise _unusable(path, error, "a URDF file that Pinocchio reads") from None
-    return _pinocchio_link(pin, model, path, name)
-
-
-def _pinocchio_link(pin: Any, model: Any, path: str, name: str) -> MassDistribution:
-    """Return the link with everything welded to it, which is one body for Pinocchio; its axes are those of its joint."""
+    # A link and the links welded to it are one body for Pinocchio, in the axes of its joint.
     links = {frame.name: frame for frame in model.frames if frame.type == pin.FrameType.BODY}
     _require_name(path, name, links)
     owners = {link for link, frame in links.items() if model.frames[frame.parentFrame].type == pin.FrameType.JOINT}
@@ -233,14 +220,3 @@ def _require_name(path: str, name: str, known: Iterable[str]) -> None:
 def _not_turning(name: str, others: list[str]) -> BadInput:
     allowed = "one that a joint turns" + (": " + ", ".join(others) if others else "; this file has none")
     return BadInput("name", f"{name!r}, which no joint turns", allowed)
-
-
-def _combine(parts: list[tuple[float, Array, Array]], fixed_point: Array | None) -> MassDistribution:
-    """Combine bodies of given mass, centre (3,) and inertia about it (3, 3), without a fixed point about their centre."""
-    mass = sum(m for m, _, _ in parts)
-    com = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
-    inertia = np.zeros((3, 3))
-    for m, c, J in parts:
-        d = c - com
-        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
-    return MassDistribution(mass, np.zeros(3) if fixed_point is None else com - fixed_point, inertia)

@@ -30,14 +30,6 @@ def engine_class(module: ModuleType) -> type[EngineMethod]:
     return method_class(module, EngineMethod)
 
 
-@lru_cache(maxsize=256)
-def _class_at(cls: type[EngineMethod], version: str) -> type[EngineMethod]:
-    if cls.version:
-        return _class_at(cls.__mro__[1], version)
-    names = {"version": version, "family": f"{cls.family}@{version}", "__module__": cls.__module__, "__doc__": cls.__doc__}
-    return type(cls.__name__, (cls,), names)
-
-
 class EngineMethod(AdapterMethod):
     """An engine in an environment of its own.
 
@@ -50,23 +42,22 @@ class EngineMethod(AdapterMethod):
     version: ClassVar[str] = ""
 
     @classmethod
+    @lru_cache(maxsize=256)
     def at_version(cls, version: str) -> type[EngineMethod]:
         """Return the class of a version, whose family is `exudyn@1.13.6`."""
-        return _class_at(cls, version)
+        if cls.version:
+            return cls.__mro__[1].at_version(version)  # type: ignore[attr-defined]
+        names = {"version": version, "family": f"{cls.family}@{version}", "__module__": cls.__module__, "__doc__": cls.__doc__}
+        return type(cls.__name__, (cls,), names)
 
     @property
     def environment(self) -> Environment:
         """The environment. Raises `MissingEnvironment` if it is not installed."""
-        return find_environment(self.engine, self.version)
-
-    @property
-    def engine(self) -> str:
-        """Name of the engine, without a version."""
-        return self.family.partition("@")[0]
+        return find_environment(self.family.partition("@")[0], self.version)
 
     @property
     def maker(self) -> Maker:
-        return Maker(self.engine, self.environment.version)
+        return Maker(self.environment.engine, self.environment.version)
 
     def prepare(self, scene: Scene, grid: Grid) -> Run:
         """Prepare the run in the worker. Raise `Unsupported` if this version does not support it."""

@@ -69,16 +69,13 @@ def install(requirement: str, source: Source | None = None, force: bool = False)
         old = find_environment(engine, version) if force else None
     except MissingEnvironment:
         old = None
-    lock = resolve(distribution, version, source) if old is None else _read_lock(old)
-    return _install(engine, distribution, lock, source, force)
-
-
-def _read_lock(environment: Environment) -> Lock:
+    if old is None:
+        return _install(engine, distribution, resolve(distribution, version, source), source, force)
     try:
-        text = (environment.folder / LOCK).read_text(encoding="utf-8")
+        text = (old.folder / LOCK).read_text(encoding="utf-8")
     except OSError:
-        raise BadInput("engine", f"{environment.engine}=={environment.version} without a lock", "`engines install`") from None
-    return Lock(environment.version, find_python(environment.python), text)
+        raise BadInput("engine", f"{engine}=={old.version} without a lock", "`engines install`") from None
+    return _install(engine, distribution, Lock(old.version, find_python(old.python), text), source, force)
 
 
 def install_build(engine: str, path: Path, source: Source) -> Installation:
@@ -94,7 +91,12 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
     """
     if path.suffix == ".whl" and path.is_file():
         distribution = distribution_of(engine)
-        version = _version_of(path, normal_name(distribution.package))
+        name, _, rest = path.name.partition("-")
+        package = normal_name(distribution.package)
+        if normal_name(name) != package or not re.fullmatch(r"[0-9][^-]*(-[^-]+){3,4}\.whl", rest):
+            raise BadInput("against", repr(path.name), f"a wheel of {package}")
+        version = rest.partition("-")[0].lower()
+        version += f"{'.' if '+' in version else '+'}{BUILD}{hashlib.sha256(path.read_bytes()).hexdigest()[:8]}"
         if existing := read_environment(folder_of_all() / engine / version):  # without a network
             return Installation(existing, False, import_trouble(existing, distribution))
         return _install(engine, distribution, resolve_wheel(distribution, path.resolve(), version, source), source)
@@ -104,16 +106,6 @@ def install_build(engine: str, path: Path, source: Source) -> Installation:
         raise BadInput("against", f"{str(path)!r}, which has to be built", "a wheel, or --allow-build, which runs its code")
     with tempfile.TemporaryDirectory(dir=temporary_folder(), prefix=f"build-{os.getpid()}-") as folder:
         return install_build(engine, build_wheel(path, Path(folder), source), source)
-
-
-def _version_of(wheel: Path, package: str) -> str:
-    """Return the version of a build. Raise `BadInput` if the file is not a wheel of the package."""
-    name, _, rest = wheel.name.partition("-")
-    if normal_name(name) != package or not re.fullmatch(r"[0-9][^-]*(-[^-]+){3,4}\.whl", rest):
-        raise BadInput("against", repr(wheel.name), f"a wheel of {package}")
-    version = rest.partition("-")[0].lower()
-    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()[:8]
-    return f"{version}{'.' if '+' in version else '+'}{BUILD}{digest}"
 
 
 def build_wheel(path: Path, folder: Path, source: Source, **variables: str) -> Path:
@@ -183,10 +175,22 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, _make_folder) as (scratch, _):
-            _fill(scratch, lock, source)
-            packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", interpreter_of(scratch)).splitlines())
-            Environment(engine, lock.version, scratch, _python_of(scratch), packages).write()
-            _replace(folder, scratch)
+            python = interpreter_of(scratch)
+            (scratch / LOCK).write_text(lock.text, encoding="utf-8")
+            run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, scratch)
+            options = ("--quiet", "--require-hashes", "--python", python)
+            run_uv("pip", "sync", *options, *source.options, scratch / LOCK)
+            packages = tuple(run_uv("pip", "freeze", "--quiet", "--python", python).splitlines())
+            ask = [str(python), "-I", "-c", "import platform; print(platform.python_version())"]
+            version = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
+            Environment(engine, lock.version, scratch, version, packages).write()
+            close_environment(folder)
+            with _removed(folder) if folder.exists() else nullcontext():
+                try:
+                    scratch.rename(folder)
+                except OSError:  # another process was faster
+                    if read_environment(folder) is None:
+                        raise
     except UvFailed as failure:
         raise BadInput("engine", f"{engine}=={lock.version}", f"a package that uv can install ({failure.summary})") from None
     except OSError as error:
@@ -199,28 +203,6 @@ def make(engine: str, lock: Lock, folder: Path, source: Source) -> Environment:
 def _make_folder(path: Path) -> int:
     path.mkdir()
     return os.open(path, os.O_RDONLY)
-
-
-def _fill(folder: Path, lock: Lock, source: Source) -> None:
-    (folder / LOCK).write_text(lock.text, encoding="utf-8")
-    run_uv("venv", "--quiet", "--relocatable", "--allow-existing", "--python", lock.python, folder)
-    options = ("--quiet", "--require-hashes", "--python", interpreter_of(folder))
-    run_uv("pip", "sync", *options, *source.options, folder / LOCK)
-
-
-def _python_of(folder: Path) -> str:
-    ask = [str(interpreter_of(folder)), "-I", "-c", "import platform; print(platform.python_version())"]
-    return subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
-
-
-def _replace(folder: Path, scratch: Path) -> None:
-    close_environment(folder)
-    with _removed(folder) if folder.exists() else nullcontext():
-        try:
-            scratch.rename(folder)
-        except OSError:  # another process was faster
-            if read_environment(folder) is None:
-                raise
 
 
 def import_trouble(environment: Environment, distribution: Distribution) -> str:

@@ -7,12 +7,13 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from conservative.errors import BadInput
 
-from .environment import Distribution, describe_versions, version_key
+from .environment import Distribution, version_key
 from .uv_command import UvFailed, run_uv
 
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9])?")
@@ -94,23 +95,40 @@ def resolve_wheel(distribution: Distribution, wheel: Path, version: str, source:
 
 def _compile(distribution: Distribution, requirement: str, version: str, source: Source) -> tuple[str, str]:
     """Return the path of the first Python for which there are wheels, and all requirements with their hashes."""
-    wanted = "\n".join([requirement, "numpy", *distribution.requirements])
-    package, tried, failure = distribution.package, [], None
+    package, requirements = distribution.package, "\n".join([requirement, "numpy", *distribution.requirements])
+    name, tried = f"{package}=={version}" if version else package, []
     for python, path in _pythons():
         tried.append(python)
         try:
-            return path, run_uv(*_COMPILE, *source.options, "--python", path, "-", stdin=wanted)
-        except UvFailed as error:
-            failure = error
-            if not error.no_wheel:
-                break
-    assert failure is not None
-    if not failure.no_wheel:
-        raise _as_bad_input(package, version, failure, source)
-    raise _no_wheel(package, version, wanted, tried, source)
+            return path, run_uv(*_COMPILE, *source.options, "--python", path, "-", stdin=requirements)
+        except UvFailed as failure:
+            if not failure.no_wheel:
+                raise _as_bad_input(package, name, version, failure, source) from None
+    others = []
+    for python in sorted(set(_PYTHONS).difference(tried)):
+        with suppress(UvFailed):
+            run_uv(*_COMPILE, *source.options, "--python-version", python, "-", stdin=requirements)
+            others.append(python)
+    needs = f"Python {' or '.join(others)} on this machine" if others else "another version, or --allow-build"
+    raise BadInput("version", f"{name!r}, which has no wheel for Python {' or '.join(tried)}", needs)
 
 
 _COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--generate-hashes")
+
+
+def _as_bad_input(package: str, name: str, version: str, failure: UvFailed, source: Source) -> BadInput:
+    if failure.says("there is no version of", "there are no versions of"):
+        newest = sorted(list_versions(package, source), key=version_key, reverse=True)
+        if not newest:
+            return BadInput("version", repr(name), "a version that exists")
+        nearest = next((each for each in newest if version_key(each) <= version_key(version)), newest[-1])
+        return BadInput("version", repr(name), f"{nearest} (nearest), or one of {', '.join(newest)}")
+    if failure.says("Failed to fetch", "error sending request", "network was disabled"):
+        return BadInput("engines", f"no answer for {name!r} from the package index", "a network, or --find-links FOLDER")
+    if failure.says("was not found in"):
+        place = "the package index" if source.find_links is None else str(source.find_links)
+        return BadInput("engine", repr(name), f"a package that {place} has")
+    return BadInput("engine", repr(name), f"a package that uv can install ({failure.summary})")
 
 
 def normal_name(package: str) -> str:
@@ -127,48 +145,19 @@ def _pythons() -> Iterator[tuple[str, str]]:
     """Yield version and path of the running Python, then of others on this machine, newest first."""
     ours = f"{sys.version_info.major}.{sys.version_info.minor}"
     yield ours, sys.executable
-    others = {".".join(entry["version"].split(".")[:2]): entry["path"] for entry in _installed()}
-    yield from ((python, others[python]) for python in _PYTHONS if python in others and python != ours)
-
-
-def _installed() -> list[dict[str, str]]:
-    """Return the Pythons on this machine that uv finds, and those of pyenv, whose shims uv does not follow."""
+    # uv finds Pythons on the path. It does not follow the shims of pyenv, so the folders of pyenv are added.
     path = [folder for folder in os.environ.get("PATH", "").split(os.pathsep) if Path(folder).name != "shims"]
     root = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
     path += [str(folder) for folder in sorted(root.glob("versions/*/bin"))]
     try:
-        listing = run_uv("python", "list", "--only-installed", "--output-format", "json", PATH=os.pathsep.join(path))
-        return [entry for entry in json.loads(listing) if entry.get("path") and entry.get("implementation") == "cpython"]
+        listing = json.loads(
+            run_uv("python", "list", "--only-installed", "--output-format", "json", PATH=os.pathsep.join(path))
+        )
     except (UvFailed, ValueError):
-        return []
-
-
-def _as_bad_input(package: str, version: str, failure: UvFailed, source: Source) -> BadInput:
-    wanted = f"{package}=={version}" if version else package
-    if failure.says("there is no version of", "there are no versions of"):
-        return BadInput("version", repr(wanted), describe_versions(version, list_versions(package, source)))
-    if failure.says("Failed to fetch", "error sending request", "network was disabled"):
-        return BadInput("engines", f"no answer for {wanted!r} from the package index", "a network, or --find-links FOLDER")
-    if failure.says("was not found in"):
-        place = "the package index" if source.find_links is None else str(source.find_links)
-        return BadInput("engine", repr(wanted), f"a package that {place} has")
-    return BadInput("engine", repr(wanted), f"a package that uv can install ({failure.summary})")
-
-
-def _no_wheel(package: str, version: str, wanted: str, tried: list[str], source: Source) -> BadInput:
-    """Return an error that names the Pythons that have a wheel."""
-    got = f"{package}=={version}" if version else package
-    others = [python for python in _PYTHONS if python not in tried and _resolves(python, wanted, source)]
-    needs = f"Python {' or '.join(sorted(others))} on this machine" if others else "another version, or --allow-build"
-    return BadInput("version", f"{got!r}, which has no wheel for Python {' or '.join(tried)}", needs)
-
-
-def _resolves(python: str, wanted: str, source: Source) -> bool:
-    try:
-        run_uv(*_COMPILE, *source.options, "--python-version", python, "-", stdin=wanted)
-    except UvFailed:
-        return False
-    return True
+        return
+    installed = [entry for entry in listing if entry.get("path") and entry.get("implementation") == "cpython"]
+    others = {".".join(entry["version"].split(".")[:2]): entry["path"] for entry in installed}
+    yield from ((python, others[python]) for python in _PYTHONS if python in others and python != ours)
 
 
 def list_versions(package: str, source: Source) -> list[str]:

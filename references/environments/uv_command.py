@@ -54,22 +54,20 @@ class UvFailed(RuntimeError):
         return " ".join(errors[-1].split())[:300] if errors else "uv ended with an error"
 
 
-@lru_cache(maxsize=1)
-def _program() -> str:
+def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -> str:
+    """Return the output of a command of uv. Raise `UvFailed`, or `BadInput` if the disk is full."""
     require_extra("conservative engines", "environments", "uv", "platformdirs")
     from uv import find_uv_bin
 
-    return find_uv_bin()
-
-
-def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -> str:
-    """Return the output of a command of uv. Raise `UvFailed`, or `BadInput` if the disk is full."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    configured = {} if set(_OF_UV) & set(kept) else _from_pip()
+    always = {"UV_PYTHON_DOWNLOADS": "never", "UV_NO_PROGRESS": "1", "NO_COLOR": "1"}
     done = subprocess.run(
-        [_program(), *map(str, arguments)],
+        [find_uv_bin(), *map(str, arguments)],
         input=stdin,
         stdin=subprocess.DEVNULL if stdin is None else None,
         cwd=temporary_folder(),  # where no project's configuration applies
-        env=_variables() | variables,
+        env={"UV_CACHE_DIR": str(folder_of_all().parent / "uv")} | configured | kept | always | variables,
         capture_output=True,
         text=True,
         check=False,
@@ -82,29 +80,19 @@ def run_uv(*arguments: str | Path, stdin: str | None = None, **variables: str) -
     raise failure
 
 
-def _variables() -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    cache = {} if "UV_CACHE_DIR" in kept else {"UV_CACHE_DIR": str(folder_of_all().parent / "uv")}
-    always = {"UV_PYTHON_DOWNLOADS": "never", "UV_NO_PROGRESS": "1", "NO_COLOR": "1"}
-    return (_from_pip() if not set(_OF_UV) & set(kept) else {}) | kept | cache | always
-
-
 @lru_cache(maxsize=1)
 def _from_pip() -> dict[str, str]:
-    """Return pip's configuration as variables of uv. With several indexes the best version counts, as with pip."""
-    variables = {_FROM_PIP[key]: value for key, value in _pip_settings().items() if key in _FROM_PIP}
-    if "UV_FIND_LINKS" in variables:
-        variables["UV_FIND_LINKS"] = ",".join(variables["UV_FIND_LINKS"].split())
-    return variables | ({"UV_INDEX_STRATEGY": "unsafe-best-match"} if "UV_INDEX" in variables else {})
-
-
-def _pip_settings() -> dict[str, str]:
-    """Return pip's settings by name. Environment variables override configuration files."""
+    """Return pip's settings as variables of uv. Environment variables override configuration files."""
     pip = [sys.executable, "-m", "pip"] if find_spec("pip") else [shutil.which("pip") or ""]
     if not pip[0]:
         return {}
     done = subprocess.run([*pip, "config", "list"], capture_output=True, text=True, check=False, timeout=60)
     lines = re.findall(r"^(\S+)\.([\w-]+)='(.*)'$", done.stdout, re.MULTILINE)
     ranks = {"global": 0, "install": 1, ":env:": 2}
-    wanted = sorted((ranks[section], key, value) for section, key, value in lines if section in ranks)
-    return {key: value for _, key, value in wanted}
+    settings = sorted((ranks[section], key, value) for section, key, value in lines if section in ranks)
+    variables = {_FROM_PIP[key]: value for _, key, value in settings if key in _FROM_PIP}
+    if "UV_FIND_LINKS" in variables:
+        variables["UV_FIND_LINKS"] = ",".join(variables["UV_FIND_LINKS"].split())
+    if "UV_INDEX" in variables:  # with several indexes the best version counts, as with pip
+        variables["UV_INDEX_STRATEGY"] = "unsafe-best-match"
+    return variables

@@ -136,7 +136,10 @@ def free_motion(start: InitialState) -> FreeMotion:
     value, slope = phase.value_and_slope(mp.mpf(0))
     excess = axes.excess / size
     mu = (size / J[2] + excess / (1 + largest[2] / size)) / 2 - omega * (slope / value).imag
-    R_lP0 = smallest_rotation([x / size for x in L])
+    # The smallest rotation from the direction of L, whose third component is positive, to e_z.
+    x, y, z = (component / size for component in L)
+    k = 1 / (1 + z)
+    R_lP0 = mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])
     return FreeMotion(
         size,
         np.array([float(x / size) for x in largest]),
@@ -162,10 +165,3 @@ def pole_phase(axes: OrderedAxes, lattice: Lattice) -> Theta:
     rest = L3max * mp.elliprf(L1max**2, L1max**2 + m_part, 1)
     y = lattice.K_prime - rest
     return theta(Lattice(lattice.K, 2 * lattice.K_prime), 4, y, lattice.K_prime + rest)
-
-
-def smallest_rotation(m: Vector) -> Matrix:
-    """Return the smallest rotation from the unit vector m, m3 > -1, to e_z."""
-    x, y, z = m
-    k = 1 / (1 + z)
-    return mp.matrix([[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]])

@@ -111,7 +111,7 @@ def top(start: InitialState, moment_B: Array, axis_B: Array) -> Top:
     third = max(range(3), key=lambda i: abs(sum(axes[row, i] * float(axis_B[row]) for row in range(3))))
     J3, J1 = moments[third], (moments[third - 1] + moments[third - 2]) / 2
     axis = axes[:, third]
-    if spherical(start):  # all axes are axes of symmetry: the one through the centre of mass
+    if max(moments) - min(moments) <= SYMMETRIC * max(moments):  # a sphere: the axis through the centre of mass
         J1 = J3 = sum(moments) / 3
         axis = moment / mp.norm(moment)
     lever = (axis.T * moment)[0]
@@ -119,12 +119,6 @@ def top(start: InitialState, moment_B: Array, axis_B: Array) -> Top:
     w1, w2, w3 = start.rates(R_BP)
     alpha, beta = halves(start.attitude * R_BP)
     return Top(abs(lever) / J1, J3 * w3 / J1, w3, mp.mpc(w1, w2), alpha, beta, R_BP)
-
-
-def spherical(start: InitialState) -> bool:
-    """Whether the three moments are equal up to round-off."""
-    moments = start.principal[0]
-    return bool(max(moments) - min(moments) <= SYMMETRIC * max(moments))
 
 
 def frame(axis: Matrix, near: Matrix) -> Matrix:
@@ -177,14 +171,10 @@ def nutation(start: Top) -> Nutation:
     q = (linear * square - 3 * constant) / 6 - square**3 / 27
     angle = mp.acos(max(min(q / mp.sqrt(p) ** 3, mp.mpf(1)), mp.mpf(-1))) / 3 if p > 0 else mp.mpf(0)
     u3, u2, u1 = (2 * root(p) * mp.cos(angle + turn * 2 * mp.pi / 3) - square / 3 for turn in (0, -1, 1))
-    u1, u2, u3 = (snap_to_marks(u, (start.u, mp.mpf(1), mp.mpf(-1))) for u in (u1, u2, u3))
+    marks = start.u, mp.mpf(1), mp.mpf(-1)  # a root that equals one of them up to round-off is that number
+    u1, u2, u3 = (next((mark for mark in marks if abs(u - mark) < _SAME), u) for u in (u1, u2, u3))
     u1, u2, u3 = max(min(u1, start.u), mp.mpf(-1)), min(max(u2, start.u), mp.mpf(1)), max(u3, mp.mpf(1))
     return Nutation(u1, u2, u3, Lattice.of((u2 - u1) / (u3 - u1), (u3 - u2) / (u3 - u1)))
-
-
-def snap_to_marks(u: Number, marks: tuple[Number, ...]) -> Number:
-    """Return the mark that equals a root up to round-off, or the root."""
-    return next((mark for mark in marks if abs(u - mark) < _SAME), u)
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,19 +87,11 @@ def lagrange_top(
     potential
         The field; weight and lever arm of either sign.
     R_WB0, w_WB_B0, t
-        Attitude (3, 3) and rates (3,), rad/s, at t = 0, and times (n,), s, as in `free_body`.
-
-    Returns
-    -------
-    R_WB
-        Attitudes (n, 3, 3), body to world.
-    w_WB_B
-        Rates (n, 3), rad/s, body axes.
+        Attitude (3, 3) and rates (3,), rad/s, at t = 0, and times (n,), s, as in `free_body`, which also describes the results
+        and the errors.
 
     Raises
     ------
-    BadInput
-        An argument is not finite, has another shape, or is not a rotation.
     Unsupported
         The body is not symmetric about the line to its centre of mass.
 

@@ -70,7 +70,12 @@ def express_field(scene: Scene) -> FieldInAxes:
     if not isinstance(scene.potential, Turning):
         return _express(scene, potential, np.eye(3) if line is None else axes_about(line))
     orbit = scene.potential.orbit
-    R_WD = _axes_beside(orbit.normal_W if line is None else line, orbit.normal_W)
+    third = orbit.normal_W if line is None else line
+    first = np.cross(orbit.normal_W, third)  # perpendicular to the normal, so that the first rate of D is 0
+    size = np.linalg.norm(first)
+    R_WD = axes_about(third)
+    if size > _ROUND_OFF:
+        R_WD = np.stack([first / size, np.cross(third, first / size), third], axis=1)
     return replace(_express(scene, potential, R_WD), turn_D=_drop_round_off(orbit.rate * (orbit.normal_W @ R_WD)))
 
 
@@ -80,15 +85,6 @@ def _express(scene: Scene, potential: Potential | None, R_WD: Array) -> FieldInA
     if potential is None or potential.axis_W is None:
         return FieldInAxes(axes, R_WD, uniform, [0.0] * 9)
     return READERS[type(potential)](axes, R_WD, potential)
-
-
-def _axes_beside(third: Array, normal: Array) -> Array:
-    """Return a rotation (3, 3) whose third column is `third` (3,) and whose first is also perpendicular to `normal` (3,)."""
-    first = np.cross(normal, third)
-    size = np.linalg.norm(first)
-    if size <= _ROUND_OFF:
-        return axes_about(third)
-    return np.stack([first / size, np.cross(third, first / size), third], axis=1)
 
 
 def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:

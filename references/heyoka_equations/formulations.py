@@ -100,7 +100,8 @@ def _from_rows(rows: Array) -> Array:
 
 def non_spinning(scene: Scene) -> Formulation:
     """Return quaternion and momentum of the frame that turns at l/J1; the spin of a symmetric body has a closed form."""
-    axes = _symmetric(scene)
+    axes = symmetric_axes(scene)
+    assert axes is not None  # checked by `Heyoka.unsupported`
     u0, spin = _slow_rates(axes)
     form, parameters = forms.form_of(forms.non_spinning, [axes.moment[2] / axes.J[0], u0[2]])
 
@@ -163,12 +164,6 @@ def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
 def _gyroscopic(axes: EngineAxes) -> list[float]:
     J1, J2, J3 = axes.J.tolist()
     return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
-
-
-def _symmetric(scene: Scene) -> EngineAxes:
-    axes = symmetric_axes(scene)
-    assert axes is not None  # checked by `Heyoka.unsupported`
-    return axes
 
 
 def _slow_rates(axes: EngineAxes) -> tuple[Array, float]:

@@ -58,12 +58,17 @@ def run_within(limit: float, work: Callable[[], T], shared: Sequence[object] = (
     by_value: list[str] = []
     while True:
         kept = [_bytes_of(each, tuple(by_value)) for each in shared]
-        kind, content = _ask(limit, dump((sys.path, _find_folder(), kept, dump(work, shared, by_value))))
+        content = dump((sys.path, _find_folder(), kept, dump(work, shared, by_value)))
+        worker = _take_idle() or python_worker(show_output=True)
+        with time_limit(limit):
+            answer = worker.ask("call", adapter=__name__, function="do", content=np.frombuffer(content, np.uint8))
+        _idle.append(worker)
+        kind, result = answer["kind"], answer["content"].tobytes()
         if kind == "returned":
-            return load(content, shared)
+            return load(result, shared)
         if kind == "raised":
-            raise load(content, shared)
-        name = content.decode()
+            raise load(result, shared)
+        name = result.decode()
         if kind == "lost" or name not in sys.modules or name in by_value or len(by_value) == MOST_MODULES:
             raise NotTransferable(name)
         by_value.append(name)  # the other process cannot import it
@@ -82,15 +87,6 @@ def _bytes_of(value: object, by_value: tuple[str, ...]) -> bytes:
     return dump(value, (), by_value)
 
 
-def _ask(limit: float, content: bytes) -> tuple[str, bytes]:
-    """Return the answer of an idle process, or of a new one, which is idle again afterwards."""
-    worker = _take_idle() or python_worker(show_output=True)
-    with time_limit(limit):
-        answer = worker.ask("call", adapter=__name__, function="do", content=np.frombuffer(content, np.uint8))
-    _idle.append(worker)
-    return answer["kind"], answer["content"].tobytes()
-
-
 def _take_idle() -> Worker | None:
     with suppress(IndexError):
         while True:
@@ -104,7 +100,7 @@ def _take_idle() -> Worker | None:
 def _find_folder() -> str:
     """Return the working directory, or "" if it was removed."""
     with suppress(OSError):
-        return os.getcwd()  # noqa: PTH109  # as it is
+        return os.getcwd()  # noqa: PTH109  # links are not resolved
     return ""
 
 

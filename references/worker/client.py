@@ -97,15 +97,18 @@ class Worker:
     ) -> None:
         self._command, self._folder, self._variables = tuple(command), folder, variables
         self._memory, self._show_output = memory, show_output
-        self._process: subprocess.Popen[bytes] | None = None
-        self._output: IO[bytes] | None = None
-        self._work: Path | None = None
-        self._life = -1
         self._binary = False
+        self._forget_process()
         self._lock = Lock()
         self._unwanted: list[tuple[int, int]] = []
         self._owner, self.starts = os.getpid(), 0
         _workers.add(self)
+
+    def _forget_process(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._output: IO[bytes] | None = None
+        self._work: Path | None = None
+        self._life = -1
 
     def ask(self, do: str, **values: Any) -> dict[str, Any]:
         """Return the answer to a request. Requests of several threads are answered one after the other.
@@ -123,9 +126,10 @@ class Worker:
             if self.pid is None:
                 self._end()
                 self._start()
+            unwanted, self._unwanted = self._unwanted, []
+            forget = [run for start, run in unwanted if start == self.starts]
             with self._ended_by_failure(_limit.get()) as deadline:
-                self._send({"do": do, "forget": self._take_unwanted(), **values}, deadline)
-                answer = self._receive(deadline)
+                answer = self._exchange({"do": do, "forget": forget, **values}, deadline)
         if answer.get("error") == "unsupported":
             raise NotImplementedError(answer["message"])
         if "error" in answer:
@@ -136,22 +140,12 @@ class Worker:
         """Let a run be forgotten that was prepared after a given start; the program is told with the next request."""
         self._unwanted.append((start, run))
 
-    def _take_unwanted(self) -> list[int]:
-        unwanted, self._unwanted = self._unwanted, []
-        return [run for start, run in unwanted if start == self.starts]
-
     @property
     def pid(self) -> int | None:
         """Process number; None if no process is running."""
         if self._owner != os.getpid():  # a fork has copies of the pipes, but the process belongs to its parent
-            self._owner, self._process, self._output, self._work, self._life, self._unwanted = (
-                os.getpid(),
-                None,
-                None,
-                None,
-                -1,
-                [],
-            )
+            self._owner, self._unwanted = os.getpid(), []
+            self._forget_process()
         process = self._process
         return None if process is None or process.poll() is not None else process.pid
 
@@ -192,24 +186,19 @@ class Worker:
         _limit_resources(self._process.pid, self._memory)
         with self._ended_by_failure(START_LIMIT) as deadline:
             greeting = {"do": "hello", "protocol": program.PROTOCOL, "framings": ["binary", "lines"], "life": life}
-            self._send(greeting, deadline)
-            answer = self._receive(deadline)
+            answer = self._exchange(greeting, deadline)
             if answer.get("protocol") != program.PROTOCOL:
                 raise program.Unreadable(answer)
             self._binary = answer.get("framing") == "binary"
 
-    def _send(self, message: dict[str, Any], deadline: float) -> None:
-        assert self._process is not None
-        assert self._process.stdin is not None
-        write_all(self._process.stdin, program.pack(message) if self._binary else program.to_json(message), deadline)
-
-    def _receive(self, deadline: float) -> dict[str, Any]:
-        assert self._process is not None
-        stdout = self._process.stdout
-        assert stdout is not None
+    def _exchange(self, message: dict[str, Any], deadline: float) -> dict[str, Any]:
+        """Send a request and return the answer."""
+        process: Any = self._process
         if self._binary:
-            return program.unpack(lambda count: read_exactly(stdout, count, deadline))
-        return program.from_json(read_line(stdout, deadline))
+            _write_all(process.stdin, program.pack(message), deadline)
+            return program.unpack(lambda count: _read_exactly(process.stdout, count, deadline))
+        _write_all(process.stdin, program.to_json(message), deadline)
+        return program.from_json(_read_line(process.stdout, deadline))
 
     @contextmanager
     def _ended_by_failure(self, limit: float) -> Iterator[float]:
@@ -239,9 +228,11 @@ class Worker:
             process.wait(_PATIENCE)
         except subprocess.TimeoutExpired:  # it closed its pipes, but goes on
             process.kill()
-        description = describe_exit(process.wait(), self._last_words())
+        code, words = process.wait(), self._last_words()
         self._end()
-        return description
+        how = f"exit code {code}" if code >= 0 else f"signal {-code}"
+        name = f" ({signal.Signals(-code).name})" if -code in set(signal.Signals) else ""
+        return f"{how}{name}" + (f": {words}" if words else "")
 
     def _last_words(self) -> str:
         """Return the last line of output. If Python printed a stack, return the line above it, which has the error."""
@@ -272,7 +263,7 @@ class Worker:
             self._output.close()
         if self._work:
             shutil.rmtree(self._work, ignore_errors=True)
-        self._process, self._output, self._work, self._life = None, None, None, -1
+        self._forget_process()
 
 
 @atexit.register
@@ -281,13 +272,6 @@ def close_workers() -> None:
     for worker in list(_workers):
         if not worker.busy:
             worker.close()
-
-
-def describe_exit(code: int, last_words: str) -> str:
-    """Return how a process ended, and the last line that it printed."""
-    how = f"exit code {code}" if code >= 0 else f"signal {-code}"
-    name = f" ({signal.Signals(-code).name})" if -code in set(signal.Signals) else ""
-    return f"{how}{name}" + (f": {last_words}" if last_words else "")
 
 
 def _limit_resources(process: int, memory: int) -> None:
@@ -320,8 +304,8 @@ def _read_some(pipe: IO[bytes], most: int, deadline: float) -> bytes:
     return part
 
 
-def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
-    """Return a number of bytes. Raise EOFError if there are fewer, and TimeoutError after the deadline in seconds."""
+def _read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
+    """Return a number of bytes. Raise EOFError if there are fewer, and TimeoutError after the deadline."""
     parts = []
     while count:
         parts.append(_read_some(pipe, count, deadline))
@@ -329,16 +313,16 @@ def read_exactly(pipe: IO[bytes], count: int, deadline: float) -> bytes:
     return b"".join(parts)
 
 
-def read_line(pipe: IO[bytes], deadline: float) -> bytes:
-    """Return a line. Each request has one answer, so nothing can follow it. Raise as `read_exactly`."""
+def _read_line(pipe: IO[bytes], deadline: float) -> bytes:
+    """Return a line. Each request has one answer, so nothing can follow it."""
     parts = [_read_some(pipe, 1 << 20, deadline)]
     while not parts[-1].endswith(b"\n"):
         parts.append(_read_some(pipe, 1 << 20, deadline))
     return b"".join(parts)
 
 
-def write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
-    """Write bytes. Raise BrokenPipeError if the reader is gone, and TimeoutError after the deadline in seconds."""
+def _write_all(pipe: IO[bytes], data: bytes, deadline: float) -> None:
+    """Write bytes. Raise BrokenPipeError if the reader is gone, and TimeoutError after the deadline."""
     descriptor, rest = pipe.fileno(), memoryview(data)
     while rest:
         _wait(descriptor, select.POLLOUT, deadline)

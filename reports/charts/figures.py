@@ -15,13 +15,11 @@ from .style import (
     PALETTE,
     SHAPES,
     WIDTH,
-    Families,
     apply_style,
-    colour_scale,
-    dash_scale,
+    colours,
     families_of,
+    look,
     power_axis,
-    shape_scale,
 )
 
 FLOOR = 1e-17
@@ -55,18 +53,6 @@ def log_channel(column: str, title: str, values: pd.Series[float]) -> dict[str, 
     }
 
 
-def _look(channel: str, families: Families, title: str, **legend: Any) -> dict[str, Any]:
-    """Return colour and mark, or colour and dash, of lines, in one legend."""
-    shown = alt.Legend(title=title, **({"columns": 1} | legend))
-    lines = list(families)
-    second = (
-        alt.Shape("name:N", scale=shape_scale(families), sort=lines, legend=shown)
-        if channel == "shape"
-        else alt.StrokeDash("name:N", scale=dash_scale(families), sort=lines, legend=shown)
-    )
-    return {"color": alt.Color("name:N", scale=colour_scale(families), sort=lines, legend=shown), channel: second}
-
-
 def _large(data: pd.DataFrame, title: str, subtitle: str) -> Any:
     return alt.Chart(data, width=2 * WIDTH - 180, height=2 * HEIGHT - 80, title=alt.Title(title, subtitle=subtitle))
 
@@ -79,15 +65,15 @@ def _time_against_error(data: pd.DataFrame) -> tuple[alt.X, alt.Y]:
 def work_precision(points: pd.DataFrame, front: pd.DataFrame, scene: str) -> Any:
     """Return time against error, from the points of a scene (see `rows.points`) and their `front`, which is the bold line."""
     data, best_points = (rows.assign(microseconds=rows["time"] * 1e6) for rows in (points, front))
-    look = _look("shape", families_of(data), "method", orient="right", symbolOpacity=1)
+    channels = look(families_of(data), "shape", title="method", orient="right", symbolOpacity=1)
     x, y = _time_against_error(data)
     subtitle = "lower left is better; bold grey: fastest at each error, without closed forms"
     base = _large(data, f"{scene}: time against error", subtitle).encode(x=x, y=y)
     best = alt.Chart(best_points).mark_line(
         color=PALETTE["black"], opacity=0.22, strokeWidth=11, strokeCap="round", strokeJoin="round"
     )
-    lines = base.mark_line(strokeWidth=1.6).encode(color=look["color"], detail="name:N", order="rank:Q")
-    marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
+    lines = base.mark_line(strokeWidth=1.6).encode(color=channels["color"], detail="name:N", order="rank:Q")
+    marks = base.mark_point(filled=True, size=48, opacity=1).encode(**channels)
     lines = lines.transform_window(rank="row_number()")
     return apply_style(best.encode(x=x, y=y, order="error:Q") + lines + marks)
 
@@ -102,7 +88,7 @@ def best_of_families(picture: pd.DataFrame) -> Any:
     def lines(part: pd.DataFrame, width: float, size: float) -> Any:
         mark = alt.Chart(part).mark_line(strokeWidth=width, point=alt.OverlayMarkDef(size=size, filled=True, opacity=1))
         return mark.encode(
-            color=alt.Color("name:N", scale=colour_scale(families), sort=list(families)),
+            color=alt.Color("name:N", scale=_scale(colours(families)), sort=list(families)),
             shape=alt.Shape("class:N", scale=_scale(CLASS_SHAPES)),
             strokeDash=alt.StrokeDash("class:N", scale=_scale(CLASS_DASHES)),
             detail="line:N",
@@ -122,14 +108,14 @@ def _scale(looks: Mapping[str, Any]) -> alt.Scale:
 def drift(drifts: pd.DataFrame, scene: str) -> Any:
     """Return the largest drift so far over time, from `lines.drifts` of a scene, a panel for each invariant."""
     data = drifts.assign(shown=drifts["drift"].clip(lower=FLOOR))
-    look = _look("strokeDash", families_of(data), "method", symbolSize=300)
+    channels = look(families_of(data), "strokeDash", title="method", symbolSize=300)
     panels = [
         alt.Chart(part, width=2 * WIDTH - 180, height=HEIGHT - 40, title=f"{scene}: drift of {kind}")
         .mark_line(strokeWidth=1.8, clip=True)
         .encode(
             x=alt.X("t:Q", title="t, s", scale=alt.Scale(nice=False)),
             y=alt.Y(**log_channel("shown", "largest so far, relative", part["shown"])),
-            **look,
+            **channels,
         )
         for kind, part in data.groupby("quantity", sort=False)
     ]
@@ -140,12 +126,12 @@ def convergence(errors: pd.DataFrame, fit_ends: pd.DataFrame, scene: str) -> Any
     """Return error against step, from `lines.errors` of a scene and `lines.fit_ends`; the fits are the bold stretches."""
     x = alt.X(**log_channel("dt", "step, s", errors["dt"]))
     y = alt.Y(**log_channel("error", "largest attitude error over the run, rad", errors["error"]))
-    look = _look("shape", families_of(errors), "method (observed order)", orient="right", symbolOpacity=1)
+    channels = look(families_of(errors), "shape", title="method (observed order)", orient="right", symbolOpacity=1)
     title, subtitle = f"{scene}: convergence", "bold: the stretch that the order is fitted to, and the fit"
-    base = _large(errors, title, subtitle).encode(x=x, y=y, color=look["color"])
-    marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=look["shape"])
+    base = _large(errors, title, subtitle).encode(x=x, y=y, color=channels["color"])
+    marks = base.mark_point(filled=True, size=48, opacity=1).encode(shape=channels["shape"])
     bold = alt.Chart(fit_ends).mark_line(strokeWidth=6, opacity=0.35, strokeCap="round")
-    return apply_style(bold.encode(x=x, y=y, color=look["color"]) + base.mark_line(strokeWidth=1.2) + marks)
+    return apply_style(bold.encode(x=x, y=y, color=channels["color"]) + base.mark_line(strokeWidth=1.2) + marks)
 
 
 def engine_looks(names: Iterable[str]) -> Mapping[str, tuple[str, str]]:
@@ -175,7 +161,7 @@ def engines(points: pd.DataFrame, scene: str) -> Any:
 
 
 def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
-    """Return the cheapest engine's time over ours against the error, a panel for each field: mean, worst and best body."""
+    """Return the fastest engine's time divided by ours against the error, a panel for each field: mean, worst and best body."""
     lowest, highest = float(points["worst"].min()), float(points["best"].max())
     low, high = min(lowest, 0.9) / 1.1, max(highest, 1.1) * 1.1
     y: dict[str, Any] = {
@@ -194,7 +180,7 @@ def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
         mark = base.mark_line(color=blue, strokeWidth=2, point=alt.OverlayMarkDef(color=blue, size=40))
         panels.append(band + even.encode(y=alt.Y("even:Q", **y)) + mark.encode(y=alt.Y("mean:Q", **y), tooltip=shown))
     title = alt.Title(
-        f"Random bodies: the cheapest engine's time over ours ({bodies} in each field, seed {seed})",
+        f"Random bodies: the fastest engine's time divided by ours ({bodies} in each field, seed {seed})",
         subtitle="line: geometric mean; band: from the worst body to the best; above the dashed line ours is faster",
     )
     return apply_style(alt.concat(*panels, columns=2, title=title))
@@ -202,16 +188,16 @@ def random_ratios(points: pd.DataFrame, bodies: int, seed: int) -> Any:
 
 def body_costs(points: pd.DataFrame) -> Any:
     """Return the time per body against the number of bodies; columns of panels are errors, rows kinds of bodies."""
-    look = _look("strokeDash", families_of(points), "method", orient="bottom", columns=2, symbolSize=300)
+    channels = look(families_of(points), "strokeDash", title="method", orient="bottom", columns=2, symbolSize=300)
     shown = [alt.Tooltip("name:N"), alt.Tooltip("size:Q"), alt.Tooltip("time:Q", format=".3g")]
     x = alt.X(**log_channel("size", "number of bodies", points["size"]))
     y = alt.Y(**log_channel("time", "µs a body and simulated second", points["time"]))
 
     def panel(part: pd.DataFrame, kind: str, error: Any) -> Any:
         title = f"{kind.replace('_', ' ')}, {tolerance(error)} rad"
-        base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **look)
+        base = alt.Chart(part, width=WIDTH - 130, height=HEIGHT - 20, title=title).encode(x=x, y=y, **channels)
         marks = alt.Chart(part).mark_point(filled=True, size=30, opacity=1)
-        marks = marks.encode(x=x, y=y, color=look["color"].legend(None), tooltip=shown)
+        marks = marks.encode(x=x, y=y, color=channels["color"].legend(None), tooltip=shown)
         return base.mark_line(strokeWidth=1.6).encode(tooltip=shown) + marks
 
     rows = [

@@ -13,7 +13,7 @@ from conservative.benchmarks.studies.selection import tolerance_setting
 
 from ..rows.names import method_text, setting_text
 from .figures import log_channel
-from .style import HEIGHT, PALETTE, WIDTH, Families, apply_style, colour_scale, families_of, shape_scale, svg_text
+from .style import HEIGHT, PALETTE, WIDTH, Families, apply_style, families_of, look, svg_text
 
 STEP, TOLERANCE = "step, s", "tolerance"
 
@@ -67,15 +67,10 @@ def _probes(data: pd.DataFrame, kind: str, families: Families, error: float) -> 
         alt.X(**log_channel("setting", kind, data["setting"])),
         alt.Y(**log_channel("expected", "error to expect, rad", reach)),
     )
-    look = {
-        "color": alt.Color(
-            "name:N", scale=colour_scale(families), sort=list(families), legend=alt.Legend(title="method", columns=1)
-        ),
-        "shape": alt.Shape("name:N", scale=shape_scale(families), sort=list(families)),
-    }
+    channels = look(families, "shape", title="method")
     base = alt.Chart(data, width=WIDTH, height=HEIGHT).encode(x=x, y=y)
-    lines = base.mark_line(strokeWidth=1.2).encode(color=look["color"], detail="name:N", order="run:Q")
-    marks = base.mark_point(filled=True, size=48, opacity=1).encode(**look)
+    lines = base.mark_line(strokeWidth=1.2).encode(color=channels["color"], detail="name:N", order="run:Q")
+    marks = base.mark_point(filled=True, size=48, opacity=1).encode(**channels)
     rings = base.transform_filter("datum.recommended").mark_point(size=200, color=PALETTE["black"], strokeWidth=1.5)
     wanted = alt.Chart(pd.DataFrame({"expected": [error]})).mark_rule(strokeDash=[6, 3], color=PALETTE["black"]).encode(y=y)
     return wanted + lines + marks + rings
@@ -85,7 +80,7 @@ def _costs(data: pd.DataFrame, families: Families) -> Any:
     x = alt.X(**log_channel("cost", "wall time per simulated second, µs", data["cost"]))
     y = alt.Y("name:N", sort=alt.EncodingSortField("cost"), title=None, axis=alt.Axis(labelLimit=320))
     base = alt.Chart(data, width=WIDTH, height=alt.Step(22), title="cost of what reaches it").encode(x=x, y=y)
-    colour = alt.Color("name:N", scale=colour_scale(families), sort=list(families))
+    colour = look(families, "shape")["color"].legend(None)
     return base.mark_point(filled=True, size=90, opacity=1).encode(color=colour) + base.mark_text(
         align="left", dx=9, fontSize=11
     ).encode(text="setting:N")

@@ -1,4 +1,4 @@
-"""What a motion looks like: the polhode of a free body on the momentum sphere, the trace of a top's axis on the unit sphere."""
+"""The polhode of a free body on the momentum sphere, or the trace of a top's axis on the unit sphere."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BEHIND = 0.3
 def chart(curve: pd.DataFrame) -> Spec:
     """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    The samples are dots, as a line between them would cut corners: a turn of the brick has but few.
+    The samples are dots, as a line between them would cut corners: a turn of the brick has only a few samples.
     """
     name, family = curve[["name", "family"]].iloc[0]
     colour = colours({name: family})[name]

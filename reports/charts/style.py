@@ -1,6 +1,6 @@
 """One look for every picture: colours by family, marks by setting, sizes, and a number format.
 
-The colours are those of Okabe and Ito (2008), then of Tol's muted scheme, which colour-blind readers can distinguish. Marks and
+The colours are from Okabe and Ito (2008), then from Tol's muted scheme; colour-blind readers can distinguish them. Marks and
 dashes distinguish settings.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import altair as alt
@@ -18,8 +18,8 @@ import vl_convert
 from conservative import registry
 from conservative.method import Method, Role
 
-SVG_MARK = "<!-- Written by conservative -->"
-"""The first line of pictures in files of their own."""
+from ..document import SVG_MARK
+
 Families = Mapping[str, str]
 """The family of each line of a picture by its name, in the order of legends."""
 
@@ -49,15 +49,16 @@ WIDTH, HEIGHT = 420, 260
 
 def family_colours() -> dict[str, str]:
     """Return the colours that registered families name, in the order of legends: by role, then by the palette."""
+    places = list(PALETTE)
+
+    def place(family: type[Method]) -> tuple[int, int]:
+        colour = family.card.colour
+        return list(Role).index(family.role), places.index(colour) if colour in places else len(places)
+
     families = [family for family in registry.list_families().values() if family.card.colour is not None]
     return {
-        family.family: PALETTE.get(str(family.card.colour), str(family.card.colour)) for family in sorted(families, key=_place)
+        family.family: PALETTE.get(str(family.card.colour), str(family.card.colour)) for family in sorted(families, key=place)
     }
-
-
-def _place(family: type[Method]) -> tuple[int, int]:
-    places, colour = list(PALETTE), family.card.colour
-    return list(Role).index(family.role), places.index(colour) if colour in places else len(places)
 
 
 def order_lines(families: Mapping[str, str]) -> Families:
@@ -79,7 +80,7 @@ def _by_value(name: str) -> list[tuple[float, str]]:
 
 
 def colours(families: Families) -> dict[str, str]:
-    """Return a colour for each line: that of its family, the same in every picture."""
+    """Return the colour of each line: the colour of its family, which is the same in every picture."""
     named = family_colours()
     strangers = sorted(set(families.values()) - named.keys())
     known = named | {family: _OTHERS[i % len(_OTHERS)] for i, family in enumerate(strangers)}
@@ -87,7 +88,7 @@ def colours(families: Families) -> dict[str, str]:
 
 
 def number_in_family(families: Families) -> dict[str, int]:
-    """Return the number of each line among those of its family, from 0."""
+    """Return the number of each line within its family, from 0."""
     counts: dict[str, int] = {}
     numbers = {}
     for name, family in families.items():
@@ -96,25 +97,22 @@ def number_in_family(families: Families) -> dict[str, int]:
     return numbers
 
 
-def colour_scale(families: Families) -> alt.Scale:
-    """Return the scale that gives each line its colour."""
-    return alt.Scale(domain=list(families), range=list(colours(families).values()))
-
-
-def shape_scale(families: Families) -> alt.Scale:
-    """Return the scale that gives each setting of a family its own mark."""
-    marks = [SHAPES[number % len(SHAPES)] for number in number_in_family(families).values()]
-    return alt.Scale(domain=list(families), range=marks)
-
-
-def dash_scale(families: Families) -> alt.Scale:
-    """Return the scale that gives each setting of a family its own dash."""
-    dashes = [DASHES[number % len(DASHES)] for number in number_in_family(families).values()]
-    return alt.Scale(domain=list(families), range=dashes)
+def look(families: Families, second: str, **legend: Any) -> dict[str, Any]:
+    """Return the channels of lines: the colour of the family, and the mark ("shape") or dash ("strokeDash") of the setting."""
+    shown = alt.Legend(**({"columns": 1} | legend))
+    looks: Sequence[Any] = SHAPES if second == "shape" else DASHES
+    of_settings = [looks[number % len(looks)] for number in number_in_family(families).values()]
+    ranges = {"color": list(colours(families).values()), second: of_settings}
+    lines = list(families)
+    channels = {"color": alt.Color, "shape": alt.Shape, "strokeDash": alt.StrokeDash}
+    return {
+        name: channels[name]("name:N", scale=alt.Scale(domain=lines, range=values), sort=lines, legend=shown)
+        for name, values in ranges.items()
+    }
 
 
 _POWER = "datum.value >= 0.01 && datum.value < 1e6 ? format(datum.value, ',~r') : format(datum.value, '~e')"
-"""How Vega writes a number of an axis: as people do."""
+"""Vega expression for the numbers of an axis: plain, or with an exponent if very small or large."""
 
 
 def power_axis(title: str, low: float, high: float) -> alt.Axis:

@@ -89,14 +89,14 @@ def remove(names: tuple[str, ...], as_json: bool) -> None:
 
 
 def _show(values: Iterable[Value], line: Callable[[Any], str], as_json: bool) -> list[Value]:
-    """Return values after each is shown in a line as soon as it is there, or all as JSON."""
+    """Return values. Each is printed in a line as soon as it is available, or all of them as JSON."""
     from ..document import json
 
-    found = []
+    shown = []
     for value in values:
-        found.append(value)
+        shown.append(value)
         if not as_json:
             click.echo(line(value))
     if as_json:
-        click.echo(json.render(found))
-    return found
+        click.echo(json.render(shown))
+    return shown

@@ -12,8 +12,8 @@ from conservative.errors import require_extra
 from . import completion
 from .options import (
     FilePath,
+    Output,
     OutputCommand,
-    OutputFile,
     allow_build_option,
     epilog,
     find_links_option,
@@ -56,7 +56,7 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
     help="The older version. Both versions run in turn, each in its own environment; no baseline is needed.",
 )
 @click.option("--project", metavar="REF|FOLDER|WHEEL", help="With --against: the newer version.  [default: this folder]")
-@names_option("scenes", "With --against: scenes.  [default: those of the benchmarks]", complete=completion.scenes)
+@names_option("scenes", "With --against: scenes.  [default: the scenes of the benchmarks]", complete=completion.scenes)
 @names_option("methods", "With --against: methods.  [default: all except engines and reference solutions]")
 @click.option(
     "--with",
@@ -70,15 +70,15 @@ OF_VERSIONS = ("project", "scenes", "methods", "requirements", "processes", "fin
 )
 @find_links_option
 @allow_build_option
-@click.option("--junit", type=OutputFile('name="conservative gate"'), help="With --against: write a JUnit report.")
-@click.option("--markdown", type=OutputFile("**gate: "), help="With --against: write verdict and table as Markdown.")
+@click.option("--junit", type=Output('name="conservative gate"'), help="With --against: write a JUnit report.")
+@click.option("--markdown", type=Output("**gate: "), help="With --against: write verdict and table as Markdown.")
 @click.option(
-    "--html", type=OutputFile("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
+    "--html", type=Output("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print violations and notes, or the new entry of the history, as JSON.")
 @click.pass_context
 def gate(context: click.Context, /, as_json: bool, **options: Any) -> None:
-    """Compare RESULTS of `pytest --benchmark` with the baseline; by default those of the last run with --gate.
+    """Compare RESULTS of `pytest --benchmark` with the baseline; by default the results of the last run with --gate.
 
     With --against, measure two versions and compare their errors, drifts, orders, work counts and times. A row that is 5 %
     slower with 99 % confidence is measured again in new processes, and fails if it is slower again.
@@ -150,11 +150,11 @@ def _compare(options: dict[str, Any]) -> Document:
     from conservative.benchmarks.versions.version import Version, install_version
     from conservative.references.environments.lock import Source
 
-    from ..run.provenance import describe_origin
+    from ..run.provenance import provenance
     from ..sections.comparison import build
     from ..terminal.progress import progress
 
-    made = describe_origin()
+    made = provenance().facts
     source, head = Source(options["find_links"], options["allow_build"]), options["project"] or "."
     project = Path(head) if Path(head).is_dir() else Path()
     asked: dict[str, Any] = {name: split_names(name, options[name]) for name in ("scenes", "methods") if options[name]}

@@ -59,7 +59,7 @@ class Commands(click.Group):
 
 
 def _as_click(error: Exception) -> Exception:
-    """Return the click exception for an error that a user can act on; anything else is a bug and keeps its traceback."""
+    """Return the click exception for an error that a user can act on; other errors are bugs and show their traceback."""
     from conservative.errors import BadInput, IntegrationFailed, MissingEngine, MissingExtra
 
     text = "; ".join([str(error), *notes(error)])

@@ -33,42 +33,28 @@ class FilePath(click.Path):
         return Path(str(value))
 
 
-class OutputFile(FilePath):
-    """A file that the command writes.
+class Output(FilePath):
+    """A file that the command writes, or a folder with such files.
 
     Parameters
     ----------
-    mark
-        Text within the first `HEAD` characters of every such file. A file without it was not written by this option.
+    marks
+        Text within the first `HEAD` characters of every such file; of a folder, the names of its files with their texts. A file
+        without its text was not written by this option.
     """
 
-    def __init__(self, mark: str) -> None:
+    def __init__(self, marks: str | Mapping[str, str]) -> None:
         super().__init__()
-        self.mark = mark
+        self.marks = {"": marks} if isinstance(marks, str) else marks
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if str(value) == "-":
             self.fail("got '-'; expected the name of a file (--json writes to stdout, ./- is a file of that name)", param, ctx)
         return super().convert(value, param, ctx)
 
-    def marks(self, path: Path) -> Mapping[Path, str]:
-        """Return the written files and their marks."""
-        return {path: self.mark}
-
-
-class OutputFolder(OutputFile):
-    """A folder that the command writes files into. Parameters: the names of the files and the mark of each."""
-
-    def __init__(self, files: Mapping[str, str]) -> None:
-        super().__init__("")
-        self.files = files
-
-    def marks(self, path: Path) -> Mapping[Path, str]:
-        return {path / name: mark for name, mark in self.files.items()}
-
 
 class OutputCommand(click.Command):
-    """A command with options of type `OutputFile` or `OutputFolder`, and with --force.
+    """A command with options of type `Output`, and with --force.
 
     A file that the same option did not write is replaced only with --force. An input of the command, or the file of another
     option, is never replaced.
@@ -81,12 +67,12 @@ class OutputCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         rest = super().parse_args(ctx, args)
         force = ctx.params.pop("force")
-        taken = [Path(word) for each in self.params if not isinstance(each.type, OutputFile) for word in _words(ctx, each)]
+        taken = [Path(word) for each in self.params if not isinstance(each.type, Output) for word in _words(ctx, each)]
         for each in self.params:
-            if isinstance(each.type, OutputFile) and (path := ctx.params.get(str(each.name))) is not None:
-                for file, mark in each.type.marks(path).items():
-                    require_replaceable(file, mark, str(each.name), force, taken)
-                    taken.append(file)
+            if isinstance(each.type, Output) and (path := ctx.params.get(str(each.name))) is not None:
+                for name, mark in each.type.marks.items():
+                    require_replaceable(path / name, mark, str(each.name), force, taken)
+                    taken.append(path / name)
         return rest
 
 
@@ -120,23 +106,17 @@ def require_replaceable(file: Path, mark: str, option: str, force: bool = False,
             return
     except OSError:  # such as a name that is too long: writing the file reports it
         return
-    if any(_is_same(file, other) for other in inputs):
+    head, shared = "", False
+    for other in inputs:
+        with suppress(OSError, ValueError):  # a word that is not the name of a file
+            shared = shared or file.samefile(other)
+    if shared:
         raise BadInput(option, f"{str(file)!r}, which the command also reads or writes elsewhere", "another file")
-    if not force and mark not in _head(file):
+    with suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
+        head = stream.read(HEAD)
+    if not force and mark not in head:
         allowed = "a new file, an earlier result of the same option, or --force to replace the file"
         raise BadInput(option, f"{str(file)!r}, which this option did not write", allowed)
-
-
-def _is_same(file: Path, other: Path) -> bool:
-    with suppress(OSError, ValueError):
-        return file.samefile(other)
-    return False
-
-
-def _head(file: Path) -> str:
-    with suppress(OSError), file.open(encoding="utf-8", errors="replace") as stream:
-        return stream.read(HEAD)
-    return ""
 
 
 def _words(ctx: click.Context, parameter: click.Parameter) -> Iterator[str]:
@@ -153,12 +133,10 @@ class Count(click.ParamType):  # type: ignore[type-arg]  # generic only for the 
     name = "count"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        try:
+        with suppress(ValueError):
             number = float(str(value))
-            if number >= 1 and number.is_integer():
+            if number >= 1 and number.is_integer():  # False for infinity
                 return int(number)
-        except (ValueError, OverflowError):  # the latter: infinite
-            pass
         self.fail(f"got {value!r}; expected an integer of 1 or more, such as 1000 or 1e6", param, ctx)
 
 
@@ -167,6 +145,9 @@ def names_option(name: str, help: str, metavar: str = "A,B", complete: Any = Non
     return click.option(f"--{name}", multiple=True, metavar=metavar, shell_complete=complete, help=help)
 
 
+scene_argument = click.argument("scene", shell_complete=completion.scenes)
+t_end_option = click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+scheduler_option = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 skip_missing_option = click.option(
     "--skip-missing", is_flag=True, help="Mark engines that are not installed instead of failing."

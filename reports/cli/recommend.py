@@ -8,10 +8,11 @@ import click
 
 from conservative.errors import require_extra
 
+from ..document import SVG_MARK
 from . import completion
-from .options import OutputCommand, OutputFolder, epilog, json_option, names_option, output_files, show, split_names
+from .options import Output, OutputCommand, epilog, json_option, names_option, output_files, scene_argument, show, split_names
 
-FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Written by conservative -->"}
+FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": SVG_MARK}
 """The files of `--out`, and how each is recognized."""
 
 
@@ -24,7 +25,7 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Wr
         "conservative recommend lagrange_top --json --out recommended | jq .cheapest",
     ),
 )
-@click.argument("scene", shell_complete=completion.scenes)
+@scene_argument
 @click.option(
     "--error", type=float, default=1e-6, show_default=True, help="Target: the largest attitude error over the duration, rad."
 )
@@ -35,7 +36,7 @@ FILES = {"recommendation.json": '"cost_limit": ', "recommendation.svg": "<!-- Wr
 )
 @click.option("--time-limit", type=float, default=60.0, show_default=True, help="Stop an engine's run after this time, s.")
 @json_option
-@click.option("--out", type=OutputFolder(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
+@click.option("--out", type=Output(FILES), help="Write recommendation.json and recommendation.svg into this folder.")
 def recommend(
     scene: str,
     error: float,

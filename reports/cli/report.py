@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -64,21 +65,7 @@ from .options import FilePath, engines_option, epilog, names_option, quick_optio
     show_default=True,
     help="Folder of the report. An earlier report there is replaced.",
 )
-def report(
-    out: Path,
-    resume: bool,
-    as_json: bool,
-    scenes: tuple[str, ...],
-    methods: tuple[str, ...],
-    engines: tuple[str, ...],
-    bodies: int | None,
-    seed: int,
-    full: bool,
-    quick: bool,
-    skip_missing: bool,
-    time_limit: float | None,
-    png: bool,
-) -> None:
+def report(out: Path, resume: bool, as_json: bool, **options: Any) -> None:
     """Measure our methods, MuJoCo, Pinocchio, heyoka and SciPy on the paper's two scenes.
 
     The report shows drift of energy and momentum, attitude error, order of convergence, time per step, and time against
@@ -93,18 +80,8 @@ def report(
     from ..terminal.progress import progress
     from ..terminal.report_folder import MANIFEST
 
-    plan = plan_report(
-        split_names("scenes", scenes),
-        split_names("methods", methods),
-        split_list("engines", engines),
-        full=full,
-        quick=quick,
-        skip_missing=skip_missing,
-        png=png,
-        time_limit=time_limit,
-        bodies=bodies,
-        seed=seed,
-    )
+    scenes, methods = (split_names(name, options.pop(name)) for name in ("scenes", "methods"))
+    plan = plan_report(scenes, methods, split_list("engines", options.pop("engines")), **options)
     if not resume and (unfinished := find_unfinished(out)):
         click.echo(f"{unfinished}: replacing an unfinished report. With --resume its studies are not measured again.", err=True)
     with progress() as step:

@@ -10,7 +10,7 @@ from conservative.deferred_imports import DEFAULT_METHOD
 from conservative.errors import require_extra
 
 from . import completion
-from .options import OutputCommand, OutputFile, epilog, json_option, show
+from .options import Output, OutputCommand, epilog, json_option, scene_argument, show, t_end_option
 
 
 @click.command(
@@ -23,7 +23,7 @@ from .options import OutputCommand, OutputFile, epilog, json_option, show
         "conservative run brick_flip:disturbance=1e-6 -m heyoka:1e-12 --csv flip.csv",
     ),
 )
-@click.argument("scene", shell_complete=completion.scenes)
+@scene_argument
 @click.option(
     "--method",
     "-m",
@@ -35,9 +35,9 @@ from .options import OutputCommand, OutputFile, epilog, json_option, show
     f"[default: {DEFAULT_METHOD}, or the first method that supports the scene's potential]",
 )
 @click.option("--dt", type=float, help="Step size (sampling interval of adaptive methods), s.  [default: the scene's]")
-@click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+@t_end_option
 @json_option
-@click.option("--csv", type=OutputFile("t,R_WB_11,"), help="Write t, R_WB, w_WB_B, energy and momentum of each sample.")
+@click.option("--csv", type=Output("t,R_WB_11,"), help="Write t, R_WB, w_WB_B, energy and momentum of each sample.")
 def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
 

@@ -11,9 +11,8 @@ from conservative.errors import require_extra
 
 from . import completion
 from .options import (
+    Output,
     OutputCommand,
-    OutputFile,
-    OutputFolder,
     engines_option,
     epilog,
     json_option,
@@ -61,9 +60,9 @@ FILES = {"study.md": "# Study: ", "study.csv": "study,scene,", "study.json": '{\
     "--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler; only for studies that measure no times."
 )
 @json_option
-@click.option("--csv", type=OutputFile(FILES["study.csv"]), help="Write the rows as CSV.")
-@click.option("--markdown", type=OutputFile(FILES["study.md"]), help="Write the tables as Markdown.")
-@click.option("--out", type=OutputFolder(FILES), help=f"Write {', '.join(FILES)} into this folder.")
+@click.option("--csv", type=Output(FILES["study.csv"]), help="Write the rows as CSV.")
+@click.option("--markdown", type=Output(FILES["study.md"]), help="Write the tables as Markdown.")
+@click.option("--out", type=Output(FILES), help=f"Write {', '.join(FILES)} into this folder.")
 def study(
     name: str,
     scenes: tuple[str, ...],
@@ -98,8 +97,7 @@ def study(
             split_list("sizes", sizes),
             **numbers,
         )
-        source = provenance()
-        made = {"command": source.command, "date": source.date, "commit": source.commit, **source.machine, **source.compared}
+        made = provenance().facts
         announce(f"study {name.replace('_', ' ')}")
         with progress() as step:
             measured = measure_study(planned, lambda done, total, what: step(done / total, what), scheduler)

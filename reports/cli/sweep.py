@@ -10,11 +10,21 @@ import click
 
 from conservative.errors import BadInput, require_extra
 
+from ..document import SVG_MARK
 from . import completion
-from .options import Count, FilePath, OutputCommand, OutputFile, epilog, json_option, show, split_list
-
-SVG_MARK = "<!-- Written by conservative -->"
-"""The first line of pictures (`reports.charts.style.SVG_MARK`, which --help has no time to import)."""
+from .options import (
+    Count,
+    FilePath,
+    Output,
+    OutputCommand,
+    epilog,
+    json_option,
+    scene_argument,
+    scheduler_option,
+    show,
+    split_list,
+    t_end_option,
+)
 
 
 @click.command(
@@ -27,7 +37,7 @@ SVG_MARK = "<!-- Written by conservative -->"
         "conservative sweep my_body.toml --starts 1e6 --spread rate=any --out big.zarr --scheduler tcp://host:8786",
     ),
 )
-@click.argument("scene", shell_complete=completion.scenes)
+@scene_argument
 @click.option("--starts", type=Count(), default=1000, show_default=True, metavar="N", help="Number of bodies.")
 @click.option(
     "--spread",
@@ -49,7 +59,7 @@ SVG_MARK = "<!-- Written by conservative -->"
 @click.option(
     "--error", type=float, help="Target attitude error, rad. Chooses the method and the step size; not with --method or --dt."
 )
-@click.option("--t-end", type=float, help="Duration, s.  [default: the scene's]")
+@t_end_option
 @click.option(
     "--samples",
     type=click.IntRange(2),
@@ -66,11 +76,11 @@ SVG_MARK = "<!-- Written by conservative -->"
 )
 @click.option(
     "--picture",
-    type=OutputFile(SVG_MARK),
+    type=Output(SVG_MARK),
     help="Write a picture of the spread of attitudes and the distribution of drifts (SVG).",
 )
 @click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads.  [default: one per processor]")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
+@scheduler_option
 @json_option
 def sweep(
     scene: str,
@@ -98,7 +108,7 @@ def sweep(
     from ..terminal.progress import progress
 
     if picture is not None and picture == out:
-        raise BadInput("picture", repr(str(picture)), "another name than that of the folder --out")
+        raise BadInput("picture", repr(str(picture)), "another name than --out")
     varied = work.read_spread(split_list("spread", spread))
     with ExitStack() as stack:
         # first, as a place that cannot be written is an error before any work

@@ -11,9 +11,8 @@ from conservative.errors import require_extra
 from . import completion
 from .options import (
     FilePath,
+    Output,
     OutputCommand,
-    OutputFile,
-    OutputFolder,
     allow_build_option,
     epilog,
     find_links_option,
@@ -54,9 +53,9 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 @names_option("scenes", "Scenes to run.  [default: the paper's two]", complete=completion.scenes)
 @names_option("settings", "Settings of the engine, such as RK4.  [default: those that a report shows]")
 @json_option
-@click.option("--junit", type=OutputFile('name="conservative track '), help="Write a JUnit report.")
-@click.option("--markdown", type=OutputFile(PAGE["track.md"]), help="Write tables and changes as Markdown.")
-@click.option("--out", type=OutputFolder(PAGE), help=f"Write {', '.join(PAGE)} into this folder.")
+@click.option("--junit", type=Output('name="conservative track '), help="Write a JUnit report.")
+@click.option("--markdown", type=Output(PAGE["track.md"]), help="Write tables and changes as Markdown.")
+@click.option("--out", type=Output(PAGE), help=f"Write {', '.join(PAGE)} into this folder.")
 @find_links_option
 @allow_build_option
 def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any) -> None:
@@ -88,14 +87,14 @@ def _answer(
     from conservative.references.environments.install import install_build, install_releases, newest_releases
     from conservative.references.environments.lock import Source
 
-    from ..run.provenance import describe_origin
+    from ..run.provenance import provenance
     from ..sections.track import build
     from ..terminal.progress import progress
 
     def tell(what: str) -> None:
         click.echo(what, err=True)
 
-    made = describe_origin()
+    made = provenance().facts
     source, against = Source(options["find_links"], options["allow_build"]), options["against"]
     last = options["last"] or (1 if against is not None and not versions else 0)
     newest = newest_releases(engine, last, source) if last else ()

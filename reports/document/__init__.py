@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from .model import Document
 
+SVG_MARK = "<!-- Written by conservative -->"
+"""The first line of pictures in files of their own."""
+
 
 def text(document: Document, kind: str) -> str:
     """Return a document as "markdown" or "md", "html", "junit" or "json" (its data); renderers are imported when used."""

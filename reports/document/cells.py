@@ -1,29 +1,21 @@
-"""What tables are made of: numbers as text, and cells with a grade."""
+"""Numbers, outcomes and grades as text and as cells of tables."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import Any
 
-from conservative.benchmarks.measures.errors import CONSERVED as CONSERVED
-from conservative.benchmarks.measures.errors import SMALL as SMALL
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.outcome import Outcome, OutcomeKind
 
-from ..document.model import Cell as Cell
-from ..document.model import Grade as Grade
-from ..document.model import Row as Row
-from ..document.model import Table as Table
+from .model import Cell, Grade
 
 DASH = "–"
-
-
 _ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING, OutcomeKind.SKIPPED)
 _DURING_A_RUN = (OutcomeKind.NOT_CONVERGED, OutcomeKind.WRONG_BRANCH, OutcomeKind.DIVERGED, OutcomeKind.NOT_CONSERVED)
 
 
 def number(value: float, digits: int = 2) -> str:
-    """Return a number to `digits` significant digits, a dash for nan."""
+    """Return a number to `digits` significant digits, a dash for NaN."""
     if math.isnan(value):
         return DASH
     plain = value == 0 or 0.01 <= abs(value) < 1e6
@@ -31,17 +23,8 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def tolerance(value: float) -> str:
-    """Return an error that something is compared at, such as a decade: `1e-3`."""
+    """Return a power of ten, such as `1e-3`."""
     return _power(f"{value:.0e}")
-
-
-def factor(ratio: float, digits: int = 2) -> str:
-    """Return how many times as much something is, as people write it: `2.0`, `220`, `1,200`; a dash for nan."""
-    if math.isnan(ratio):
-        return DASH
-    rounded = float(f"{ratio:.{digits}g}")
-    decimals = digits - 1 - math.floor(math.log10(rounded)) if rounded > 0 else 0
-    return f"{rounded:,.{max(decimals, 0)}f}"
 
 
 def _power(text: str) -> str:
@@ -50,33 +33,56 @@ def _power(text: str) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else text
 
 
-def grade_drift(value: float) -> Cell:
-    """Return a drift with a symbol that is not its colour alone."""
+def factor(ratio: float, digits: int = 2) -> str:
+    """Return a ratio with all its digits, such as `2.0`, `220` and `1,200`; a dash for NaN."""
+    if math.isnan(ratio):
+        return DASH
+    rounded = float(f"{ratio:.{digits}g}")
+    decimals = digits - 1 - math.floor(math.log10(rounded)) if rounded > 0 else 0
+    return f"{rounded:,.{max(decimals, 0)}f}"
+
+
+def numeric(value: float, text: str = "", digits: int = 2) -> Cell:
+    """Return a number as a cell that the page sorts by its value; the default text is that of `number`."""
+    return Cell(text or number(value, digits), value=value)
+
+
+def grade(value: float, text: str = "", limits: tuple[float, float] = (CONSERVED, SMALL)) -> Cell:
+    """Return a size with the symbol of its grade; the default limits are those of drifts.
+
+    Parameters
+    ----------
+    value
+        The size; NaN gives a dash.
+    text
+        Default: the size as a number.
+    limits
+        Largest sizes that are good, and fair.
+    """
     if math.isnan(value):
-        return Cell(DASH, Grade.NONE)
-    symbol, grade = ("✓", Grade.GOOD) if value <= CONSERVED else ("≈", Grade.FAIR) if value <= SMALL else ("✗", Grade.BAD)
-    return Cell(f"{symbol} {number(value)}", grade)
+        return Cell(DASH, Grade.NONE, value=value)
+    symbol, graded = ("✓", Grade.GOOD) if value <= limits[0] else ("≈", Grade.FAIR) if value <= limits[1] else ("✗", Grade.BAD)
+    return Cell(f"{symbol} {text or number(value)}", graded, value=value)
+
+
+def grade_ratio(ratio: float, note: str = "", digits: int = 3) -> Cell:
+    """Return an engine's time divided by ours, good from 1 on."""
+    if math.isnan(ratio):
+        return Cell(DASH, Grade.NONE, note, value=ratio)
+    good = ratio >= 1
+    return Cell(f"{'✓' if good else '✗'} {factor(ratio, digits)}", Grade.GOOD if good else Grade.BAD, note, value=ratio)
 
 
 def outcome_text(outcome: Outcome) -> str:
-    """Return an outcome as a table shows it: when and why for what happens during a run, otherwise the kind alone."""
+    """Return an outcome as a table shows it: with time and reason if it happened during a run, otherwise the kind alone."""
     return str(outcome) if outcome.kind in _DURING_A_RUN else outcome.kind.value
 
 
-def finite_or_none(value: float) -> float | None:
-    """Return the value, None where JSON has no number for it."""
-    return value if math.isfinite(value) else None
-
-
-def outcome_record(outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of an outcome for JSON."""
-    residual = None if outcome.residual is None else finite_or_none(outcome.residual)
-    return asdict(outcome) | {"kind": outcome.kind.value, "residual": residual}
-
-
-def outcome_cell(outcome: Outcome) -> Cell:
-    """Return how a run ended, with a symbol."""
+def outcome_cell(outcome: Outcome, reason: bool = False) -> Cell:
+    """Return an outcome with a symbol, and with its reason if `reason`."""
     if outcome.ok:
         return Cell("✓ done", Grade.GOOD)
-    absent = outcome.kind in _ABSENT
-    return Cell(f"{DASH if absent else '✗'} {outcome_text(outcome)}", Grade.NONE if absent else Grade.BAD)
+    absent, text = outcome.kind in _ABSENT, outcome_text(outcome)
+    if reason and outcome.reason not in text:
+        text += f": {outcome.reason}"
+    return Cell(f"{DASH if absent else '✗'} {text}", Grade.NONE if absent else Grade.BAD)

@@ -1,6 +1,6 @@
-"""Colours that can be seen on the paper they are on, light or dark: a stand-in for each that is too close to it.
+"""Replacements for colours with too little contrast to the light or dark page.
 
-Contrast is that of the Web Content Accessibility Guidelines 2.2, which ask for 3 or more of lines and marks (criterion 1.4.11).
+Contrast is defined by the Web Content Accessibility Guidelines 2.2, which require 3 or more for lines and marks (1.4.11).
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from collections.abc import Iterable
 LIGHT_PAPER, DARK_PAPER = "#ffffff", "#14171a"
 """Background of the page, as page.css has it."""
 LEAST = 3.0
-"""Contrast that a line has at least."""
+"""Smallest contrast of a line."""
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}\b")
 
 
 def colours_in(text: str) -> frozenset[str]:
-    """Return the colours that a text names, in capitals."""
-    return frozenset(found.upper() for found in _COLOUR.findall(text))
+    """Return the colours in a text, in capitals."""
+    return frozenset(colour.upper() for colour in _COLOUR.findall(text))
 
 
 def stand_ins(colours: Iterable[str], paper: str) -> dict[str, str]:

@@ -18,7 +18,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from .model import Document, Section, Style, Table, walk
+from .model import Cell, Document, Section, Style, Table, walk
 
 WIDEST = 1.35
 """Largest ratio in the drawing of an interval, and the reciprocal of the smallest."""
@@ -29,6 +29,7 @@ def render(document: Document) -> str:
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"whole": _whole, "narrow": _narrow, "place": _place}
+    environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns}
     blocks = list(walk(document.blocks))
     linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
@@ -63,20 +64,38 @@ def _with_colours(charts: dict[str, Any]) -> dict[str, Any]:
     """Return charts with replacements for the colours that have too little contrast on a light or dark page."""
     from . import contrast
 
-    found = contrast.colours_in(json.dumps(charts))
+    colours = contrast.colours_in(json.dumps(charts))
     papers = {"light": contrast.LIGHT_PAPER, "dark": contrast.DARK_PAPER}
-    return {"figures": charts, "colours": {name: contrast.stand_ins(found, paper) for name, paper in papers.items()}}
+    return {"figures": charts, "colours": {name: contrast.stand_ins(colours, paper) for name, paper in papers.items()}}
 
 
 def _whole(text: str) -> Markup:
     """Return a text in which no line breaks within a number such as 1e-3, or before its unit; words in backticks are code."""
-    whole = re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
-    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", whole))
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", _with_whole_numbers(text)))
+
+
+def _with_whole_numbers(text: str) -> str:
+    return re.sub(r"[\d.]+e-\d+(?: rad)?", r'<span class="n">\g<0></span>', str(escape(text)))
 
 
 def _narrow(name: str) -> Markup:
     """Return a name in which a line may break after each underscore, so that a narrow column has whole words."""
-    return Markup(str(escape(name)).replace("_", "_<wbr>"))
+    return Markup(_with_whole_numbers(name).replace("_", "_<wbr>"))
+
+
+def _cell(value: str | Cell) -> Cell:
+    return value if isinstance(value, Cell) else Cell(value)
+
+
+def _numeric_columns(table: Table) -> list[bool]:
+    """Return for each column whether it is sorted by numbers."""
+    return [any(_cell(row[j]).value is not None for row in table.rows) for j in range(len(table.header))]
+
+
+def _order(cell: Cell) -> str:
+    """Return the number of a cell as JavaScript reads it; empty without one."""
+    known = cell.value is not None and not math.isnan(cell.value)
+    return str(cell.value).replace("inf", "Infinity") if known else ""
 
 
 def _place(ratio: float) -> float:

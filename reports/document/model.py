@@ -12,7 +12,7 @@ from typing import Any
 
 
 class Grade(StrEnum):
-    """How good a cell is. The page shows it as a colour, in addition to a symbol in the text."""
+    """Grade of a cell. The page shows it as a colour, in addition to a symbol in the text."""
 
     GOOD = "good"
     FAIR = "fair"
@@ -32,11 +32,26 @@ class Interval:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell with more than text: a grade, a less important note, an interval to draw, or two halves (in a `GRID`)."""
+    """A cell of a table.
+
+    Attributes
+    ----------
+    text, note
+        The text, and a less important one.
+    grade
+        Its grade, if it is judged.
+    value
+        The number that the page sorts the column by; NaN comes last.
+    interval
+        An interval to draw.
+    parts
+        The two halves of a cell in a `GRID`.
+    """
 
     text: str
     grade: Grade | None = None
     note: str = ""
+    value: float | None = None
     interval: Interval | None = None
     parts: tuple[Cell, ...] = ()
 
@@ -48,7 +63,7 @@ Row = Sequence[str | Cell]
 
 
 class Style(StrEnum):
-    """How the page shows a table."""
+    """Form of a table on the page."""
 
     SORTED = "sorted"
     FILTERED = "filtered"  # sorted, with a search field
@@ -67,7 +82,7 @@ class Table:
 
 
 class Emphasis(StrEnum):
-    """How a paragraph is emphasized."""
+    """Emphasis of a paragraph."""
 
     BODY = ""
     LEAD = "lead"
@@ -122,7 +137,7 @@ class LegendEntry:
 
 
 class Layout(StrEnum):
-    """How the page arranges the panels of a figure."""
+    """Arrangement of the panels of a figure on the page."""
 
     SINGLE = ""
     PANELS = "panels"
@@ -167,7 +182,7 @@ class Section:
     anchor: str = ""
     menu: str = ""
     folded: bool = False
-    """Whether the page shows the title alone until it is pressed."""
+    """True if the page shows only the title until a reader opens it."""
 
 
 Block = Paragraph | Items | Facts | Table | Figure | Section

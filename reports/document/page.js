@@ -15,7 +15,7 @@
   const views = new Map(figures.map((figure) => [figure, []]));
   const signals = new Map(figures.map((figure) => [figure, {}]));
 
-  // The colours of a chart on the page as it is now: those too close to the paper have a stand-in.
+  // Colours with too little contrast to the page have a stand-in.
   const look = (ink, grid) => ({
     background: null, font: "system-ui, sans-serif", padding: 4,
     axis: { labelColor: ink, titleColor: ink, gridColor: grid, domainColor: grid, tickColor: grid, labelSeparation: 6, labelFontSize: 12, titleFontSize: 12, titleFontWeight: "normal" },
@@ -43,12 +43,10 @@
     return Promise.all(views.get(figure).map((view) => view.signal(name, value).runAsync()));
   };
 
-  // A column sorts as numbers where every cell that is not a dash begins with one, after any status symbol; dashes stay last.
-  // Of a change, "1 → 2", the later number counts.
-  const number = (cell) => parseFloat(cell.split("→").pop().trim().replace(/^[✓≈✗]\s*/, "").replace(/(\d),(?=\d{3})/g, "$1"));
-  const empty = (cell) => /^–|^$/.test(cell.trim());
-  const ways = (value, compare) => {
-    const placed = (way) => (a, b) => empty(a) - empty(b) || way * compare(value(a), value(b));
+  // A numeric column has its numbers in data-order. Cells without a number, and dashes, stay last.
+  const ways = (compare) => {
+    const empty = (cell) => cell === "" || cell === "–";
+    const placed = (way) => (a, b) => empty(a) - empty(b) || way * compare(a, b);
     return { asc: placed(1), desc: placed(-1) };
   };
   const words = new Intl.Collator("en", { numeric: true });
@@ -57,8 +55,8 @@
     if (!document.getElementById("datatables")) return;
     const DataTable = await load("datatables");
     const search = (cell) => String(cell).replace(/<[^>]*>/g, " ");  // the text of a cell, not its markup
-    DataTable.type("words", { detect: () => true, order: ways(String, words.compare), search });
-    DataTable.type("numbers", { search, detect: (cell) => empty(cell) || !Number.isNaN(number(cell)), order: ways(number, (a, b) => a - b) });
+    DataTable.type("words", { detect: () => true, order: ways(words.compare), search });
+    DataTable.type("numbers", { detect: (cell) => !Number.isNaN(Number(cell)), order: ways((a, b) => a - b), search });
     const language = { zeroRecords: "No row has all of these words." };
     const layout = { topStart: null, topEnd: null, bottomStart: null, bottomEnd: null };
     for (const table of document.querySelectorAll("table.sortable")) {
@@ -72,7 +70,7 @@
     }
   }
 
-  // One figure after the other, so that the first is there at once and the page stays quick to answer; then come the tables.
+  // Figures are drawn one after the other and tables are made sortable last, so that the page responds at once.
   const pause = () => new Promise((done) => setTimeout(done, 0));
   let drawing = Promise.resolve(), equipped;
   const drawAll = (dark) => {
@@ -102,17 +100,17 @@
     }
   }
 
-  // What a cell of the grid of hard cases says, told below it.
+  // The text of the selected cell of a grid is shown below the grid.
   for (const grid of document.querySelectorAll(".grid")) {
-    const tell = (event) => {
+    const showText = (event) => {
       const cell = event.target.closest("td");
       if (!cell) return;
-      grid.querySelector(".told")?.classList.remove("told");
-      cell.classList.add("told");
+      grid.querySelector(".shown")?.classList.remove("shown");
+      cell.classList.add("shown");
       grid.querySelector("output").textContent = cell.dataset.about;
     };
-    grid.addEventListener("mouseover", tell);
-    grid.addEventListener("click", tell);
+    grid.addEventListener("mouseover", showText);
+    grid.addEventListener("click", showText);
   }
 
   drawAll(night.matches);

@@ -2,7 +2,7 @@
 
     python -m conservative.reports.documentation.api
 
-They open from disk without a network. What stands here is pdoc's settings: docstrings are NumPy's, and formulas are plain text.
+They open from disk without a network.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ MODULES = (
     "!conservative.references.exact.",
     "conservative.references.exact.method",
 )
-"""What a user's program imports, as pdoc has it: packages with all that is public in them; an exclamation mark leaves out."""
-ALIASES = {"Array": "A NumPy array of float64.", "ArrayLike": "What NumPy makes an array of."}
+"""Modules that users import, as pdoc specifies them: with their submodules, except those after an exclamation mark."""
+ALIASES = {"Array": "A NumPy array of float64.", "ArrayLike": "Anything that NumPy converts to an array."}
 """Short names in signatures for NumPy's long types."""
 
 
@@ -54,7 +54,7 @@ def write(folder: Path) -> Path:
 
 
 def _name_aliases() -> None:
-    """Put classes that have nothing but a name in place of the aliases, in all that is imported of ours."""
+    """Replace the aliases in our imported modules by classes with only a name."""
     stand_ins = {name: type(name, (), {"__module__": "builtins", "__doc__": words}) for name, words in ALIASES.items()}
     ours = [module for name, module in sys.modules.items() if name.partition(".")[0] == "conservative"]
     for module in ours:
@@ -62,7 +62,7 @@ def _name_aliases() -> None:
 
 
 def main() -> None:
-    """Write the pages, and print where they begin."""
+    """Write the pages, and print the path of the first."""
     parser = argparse.ArgumentParser(prog="python -m conservative.reports.documentation.api", description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("api"), help="[default: api]")
     print(write(parser.parse_args().folder))

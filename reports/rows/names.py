@@ -85,7 +85,7 @@ def of_classes(points: pd.DataFrame, *kinds: MethodClass) -> pd.DataFrame:
 
 
 def without_solutions(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points except those of our closed forms."""
+    """Return the points without our closed forms."""
     return points[points["class"] != MethodClass.SOLUTION]
 
 
@@ -109,7 +109,7 @@ def of_study(table: pd.DataFrame, study: str, scene: str | None = None) -> pd.Da
 
 
 def of_measure(rows: pd.DataFrame, measure: Measure, quantity: str = "") -> pd.DataFrame:
-    """Return the rows of a measure; of a drift, those of one quantity."""
+    """Return the rows of a measure, and of one quantity if it is a drift."""
     return rows[(rows["measure"] == measure.text) & (rows["quantity"] == quantity)]
 
 
@@ -129,5 +129,5 @@ def with_outcome(rows: pd.DataFrame, *kinds: OutcomeKind) -> pd.DataFrame:
 
 
 def without_outcome(rows: pd.DataFrame, *kinds: OutcomeKind) -> pd.DataFrame:
-    """Return the rows with none of some outcomes."""
+    """Return the rows without some outcomes."""
     return rows[~rows["outcome"].isin([kind.value for kind in kinds])]

@@ -1,6 +1,6 @@
 """Errors and times of runs over steps and tolerances, and the picture of the best of each family.
 
-A picture has the columns `name` (of the family), `class`, `single` (whether a line is that of one setting), `line` (its name),
+A picture has the columns `name` (of the family), `class`, `single` (whether the line has a single setting), `line` (its name),
 `setting` (of a point), `error` (rad), `time` (s per simulated second), `sample` (s per sample, of a scene), `dt` (s), and
 `within` (on how many bodies the error is reached, if there are several).
 """
@@ -60,7 +60,7 @@ def points(
 
 
 def all_points(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of the work-precision study, and those of engines that only their own study has."""
+    """Return the points of the work-precision study, and the points that only the study of engines has."""
     ours, engines = points(table), points(table, "engines_over_steps")
     known = set(zip(ours["scene"], ours["name"], strict=True))
     new = [key not in known for key in zip(engines["scene"], engines["name"], strict=True)]
@@ -81,7 +81,7 @@ def _name_lines(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def front(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of one scene that no other beats in both error and time, cheapest first."""
+    """Return the points of one scene that no other beats in both error and time, fastest first."""
     ordered = points.sort_values(["time", "error"])
     best_before = ordered["error"].cummin().shift(fill_value=math.inf)
     return ordered[ordered["error"] < best_before]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from .plan import Plan
 from .provenance import Provenance
 from .terms import differences, terms
 
-FORMAT = 2
+FORMAT = 3
 _BEGINNING = '{"format": '
 """First characters of every file of unfinished work."""
 _MOST_DIFFERENCES = 3
@@ -62,13 +62,22 @@ class Checkpoint:
     process: Origin
     results: dict[str, StudyResult] = field(default_factory=dict)
 
-    def keep(self, name: str, findings: Iterable[Finding]) -> None:
+    def store(self, name: str, findings: Iterable[Finding]) -> None:
         """Store the findings of a study, also in the file. Raise `NotWritten` if that fails."""
         every = list(findings)
         rows = tuple(finding for finding in every if isinstance(finding, Measurement))
         lines = tuple(finding for finding in every if isinstance(finding, Samples))
         result = StudyResult(rows, lines, self.process)
-        write_text(self.path, _content(replace(self, results={**self.results, name: result})), "out")
+        studies = {
+            name: {
+                "by": vars(each.by),
+                "rows": list(map(measurement.flat, each.rows)),
+                "samples": list(map(measurement.flat_samples, each.samples)),
+            }
+            for name, each in {**self.results, name: result}.items()
+        }
+        content = {"format": FORMAT, "command": self.process.command, "terms": self.terms, "studies": studies}
+        write_text(self.path, json.dumps(content, ensure_ascii=False), "out")  # floats are restored exactly, NaN as NaN
         self.results[name] = result
 
     def remove(self) -> None:
@@ -80,17 +89,17 @@ class Checkpoint:
     def summary(self) -> str:
         """The finished studies, their file, and the command that continues, in words."""
         if not self.results:
-            return "nothing was finished, nothing is kept"
+            return "no study was finished"
         command = self.process.command
         again = command if "--resume" in shlex.split(command) else f"{command} --resume"
         done = f"{len(self.results)} of {len(self.names)} studies are finished ({', '.join(self.results)})"
-        return f"{done} and kept in {str(self.path)!r}; go on with: {again}"
+        return f"{done} and stored in {str(self.path)!r}; continue with: {again}"
 
     def describe_earlier(self) -> tuple[str, ...]:
         """Return a sentence for each other process that measured a part; empty if one process measured everything."""
         return tuple(
             f"{', '.join(name for name, _ in items)}: measured by an earlier process, which was interrupted; "
-            f"begun {by.start} at commit {by.commit} with `{by.command}`"
+            f"started {by.start} at commit {by.commit} with `{by.command}`"
             for by, items in groupby(self.results.items(), key=lambda item: item[1].by)
             if by != self.process
         )
@@ -117,9 +126,9 @@ def find_unfinished(out: Path) -> Path | None:
     try:
         with path.open("rb") as stream:
             if stream.read(len(_BEGINNING)) != _BEGINNING.encode():
-                raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file beside it")
+                raise BadInput("out", f"{str(path)!r}, which no report wrote", "a folder without such a file next to it")
     except OSError as error:
-        raise BadInput("out", f"{str(path)!r} ({error.strerror})", "a file that can be read, or none of this name") from None
+        raise BadInput("out", f"{str(path)!r} ({error.strerror})", "a readable file, or no file of this name") from None
     return path
 
 
@@ -134,51 +143,20 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
     path = find_unfinished(out)
     process = Origin(source.command, source.date, source.commit)
     fresh = Checkpoint(path_for(out), plan.names, terms(plan, source), process)
-    if resume:
-        if path is None:
-            raise BadInput("resume", f"no {str(fresh.path)!r}", "the folder --out of a report that was interrupted")
-        before, results = read(path)
-        _require_same_terms(path, before, fresh.terms)
-        fresh.results.update(results)
+    if not resume:
+        return fresh
+    if path is None:
+        raise BadInput("resume", f"no {str(fresh.path)!r}", "the folder --out of a report that was interrupted")
+    command, before, results = read(path)
+    if different := list(differences(before, json.loads(json.dumps(fresh.terms)))):
+        more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
+        got = f"{str(path)!r}, which was made with {'; '.join(different[:_MOST_DIFFERENCES])}{more}"
+        raise BadInput("resume", got, f"the same again (it was `{command}`), or no --resume, to start again")
+    fresh.results.update(results)
     return fresh
 
 
-def _require_same_terms(path: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    """Raise `BadInput` if the terms of a file differ from the present ones."""
-    different = list(differences(before["terms"], json.loads(json.dumps(now))))
-    if different:
-        more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
-        raise BadInput(
-            "resume",
-            f"{str(path)!r}, which was made with {'; '.join(different[:_MOST_DIFFERENCES])}{more}",
-            f"the same again (it was `{before['command']}`), or no --resume, to begin anew",
-        )
-
-
-def _content(checkpoint: Checkpoint) -> str:
-    """Return the text of the file. Floats are restored exactly, nan as nan."""
-    results = {name: _record(result) for name, result in checkpoint.results.items()}
-    content = {"format": FORMAT, "command": checkpoint.process.command, "terms": checkpoint.terms, "pieces": results}
-    return json.dumps(content, ensure_ascii=False)
-
-
-def _record(result: StudyResult) -> dict[str, Any]:
-    return {
-        "by": vars(result.by),
-        "rows": list(map(measurement.flat, result.rows)),
-        "samples": list(map(measurement.flat_samples, result.samples)),
-    }
-
-
-def _result(record: Mapping[str, Any]) -> StudyResult:
-    return StudyResult(
-        tuple(map(measurement.from_flat, record["rows"])),
-        tuple(map(measurement.samples_from_flat, record["samples"])),
-        Origin(**record["by"]),
-    )
-
-
-def read(path: Path) -> tuple[dict[str, Any], dict[str, StudyResult]]:
+def read(path: Path) -> tuple[str, dict[str, Any], dict[str, StudyResult]]:
     """Return command, terms and results of a file of unfinished work.
 
     Raises
@@ -190,8 +168,15 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, StudyResult]]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']}")
-        results = {name: _result(record) for name, record in content["pieces"].items()}
-        return {"command": str(content["command"]), "terms": dict(content["terms"])}, results
+        results = {
+            name: StudyResult(
+                tuple(map(measurement.from_flat, record["rows"])),
+                tuple(map(measurement.samples_from_flat, record["samples"])),
+                Origin(**record["by"]),
+            )
+            for name, record in content["studies"].items()
+        }
+        return str(content["command"]), dict(content["terms"]), results
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         got = f"{str(path)!r}, which is damaged ({type(error).__name__}: {error})"
         raise BadInput("resume", got, "a file that an interrupted report of this version left, or no --resume") from None

@@ -34,7 +34,7 @@ def measure(plan: Plan, step: Step, checkpoint: Checkpoint) -> Measurements:
         title = f"study {i + 1} of {len(plan.studies)}, {study.name.replace('_', ' ')}"
         announce(title)
         progress = _progress(step, title, i, len(plan.studies))
-        checkpoint.keep(study.name, studies.findings(study, progress))
+        checkpoint.store(study.name, studies.findings(study, progress))
     results = [checkpoint.results[name] for name in plan.names]
     return Measurements(
         measurement.frame(row for result in results for row in result.rows),

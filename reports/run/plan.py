@@ -9,12 +9,13 @@ from conservative.benchmarks.studies import engine_selection, many_runs, random,
 from conservative.benchmarks.studies.study import Study
 from conservative.check import positive_number
 from conservative.method import Method
+from conservative.references.environments.engine_method import EngineMethod
 from conservative.scene import Scene
 
-from .provenance import LockedEngine, locks_of
+from .provenance import LockedEngine
 
 MAIN_TIME_LIMIT = 0.15
-"""Time budget of a run, s, in a default report, which then takes a minute. A full report has that of `Study`."""
+"""Time budget of a run, s, in a default report, which then takes a minute; the default of `Study` is used in a full report."""
 BODIES, QUICK_BODIES = 3, 1
 """Random bodies in each field of a full report, and of a quick one."""
 
@@ -46,8 +47,11 @@ class Plan:
 
     @property
     def locks(self) -> tuple[LockedEngine, ...]:
-        """The locks of the environments that engines run in."""
-        return locks_of((*self.methods, *self.engines))
+        """The locks of the environments that engines run in, sorted by name."""
+        methods = (*self.methods, *self.engines)
+        used = {each.environment.folder: each.environment for each in methods if isinstance(each, EngineMethod)}
+        locks = (LockedEngine(f"{each.engine}=={each.version}", each.python, each.packages) for each in used.values())
+        return tuple(sorted(locks, key=lambda lock: lock.name))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,9 +107,9 @@ def plan_report(
     chosen = selection.scenes(names) if names else selection.scenes()
     every = selection.methods(methods or None, skip_missing) if methods or full or bodies else ()
     compared = every if methods or full else selection.main_methods(skip_missing)
-    found = engine_selection.select_engines(engines, skip_missing) if (engines := tuple(engines)) else ()
+    named = engine_selection.select_engines(engines, skip_missing) if (engines := tuple(engines)) else ()
     if not skip_missing:
-        for method in (*compared, *found):
+        for method in (*compared, *named):
             _ = method.label  # contains the engine's version, so it raises `MissingEngine` before any work
     made: list[Study] = []
     # Random bodies come first, as on the page. Methods that do not support them are not part of the study.
@@ -115,11 +119,11 @@ def plan_report(
     crossed = [name for name in studies.MAKERS if name in studies.MAIN or (full and name in studies.MORE)]
     main_limit = time_limit or (None if full else MAIN_TIME_LIMIT)
     made += studies.cross_studies(crossed, chosen, compared, quick, skip_missing, main_limit)
-    if found:
-        made += studies.cross_studies(studies.ENGINES, chosen, found, quick, skip_missing, time_limit)
+    if named:
+        made += studies.cross_studies(studies.ENGINES, chosen, named, quick, skip_missing, time_limit)
     if full and not (names or quick):
         made += studies.list_hard_studies(compared, skip_missing, time_limit)
     # The coarse study of many bodies, with one setting of each family. Not in a quick report: preparing engines takes minutes.
-    if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *found), quick=True))):
+    if full and bodies and not quick and (many := tuple(many_runs.families((*compared, *named), quick=True))):
         made.append(throughput.throughput_study(many, quick=True, seed=seed, skip_missing=skip_missing, time_limit=time_limit))
-    return Plan(chosen, compared, tuple(made), found, quick, skip_missing, png, time_limit, bodies, seed)
+    return Plan(chosen, compared, tuple(made), named, quick, skip_missing, png, time_limit, bodies, seed)

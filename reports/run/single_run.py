@@ -45,7 +45,7 @@ def run_once(
     Raises
     ------
     BadInput
-        A name, a setting, dt, t_end or the file cannot be used; found before the run starts.
+        A name, a setting, dt, t_end or the file cannot be used; raised before the run.
     MissingEngine
         The method's engine is not installed.
     """
@@ -70,7 +70,7 @@ def compare(
     Raises
     ------
     BadInput
-        A name, a setting, dt or t_end cannot be used, or a method does not take the scene; found before the first run.
+        A name, a setting, dt or t_end cannot be used, or a method does not support the scene; raised before the first run.
     MissingEngine
         The engine of a method is not installed.
     """
@@ -79,7 +79,7 @@ def compare(
     for method, _ in runs:
         _ = method.label  # raises `MissingEngine`
     exact = Exact()
-    found = []
+    summaries = []
     for number, (method, grid) in enumerate(runs):
         step(number / len(runs), method.name)
         _integrate(scene, method, replace(grid, n_steps=min(grid.n_steps, FIRST_STEPS), every=1))
@@ -91,8 +91,8 @@ def compare(
         if trajectory.ok and exact.unsupported(scene) is None:
             truth = exact.solve(scene, Grid(grid.dt * grid.n_steps, 1))
             error = float(angle_between(trajectory.R_WB[-1:], truth.R_WB[-1:])[0])
-        found.append(summarize(trajectory, method, grid.dt) | {"attitude_error": error, "wall_time": wall_time})
-    return found
+        summaries.append(summarize(trajectory, method, grid.dt) | {"attitude_error": error, "wall_time": wall_time})
+    return summaries
 
 
 def bounded_grid(scene: Scene, method: Method, dt: float | None, t_end: float | None) -> Grid:

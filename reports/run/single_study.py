@@ -93,9 +93,10 @@ def _require_fitting(name: str, **given: Sequence[str] | int | None) -> None:
     """Raise `BadInput` if an argument is given that a study does not have."""
     drawn = (studies.RANDOM, studies.THROUGHPUT)
     draws = f"nothing: only the studies {drawn[0]!r} and {drawn[1]!r} draw bodies"
-    refused = {} if name in drawn else {"bodies": draws, "seed": draws}
     if name in drawn:
-        refused["scenes"] = "none: the study draws its bodies; say how many, and a seed"
+        refused = {"scenes": "none: the study draws its bodies; their number and seed are options"}
+    else:
+        refused = {"bodies": draws, "seed": draws}
     if name != studies.THROUGHPUT:
         refused["sizes"] = f"nothing: only the study {studies.THROUGHPUT!r} has numbers of bodies"
     if name in studies.ENGINES:

@@ -69,7 +69,7 @@ def read_spread(items: Iterable[str]) -> dict[str, str]:
     BadInput
         A text is not of that form, has no unit, or a quantity is named twice.
     """
-    found: dict[str, str] = {}
+    spreads: dict[str, str] = {}
     for item in items:
         name, _, value = (part.strip() for part in item.partition("="))
         if not value:
@@ -78,10 +78,10 @@ def read_spread(items: Iterable[str]) -> dict[str, str]:
             raise BadInput("spread", repr(name), f"{nearest(name, KINDS)}, or {FIELD} and the name of a number of the field")
         if name in _UNITS and value[-1:] in {*"0123456789."}:
             raise BadInput("spread", repr(item), f"a number with its unit, such as {_UNITS[name]}")
-        if name in found:
-            raise BadInput("spread", f"{item!r} after {name}={found[name]}", "each quantity once")
-        found[name] = value
-    return found
+        if name in spreads:
+            raise BadInput("spread", f"{item!r} after {name}={spreads[name]}", "each quantity once")
+        spreads[name] = value
+    return spreads
 
 
 def plan(
@@ -145,24 +145,27 @@ def run_sweep(sweep: Sweep, step: Step) -> SweepResult:
     """
     last: ProgressOfMany | None = None
 
-    def hear(progress: ProgressOfMany) -> None:
+    def report(progress: ProgressOfMany) -> None:
         nonlocal last
         last = progress
-        step(progress.done / progress.total, _progress_text(sweep, progress))
+        steps = f", {rate_text(progress.rate * sweep.steps)} steps/s" if sweep.steps else ""
+        step(progress.done / progress.total, f"{rate_text(progress.rate)} bodies/s{steps}")
 
     step(0.0, "preparing: a first run compiles")
     begin = perf_counter()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AccuracyNotReached)  # the summary says so
-            found = integrate_many(sweep.scene, **sweep.starts, **sweep.settings, progress=hear)
+            ensemble = integrate_many(sweep.scene, **sweep.starts, **sweep.settings, progress=report)
     except KeyboardInterrupt as stop:
-        if last is not None and (text := _kept_text(sweep, last)):
-            stop.add_note(text)
+        out = sweep.settings.get("path")
+        if last is not None and out is not None:
+            stored = f"{last.done:,} of {last.total:,} bodies are finished in {out}"
+            stop.add_note(f"{stored}; the same command with --resume does the rest")
         raise
     except BadInput as error:
         raise _in_options(error) from None
-    return SweepResult(found, perf_counter() - begin, last)
+    return SweepResult(ensemble, perf_counter() - begin, last)
 
 
 def _in_options(error: BadInput) -> BadInput:
@@ -179,32 +182,19 @@ def _in_options(error: BadInput) -> BadInput:
     return BadInput(argument, error.got, allowed)
 
 
-def _kept_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    """Return the note on the stored bodies for an interrupted run; empty if samples are not written to a folder."""
-    out = sweep.settings.get("path")
-    if out is None:
-        return ""
-    return f"{progress.done:,} of {progress.total:,} bodies are finished in {out}; the same command with --resume does the rest"
-
-
-def _progress_text(sweep: Sweep, progress: ProgressOfMany) -> str:
-    steps = f", {rate_text(progress.rate * sweep.steps)} steps/s" if sweep.steps else ""
-    return f"{rate_text(progress.rate)} bodies/s{steps}"
-
-
 def summarize(sweep: Sweep, result: SweepResult) -> Summary:
     """Return outcomes, drifts, spread of attitudes, and rates."""
-    found, last, choice = result.ensemble, result.last, result.ensemble.choice
+    ensemble, last, choice = result.ensemble, result.last, result.ensemble.choice
     rate = (last.done - last.found) / (last.elapsed or result.wall) if last else 0.0
-    failed = sorted(found.failures.items())
+    failed = sorted(ensemble.failures.items())
     kinds = Counter(failure.outcome.kind.value for _, failure in failed)
     drifts: dict[str, Any] = {}
-    for name, values in found.drifts.items():
+    for name, values in ensemble.drifts.items():
         body = -1 if np.isnan(values).all() else int(np.nanargmax(values))
         largest = {"largest": float(values[body]), "body": body, "median": float(np.nanmedian(values))} if body >= 0 else None
         drifts[name] = largest
-    samples = np.unique(np.rint(np.linspace(0, len(found.t) - 1, MOST_TIMES)).astype(int)).tolist()
-    quantiles = angle_quantiles(found.R_WB, mean_attitudes(found.R_WB, samples), samples).tolist()
+    samples = np.unique(np.rint(np.linspace(0, len(ensemble.t) - 1, MOST_TIMES)).astype(int)).tolist()
+    quantiles = angle_quantiles(ensemble.R_WB, mean_attitudes(ensemble.R_WB, samples), samples).tolist()
     names = [f"p{100 * share:g}" for share in QUANTILES]
     error = None
     if choice is not None:
@@ -212,27 +202,27 @@ def summarize(sweep: Sweep, result: SweepResult) -> Summary:
         error = {"asked": choice.error, "estimate": choice.estimate, "reached": reached, "bodies": bodies}
     return {
         "scene": sweep.scene.name,
-        "label": found.label,
-        "bodies": len(found),
+        "label": ensemble.label,
+        "bodies": len(ensemble),
         "spread": dict(sweep.spread),
         "seed": sweep.seed,
-        "dt": found.grid.dt,
-        "steps": found.grid.n_steps,
-        "t_end": float(found.t[-1]),
+        "dt": ensemble.grid.dt,
+        "steps": ensemble.grid.n_steps,
+        "t_end": float(ensemble.t[-1]),
         "error": error,
-        "samples": len(found.t),
-        "outcomes": {"ok": len(found) - len(failed), **kinds},
+        "samples": len(ensemble.t),
+        "outcomes": {"ok": len(ensemble) - len(failed), **kinds},
         "failures": [
             {"body": i, "text": str(failure.outcome), **vars(failure.outcome)} for i, failure in failed[:MOST_FAILURES]
         ],
         "drift": drifts,
         "angle_from_mean": [
-            {"t": float(found.t[i]), **dict(zip(names, row, strict=True))} for i, row in zip(samples, quantiles, strict=True)
+            {"t": float(ensemble.t[i]), **dict(zip(names, row, strict=True))} for i, row in zip(samples, quantiles, strict=True)
         ],
         "wall_time": result.wall,
-        "found_before": last.found if last else len(found),
+        "found_before": last.found if last else len(ensemble),
         "bodies_per_second": rate,
-        "body_steps_per_second": rate * found.grid.n_steps,
+        "body_steps_per_second": rate * ensemble.grid.n_steps,
     }
 
 

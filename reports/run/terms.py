@@ -16,20 +16,22 @@ _ROOMS = (".", "references", "benchmarks")
 """Packages whose source determines measurements. `reports` only shows them."""
 
 
-def terms(plan: Plan, source: Provenance) -> dict[str, Any]:
-    """Return the terms of measurements as JSON values."""
+def terms(plan: Plan, source: Provenance) -> dict[str, dict[str, Any]]:
+    """Return the terms of measurements as JSON values, in groups."""
     return {
-        "studies": list(plan.names),
+        "studies": dict.fromkeys(plan.names, ""),
         "scenes": {scene.name: define_scene(scene) for scene in plan.scenes},
         "methods": {method.name: method.label for method in plan.methods},
         "engines": {method.name: method.label for method in plan.engines},
         "environments": {lock.name: ", ".join(lock.packages) for lock in plan.locks},
-        "--quick": plan.quick,
-        "--skip-missing": plan.skip_missing,
-        "--time-limit": plan.time_limit,
-        "--bodies": plan.bodies,
-        "--seed": plan.seed,
-        "source": _source_hash(),
+        "options": {
+            "--quick": plan.quick,
+            "--skip-missing": plan.skip_missing,
+            "--time-limit": plan.time_limit,
+            "--bodies": plan.bodies,
+            "--seed": plan.seed,
+        },
+        "source": {"hash": _source_hash()},
         "machine": {key: source.machine[key] for key in ("processor", "cores")},
         "versions": {"python": source.python, **source.compared},
     }
@@ -44,25 +46,14 @@ def _source_hash() -> str:
     return digest.hexdigest()[:12]
 
 
-def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+def differences(before: Mapping[str, Mapping[str, Any]], now: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     """Yield the differences between two terms, in words."""
-    for name in {**before, **now}:
-        old, new = before.get(name), now.get(name)
-        if isinstance(old, dict) and isinstance(new, dict):
-            yield from (f"{name}: {key} {text}" for key, text in _between(old, new))
-        elif old != new:
-            yield f"{name} {_text(old)}, now {_text(new)}"
-
-
-def _between(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key in {**old, **new}:
-        if key not in new:
-            yield key, "(now without)"
-        elif key not in old:
-            yield key, "missing (now with)"
-        elif old[key] != new[key]:
-            yield key, f"{_text(old[key])}, now {_text(new[key])}"
-
-
-def _text(value: Any) -> str:
-    return ", ".join(value) if isinstance(value, list) else str(value)
+    for group in {**before, **now}:
+        old, new = before.get(group, {}), now.get(group, {})
+        for key in {**old, **new}:
+            if key not in new:
+                yield f"{group}: {key} (now without)"
+            elif key not in old:
+                yield f"{group}: {key} missing (now with)"
+            elif old[key] != new[key]:
+                yield f"{group}: {key} {old[key]}, now {new[key]}"

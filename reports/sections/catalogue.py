@@ -2,98 +2,84 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import groupby
+from typing import Any
 
 from conservative import registry
 from conservative.errors import BadInput, MissingEngine
-from conservative.method import Method, Role
+from conservative.method import Role
 
 from ..document.model import Document, Table
 
 SCENE_HEADER = ("name", "t_end, s", "dt, s", "conserved by the motion", "source")
-TITLES = {Role.OURS: "ours", Role.ENGINE: "engines", Role.TRUTH: "reference solutions", None: "not available"}
 METHOD_HEADER = ("name", "order", "conserves", "version, or why it cannot run")
-
-
-@dataclass(frozen=True)
-class SceneEntry:
-    """A scene as the list shows it; times in s."""
-
-    name: str
-    group: str
-    source: str
-    invariants: tuple[str, ...]
-    t_end: float
-    dt: float
-
-
-@dataclass(frozen=True)
-class MethodEntry:
-    """A method in the list. Without its engine, `available` is False and `reason` contains the command that installs it."""
-
-    name: str
-    role: Role | None
-    label: str
-    order: int | None
-    conserves: tuple[str, ...]
-    available: bool
-    reason: str
-
-
-def scenes() -> list[SceneEntry]:
-    """Return every registered scene, sorted by group and name."""
-    return sorted((_scene(name) for name in registry.list_scenes()), key=lambda entry: (entry.group, entry.name))
-
-
-def _scene(name: str) -> SceneEntry:
-    scene = registry.scene(name)
-    return SceneEntry(
-        name, scene.group, scene.source, tuple(i.name for i in scene.invariants), scene.t_end, scene.dt or scene.t_end
-    )
-
-
-def methods() -> list[MethodEntry]:
-    """Return every variant of every registered method, ours first, then engines, then truths."""
-    entries = [entry for name in registry.list_methods() for entry in _variants(name)]
-    return sorted(entries, key=lambda entry: (*Role, None).index(entry.role))
-
-
-def _variants(name: str) -> list[MethodEntry]:
-    try:
-        return [_method(method) for method in registry.method(name).settings_for("variants")]
-    except (MissingEngine, BadInput) as missing:
-        # An engine that is not installed, or a registered package that is not whole: shown, never fatal for the list.
-        return [MethodEntry(name, None, "", None, (), False, str(missing))]
-
-
-def _method(method: Method) -> MethodEntry:
-    try:
-        label, reason = method.label, ""
-    except MissingEngine as missing:
-        label, reason = "", str(missing)
-    return MethodEntry(method.name, method.role, label, method.order, tuple(sorted(method.conserves)), not reason, reason)
+TITLES = {Role.OURS: "ours", Role.ENGINE: "engines", Role.TRUTH: "reference solutions", "": "not available"}
 
 
 def build() -> Document:
     """Return a table for each group of scenes, then for each role of methods."""
     every_scene, every_method = scenes(), methods()
     tables = [
-        Table(SCENE_HEADER, [_scene_row(entry) for entry in members], f"Scenes: {group}")
-        for group, members in groupby(every_scene, key=lambda entry: entry.group)
+        Table(
+            SCENE_HEADER,
+            [
+                (each["name"], f"{each['t_end']:.4g}", f"{each['dt']:.4g}", ", ".join(each["invariants"]), each["source"])
+                for each in members
+            ],
+            f"Scenes: {group}",
+        )
+        for group, members in groupby(every_scene, key=lambda entry: str(entry["group"]))
     ]
     tables += [
-        Table(METHOD_HEADER, [_method_row(entry) for entry in members], f"Methods: {TITLES[role]}")
-        for role, members in groupby(every_method, key=lambda entry: entry.role)
+        Table(
+            METHOD_HEADER,
+            [
+                (
+                    each["name"],
+                    "-" if each["order"] is None else str(each["order"]),
+                    ", ".join(each["conserves"]) or "-",
+                    each["label"] or each["reason"],
+                )
+                for each in members
+            ],
+            f"Methods: {TITLES[role]}",
+        )
+        for role, members in groupby(every_method, key=lambda entry: entry["role"])
     ]
-    data = {"scenes": every_scene, "methods": [{**vars(entry), "role": entry.role or ""} for entry in every_method]}
-    return Document("conservative list", "Scenes and methods", tables, data=data)
+    return Document("conservative list", "Scenes and methods", tables, data={"scenes": every_scene, "methods": every_method})
 
 
-def _scene_row(entry: SceneEntry) -> tuple[str, ...]:
-    return entry.name, f"{entry.t_end:.4g}", f"{entry.dt:.4g}", ", ".join(entry.invariants), entry.source
+def scenes() -> list[dict[str, Any]]:
+    """Return every registered scene, sorted by group and name; times in s."""
+    entries = []
+    for name in registry.list_scenes():
+        scene = registry.scene(name)
+        names = [invariant.name for invariant in scene.invariants]
+        about = {"name": name, "group": scene.group, "source": scene.source, "invariants": names}
+        entries.append({**about, "t_end": scene.t_end, "dt": scene.dt or scene.t_end})
+    return sorted(entries, key=lambda entry: (entry["group"], entry["name"]))
 
 
-def _method_row(entry: MethodEntry) -> tuple[str, ...]:
-    order = "-" if entry.order is None else str(entry.order)
-    return entry.name, order, ", ".join(entry.conserves) or "-", entry.label or entry.reason
+def methods() -> list[dict[str, Any]]:
+    """Return every variant of every registered method: ours, engines, reference solutions, then those that are missing."""
+    return sorted(
+        (entry for name in registry.list_methods() for entry in _variants(name)),
+        key=lambda entry: list(TITLES).index(entry["role"]),
+    )
+
+
+def _variants(name: str) -> Iterator[dict[str, Any]]:
+    """Yield the variants of a method. If its engine is not installed, `reason` contains the command that installs it."""
+    try:
+        for method in registry.method(name).settings_for("variants"):
+            try:
+                label, reason = method.label, ""
+            except MissingEngine as missing:
+                label, reason = "", str(missing)
+            about = {"name": method.name, "role": method.role, "label": label, "order": method.order}
+            yield {**about, "conserves": sorted(method.conserves), "available": not reason, "reason": reason}
+    except (MissingEngine, BadInput) as missing:
+        # An engine that is not installed, or a registered package that is damaged: shown, never an error of the list.
+        about = {"name": name, "role": "", "label": "", "order": None}
+        yield {**about, "conserves": [], "available": False, "reason": str(missing)}

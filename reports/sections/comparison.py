@@ -1,4 +1,4 @@
-"""Two versions of a project compared: verdict, table, JSON and test cases."""
+"""Comparison of two versions of a project: verdict, table, JSON and test cases."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
-from conservative.benchmarks.gate import results
 from conservative.benchmarks.gate.compare import Violation
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, judge
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
-from ..document.cells import DASH, number
+from ..document.cells import DASH, number, numeric
 from ..document.model import (
     Cell,
     Check,
@@ -47,8 +46,8 @@ SHOWN = (Measure.ATTITUDE_MAX.text, ENERGY_DRIFT, Measure.ORDER.text)
 """Measures with a column in the table; all are compared and are in the JSON."""
 EXPLANATION = (
     "Times are relative to the earlier version, from several processes of both, which take turns. Both ends of an interval "
-    f"have {CONFIDENCE:.0%} confidence. A row fails if its whole interval is more than {SLOWER:.0%} slower, again so in new "
-    "processes, or if another value is worse than round-off explains."
+    f"have {CONFIDENCE:.0%} confidence. A row fails if its whole interval is more than {SLOWER:.0%} slower, in a second "
+    "measurement too, or if another value is worse than round-off explains."
 )
 
 
@@ -64,7 +63,6 @@ class Standing(StrEnum):
 
 
 _GRADES = {Standing.SLOWER: Grade.BAD, Standing.WORSE: Grade.BAD, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE}
-_MARKS = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}
 
 
 def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) -> Document:
@@ -77,6 +75,10 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
         f"gate: {'passed' if judged.passed else 'FAILED'}, {rows} row{'s' * (rows != 1)}, {timed} timed, "
         f"{violations} violation{'s' * (violations != 1)}"
     )
+    # A check for each row, and one for each violation that belongs to no row.
+    failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
+    for each in judged.violations:
+        failed.setdefault((each.scene, each.method), []).append(each.finding)
     packages = [(each.title, each.environment.python, ", ".join(each.packages)) for each in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
     notes = Items.of(f"note: {note}" for note in judged.notes)
@@ -96,7 +98,7 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
         f"{versions[1].title} against {versions[0].title}",
         filled(
             Paragraph(verdict, Emphasis.LEAD),
-            Section("What is worse", filled(Items.of(findings))),
+            Section("Violations", filled(Items.of(findings))),
             Section("Rows", [Paragraph(explained), table(comparison, judged.violations)]),
             Section("Notes", filled(notes)),
             Section("Versions", [Table(("version", "Python", "packages"), packages, "Packages of both versions")]),
@@ -104,7 +106,7 @@ def build(comparison: ProjectComparison, made: Mapping[str, str] | None = None) 
         ),
         brief=filled(Paragraph(verdict), Items.of(findings), notes),
         data=data,
-        checks=_checks(comparison, judged.violations),
+        checks=[Check(*name, failure="\n".join(texts)) for name, texts in failed.items()],
         failures=findings,
     )
 
@@ -118,30 +120,26 @@ def table(comparison: ProjectComparison, violations: Sequence[Violation]) -> Tab
         ratio = _ratio(entry[1])
         return list(Standing).index(entry[0]), -abs(math.log(ratio.value)) if ratio else 0.0
 
-    return Table(HEADER, [_cells(line, standing) for standing, line in sorted(standings, key=rank)], "Rows", Style.FILTERED)
+    return Table(HEADER, [_row(line, standing) for standing, line in sorted(standings, key=rank)], "Rows", Style.FILTERED)
 
 
-def _checks(comparison: ProjectComparison, violations: Sequence[Violation]) -> list[Check]:
-    """Return a check for each row, and one for each violation that belongs to no row."""
-    found: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
-    for each in violations:
-        found.setdefault((each.scene, each.method), []).append(each.finding)
-    return [Check(*name, failure="\n".join(texts)) for name, texts in found.items()]
-
-
-def _cells(line: ProjectLine, standing: Standing) -> Row:
-    (was, now), time, ratio, grade = line.results, line.times, _ratio(line), _GRADES.get(standing)
-    drawn = None if ratio is None else Interval(ratio.value, ratio.low, ratio.high, 1 + SLOWER)
-    slower = Grade.BAD if standing is Standing.SLOWER else None
-    return (
-        line.scene,
-        line.setting,
-        standing.value if grade is None else Cell(f"{_MARKS.get(grade, '')}{standing}", grade),
-        Cell(f"{ratio.value:.3f}", slower, interval=drawn) if ratio else DASH,
-        f"{ratio.low:.3f} to {ratio.high:.3f}" if ratio else DASH,
-        DASH if time is None else f"{number(1e6 * time.was, 3)} → {number(1e6 * time.now, 3)}",
-        *(_pair(was, now, name) for name in SHOWN),
-    )
+def _row(line: ProjectLine, standing: Standing) -> Row:
+    (was, now), time, ratio, graded = line.results, line.times, _ratio(line), _GRADES.get(standing)
+    mark = {Grade.BAD: "✗ ", Grade.GOOD: "✓ "}.get(graded or Grade.NONE, "")
+    cells: list[str | Cell] = [line.scene, line.setting, Cell(f"{mark}{standing}", graded)]
+    if ratio is None:
+        cells += [DASH, DASH]
+    else:
+        drawn = Interval(ratio.value, ratio.low, ratio.high, 1 + SLOWER)
+        slower = Grade.BAD if standing is Standing.SLOWER else None
+        cells.append(Cell(f"{ratio.value:.3f}", slower, value=ratio.value, interval=drawn))
+        cells.append(numeric(ratio.low, f"{ratio.low:.3f} to {ratio.high:.3f}"))
+    times = (math.nan, math.nan) if time is None else (1e6 * time.was, 1e6 * time.now)
+    values = [[row.values.get(name, math.nan) if row else math.nan for row in (was, now)] for name in SHOWN]
+    for before, after in (times, *values):
+        texts = [number(value, 3) for value in (before, after)]
+        cells.append(numeric(after, " → ".join(dict.fromkeys(texts))))  # equal ones once
+    return cells
 
 
 def _ratio(line: ProjectLine) -> Ratio | None:
@@ -158,11 +156,6 @@ def _standing(line: ProjectLine, failed: bool) -> Standing:
     if line.times is None:
         return Standing.NOTHING
     return Standing.FASTER if line.times.first.high < 1 / (1 + SLOWER) else Standing.SAME
-
-
-def _pair(was: results.Row | None, now: results.Row | None, name: str) -> str:
-    before, after = (number(row.values.get(name, math.nan), 3) if row else DASH for row in (was, now))
-    return before if before == after else f"{before} → {after}"
 
 
 def _record(line: ProjectLine) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from itertools import groupby
 import pandas as pd
 
 from conservative.benchmarks.contest import cost
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.engines_at_one_step import AS_INSTALLED
 from conservative.benchmarks.studies.engines_over_steps import WORSE
@@ -19,7 +20,7 @@ from conservative.outcome import OK, Outcome, OutcomeKind
 from conservative.scene import Scene
 
 from ..charts import figures, vega_embed
-from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
+from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
 from ..document.model import Block, Cell, Figure, Grade, Item, Items, LegendEntry, Paragraph, Row, Section, Style, Table
 from ..rows.names import of_measure, of_study, outcomes, with_outcome
 from ..rows.points import points as points_over
@@ -36,7 +37,7 @@ MOMENTA = ("momentum", "vertical momentum")
 AT_ITS_BEST = "at its best"
 ABSENT = (OutcomeKind.UNSUPPORTED, OutcomeKind.MISSING)
 FAR_FROM_ORDER = 0.5
-"""How far an order may be below the expected one without a mark."""
+"""Largest difference of an order below the expected one that is not marked."""
 
 COLUMNS = (
     (
@@ -44,29 +45,34 @@ COLUMNS = (
         "as installed: only the step size is set (– if a user has to choose a setting or no defaults are stated); at its "
         "best: the setting with the smallest error; both.",
     ),
-    ("bits", "of the engine's numbers: 64 double precision, 32 single."),
-    ("error", "largest attitude error over the run; engines that choose their steps use the tolerance of the setting."),
+    ("bits", "precision of the engine's numbers: 64 double, 32 single."),
     (
-        "order",
-        "fit of log(error) over log(step), in parentheses the expected order of the integrator; ✗ if the order is lower. "
+        "error, rad",
+        "largest attitude error over the run; engines that choose their steps use the tolerance of the setting.",
+    ),
+    (
+        "order (expected)",
+        "fit of log(error) over log(step), and the expected order of the integrator; ✗ if the order is lower. "
         f"Impulse-based engines in single precision get {WORSE}: they have no order.",
     ),
-    ("energy drift, world momentum drift", "largest relative drift of the run, and whether it was gained or lost at the end."),
+    ("energy drift", "largest relative drift of the run, and whether energy was gained or lost at the end."),
+    ("world momentum drift", "the same of the conserved momentum: of a free body, or about the axis of a field."),
     ("turns over", "number of flips of the free body, and of the exact motion: the quality of the motion."),
-    ("longest step", f"longest measured step with an error of at most {USABLE:g} rad; – if there is none."),
+    ("longest step, s", f"longest measured step with an error of at most {USABLE:g} rad; – if there is none."),
     ("µs a step", "wall time at the scene's step, the fastest of interleaved rounds, measured in the engine's process."),
     (
         f"µs per s at {ERROR:g} rad",
         "wall time of a simulated second at this error, interpolated log-log between two measured steps or tolerances; – if no "
         "measured run reaches it.",
     ),
+    ("run", "the outcome."),
 )
-"""The meaning of the columns."""
+"""The columns of the table of settings, and their meaning."""
 
 
 @dataclass(frozen=True)
 class EngineRow:
-    """One setting of one engine on one scene; NaN or a dash for values that were not measured.
+    """One setting of one engine on one scene.
 
     Attributes
     ----------
@@ -78,14 +84,12 @@ class EngineRow:
         Outcome of the run at the scene's step, or of its timing.
     as_installed, best
         Whether only the step is set, and whether no setting of the engine has a smaller error.
-    bits, error
-        Precision of its numbers, and largest attitude error at the scene's step, rad.
-    energy, momentum, turns, order
-        Cells: drifts, flips of the body, and the observed order with the expected one.
-    longest_step
-        The longest step, s, with an error of `USABLE` or less.
-    step_time, second_time
-        Wall time, s, of a step at the scene's step, and of a simulated second at an error of `ERROR`.
+    error
+        Largest attitude error at the scene's step, rad; NaN if it was not measured.
+    second_time
+        Wall time of a simulated second at an error of `ERROR`, s; NaN if it is not reached.
+    cells
+        The cells of `COLUMNS` by name, except "taken".
     """
 
     engine: str
@@ -94,16 +98,16 @@ class EngineRow:
     series: str
     outcome: Outcome
     as_installed: bool
-    bits: float
     error: float
-    energy: Cell
-    momentum: Cell
-    turns: str | Cell
-    order: str | Cell
-    longest_step: float
-    step_time: float
     second_time: float
+    cells: Mapping[str, Cell]
     best: bool = False
+
+    @property
+    def taken(self) -> str:
+        """The first cell."""
+        names = [AS_INSTALLED] * self.as_installed + [AT_ITS_BEST] * self.best
+        return "both" if len(names) == 2 else "".join(names)
 
 
 def section(measured: Measured) -> Section:
@@ -115,11 +119,11 @@ def section(measured: Measured) -> Section:
         "process, one process at a time. At its best: the setting with the smallest error at the scene's step. As "
         "installed: only the step size is set."
     )
-    columns = Items([Item(text, subject) for subject, text in COLUMNS])
+    columns = Items([Item(meaning, name) for name, meaning in COLUMNS])
     blocks: list[Block] = [Paragraph(words)]
     for scene in measured.plan.scenes:
         blocks += _scene_sections(engine_rows(table, scene.name, points), of_scene(points, scene.name), scene)
-    blocks.append(Section("The meaning of the columns", [columns], folded=True))
+    blocks.append(Section("Meaning of the columns", [columns], folded=True))
     blocks.append(Section("Versions and environments", [_versions(measured), *lock_sections(measured.source.environments)]))
     return Section("Engines", blocks, "engines")
 
@@ -131,7 +135,7 @@ def _scene_sections(rows: Sequence[EngineRow], points: pd.DataFrame, scene: Scen
             f"{count} engines support this scene. {scene.t_end:g} s at dt = {dt} s. Drifts are the largest of the run, "
             f"relative: ✓ up to {tolerance(CONSERVED)}, ≈ up to {tolerance(SMALL)}, ✗ more."
         )
-        yield Section(f"{name}: as installed, and at its best", [Paragraph(words), beside(rows, name)])
+        yield Section(f"{name}: as installed, and at its best", [Paragraph(words), side_by_side(rows, name)])
         drawn = picture_points(rows, points)
         none = Paragraph("No run was close enough to the motion to be timed.")
         yield Section(f"{name}: work against precision", [figure(drawn, name) if len(drawn) else none])
@@ -189,29 +193,39 @@ def engine_rows(table: pd.DataFrame, scene: str, points: pd.DataFrame) -> list[E
 
 def _engine_row(rows: pd.DataFrame, lines: Mapping[str, pd.DataFrame], timed: Mapping[str, pd.DataFrame]) -> EngineRow:
     first = rows.iloc[0]
-    label, setting, series = (str(first[name]) for name in ("label", "setting", "series"))
+    series = str(first["series"])
     line, points = lines.get(series, rows.iloc[:0]), timed.get(series)
     ends = pd.concat([of_measure(rows, measure) for measure in (Measure.ATTITUDE_MAX, Measure.TIME)])
-    good = with_outcome(of_measure(line, Measure.ATTITUDE_MAX), OutcomeKind.OK)
-    expected = _value(rows, Measure.ORDER_EXPECTED)
-    has_step = not math.isnan(expected)
-    momenta = [_drift(rows, name) for name in MOMENTA if len(of_measure(rows, Measure.DRIFT_MAX, name))]
+    outcome = next((outcome for outcome in outcomes(ends) if not outcome.ok), OK)
+    usable = with_outcome(of_measure(line, Measure.ATTITUDE_MAX), OutcomeKind.OK)
+    expected, error, bits = (_value(rows, each) for each in (Measure.ORDER_EXPECTED, Measure.ATTITUDE_MAX, Measure.PRECISION))
+    longest_step, step_time = float(usable[usable["value"] <= USABLE]["dt"].max()), _value(rows, Measure.TIME_PER_STEP)
+    if math.isnan(expected):  # it chooses its steps
+        longest_step = step_time = math.nan
+    second_time = math.nan if points is None else cost(points["error"].tolist(), points["time"].tolist(), ERROR)
+    momentum = next((name for name in MOMENTA if len(of_measure(rows, Measure.DRIFT_MAX, name))), MOMENTA[0])
+    cells = (
+        numeric(bits),
+        numeric(error),
+        _order(line, expected),
+        _drift(rows, "energy"),
+        _drift(rows, momentum),
+        _turns(_value(rows, Measure.TURNS_OVER), _value(rows, Measure.TURNS_OVER_TRUE)),
+        numeric(longest_step),
+        numeric(step_time * 1e6, digits=3),
+        numeric(second_time * 1e6, digits=3),
+        outcome_cell(outcome, reason=True),
+    )
     return EngineRow(
         engine="==".join(filter(None, (first["engine"], first["version"]))),
-        label=label,
-        setting=setting,
+        label=str(first["label"]),
+        setting=str(first["setting"]),
         series=series,
-        outcome=next((outcome for outcome in outcomes(ends) if not outcome.ok), OK),
+        outcome=outcome,
         as_installed=AS_INSTALLED in set(of_measure(rows, Measure.PRECISION)["detail"]),
-        bits=_value(rows, Measure.PRECISION),
-        error=_value(rows, Measure.ATTITUDE_MAX),
-        energy=_drift(rows, "energy"),
-        momentum=momenta[0] if momenta else grade_drift(math.nan),
-        turns=_turns(_value(rows, Measure.TURNS_OVER), _value(rows, Measure.TURNS_OVER_TRUE)),
-        order=_order(line, expected),
-        longest_step=float(good[good["value"] <= USABLE]["dt"].max()) if has_step else math.nan,
-        step_time=_value(rows, Measure.TIME_PER_STEP) if has_step else math.nan,
-        second_time=math.nan if points is None else cost(points["error"].tolist(), points["time"].tolist(), ERROR),
+        error=error,
+        second_time=second_time,
+        cells=dict(zip([name for name, _ in COLUMNS[1:]], cells, strict=True)),
     )
 
 
@@ -224,28 +238,28 @@ def _drift(rows: pd.DataFrame, quantity: str) -> Cell:
     """Return a graded drift; the direction is given if it is more than small."""
     drift = of_measure(rows, Measure.DRIFT_MAX, quantity)
     size = float(drift["value"].iloc[0]) if len(drift) else math.nan
-    cell = grade_drift(size)
-    return Cell(f"{cell.text} {drift['detail'].iloc[0]}".rstrip(), cell.grade) if size > SMALL else cell
+    return grade(size, f"{number(size)} {drift['detail'].iloc[0]}".rstrip() if size > SMALL else "")
 
 
-def _turns(turns: float, expected: float) -> str | Cell:
+def _turns(turns: float, expected: float) -> Cell:
     if math.isnan(turns) or math.isnan(expected):
-        return DASH
+        return Cell(DASH)
     right = turns == expected
     return Cell(f"{'✓' if right else '✗'} {turns:.0f} of {expected:.0f}", Grade.GOOD if right else Grade.BAD)
 
 
-def _order(line: pd.DataFrame, expected: float) -> str | Cell:
+def _order(line: pd.DataFrame, expected: float) -> Cell:
     """Return the observed order with the expected one, marked if it is lower, or that there is none."""
     if math.isnan(expected):
-        return DASH
+        return numeric(math.nan)
     fit, order = of_measure(line, Measure.ORDER), _value(line, Measure.ORDER)
     if len(fit) and fit["outcome"].iloc[0] == OutcomeKind.NO_ORDER and fit["reason"].iloc[0] == WORSE:
         return Cell(f"{DASH} none ({expected:.0f}): {WORSE}", Grade.BAD)
     if math.isnan(order):
-        return f"{DASH} not seen ({expected:.0f})"
+        return numeric(order, f"{DASH} not seen ({expected:.0f})")
     text = f"{order:.2f} ± {_value(line, Measure.ORDER_STDERR):.2f} ({expected:.0f})"
-    return Cell(f"✗ {text}", Grade.BAD) if order < expected - FAR_FROM_ORDER else text
+    low = order < expected - FAR_FROM_ORDER
+    return Cell(f"✗ {text}" if low else text, Grade.BAD if low else None, value=order)
 
 
 def _mark_best(rows: list[EngineRow]) -> list[EngineRow]:
@@ -262,79 +276,37 @@ def _mark_best(rows: list[EngineRow]) -> list[EngineRow]:
 
 def every_setting(rows: Sequence[EngineRow], dt: str, scene: str) -> Table:
     """Return a row for each setting, and one for each engine that does not support the scene; `dt` is the scene's step, s."""
-    header = [
-        "engine==version/setting",
-        "taken",
-        "bits",
-        f"error at dt {dt}, rad",
-        "order (expected)",
-        "energy drift",
-        "world momentum drift",
-        "turns over",
-        "longest step, s",
-        "µs a step",
-        f"µs per s at {ERROR:g} rad",
-        "run",
+    names = [name for name, _ in COLUMNS]
+    shown: list[Row] = [
+        [row.label, row.taken, *(row.cells[name] for name in names[1:])] for row in rows if row.outcome.kind not in ABSENT
     ]
-    there: list[Row] = [
-        [
-            row.label,
-            _taken(row),
-            _integer(row.bits),
-            number(row.error),
-            row.order,
-            row.energy,
-            row.momentum,
-            row.turns,
-            number(row.longest_step),
-            number(row.step_time * 1e6, 3),
-            number(row.second_time * 1e6, 3),
-            _with_reason(row.outcome),
-        ]
-        for row in rows
-        if row.outcome.kind not in ABSENT
-    ]
-    absent = sorted((row for row in rows if row.outcome.kind in ABSENT), key=_reason)
-    for (engine, _), group in groupby(absent, _reason):
+
+    def reason(row: EngineRow) -> tuple[str, str]:
+        return row.engine, row.outcome.reason
+
+    absent = sorted((row for row in rows if row.outcome.kind in ABSENT), key=reason)
+    for (engine, _), group in groupby(absent, reason):
         members = list(group)
         label = members[0].label if len(members) == 1 else f"{engine}, {len(members)} settings"
-        there.append([label, *[DASH] * (len(header) - 2), _with_reason(members[0].outcome)])
-    return Table(header, there, f"{scene}: every setting of every engine", Style.FILTERED)
+        shown.append([label, *[DASH] * (len(names) - 1), members[0].cells["run"]])
+    caption = f"{scene}: every setting of every engine at dt = {dt} s"
+    return Table(["engine==version/setting", *names], shown, caption, Style.FILTERED)
 
 
-def _reason(row: EngineRow) -> tuple[str, str]:
-    return row.engine, row.outcome.reason
-
-
-def _taken(row: EngineRow) -> str:
-    if row.as_installed and row.best:
-        return "both"
-    return AS_INSTALLED if row.as_installed else AT_ITS_BEST if row.best else ""
-
-
-def _with_reason(outcome: Outcome) -> Cell:
-    """Return an outcome with its reason, which other tables omit."""
-    cell = outcome_cell(outcome)
-    known = outcome.ok or not outcome.reason or outcome.reason in cell.text
-    return cell if known else Cell(f"{cell.text}: {outcome.reason}", cell.grade)
-
-
-def _integer(value: float) -> str:
-    return DASH if math.isnan(value) else f"{value:.0f}"
-
-
-def beside(rows: Sequence[EngineRow], scene: str) -> Table:
+def side_by_side(rows: Sequence[EngineRow], scene: str) -> Table:
     """Return each engine as installed next to its best setting, the most accurate engines first."""
-    parts = ("setting", "attitude error, rad", "energy drift", "turns over")
-    header = ["engine", "bits", *(f"{text}: {part}" for text in (AS_INSTALLED, AT_ITS_BEST) for part in parts)]
+    parts = ("error, rad", "energy drift", "turns over")
+    sides = (AS_INSTALLED, AT_ITS_BEST)
+    header = ["engine", "bits", *(f"{side}: {part}" for side in sides for part in ("setting", *parts))]
     body: list[Row] = []
     for best in (row for row in rows if row.best):
-        installed = next((row for row in rows if row.engine == best.engine and row.as_installed), None)
-        body.append([best.engine, _integer(best.bits), *(_short(installed) if installed else [DASH] * 4), *_short(best)])
+        cells: list[str | Cell] = [best.engine, best.cells["bits"]]
+        for row in (next((row for row in rows if row.engine == best.engine and row.as_installed), None), best):
+            if row is None:
+                cells += [DASH] * 4
+            elif math.isnan(row.error):
+                cells += [row.setting, outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
+            else:
+                cells += [row.setting, *(row.cells[part] for part in parts)]
+        body.append(cells)
     return Table(header, body, f"{scene}: each engine", Style.FILTERED)
-
-
-def _short(row: EngineRow) -> list[str | Cell]:
-    if math.isnan(row.error):
-        return [row.setting, outcome_cell(Outcome(row.outcome.kind)), DASH, DASH]
-    return [row.setting, number(row.error), row.energy, row.turns]

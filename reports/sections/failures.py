@@ -9,7 +9,7 @@ from conservative.benchmarks.studies.studies import ENGINES, HARD
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
-from ..document.cells import number, outcome_text
+from ..document.cells import DASH, numeric, outcome_text
 from ..document.model import Paragraph, Section, Style, Table, filled
 from ..rows.names import of_study, outcomes, with_outcome, without_outcome
 
@@ -25,25 +25,20 @@ def section(table: pd.DataFrame) -> Section:
         "Errors are relative to a reference solution that a second, independent one confirms."
     )
     absent = Section("Unsupported or not installed", filled(unsupported(table)), folded=True)
-    title = "What failed, what is not supported, and the reference solutions"
-    return Section(title, filled(Paragraph(words), failures(table), absent, truths(table)), "failures", "What failed")
+    title = "Failures, unsupported runs, and the reference solutions"
+    return Section(title, filled(Paragraph(words), failures(table), absent, truths(table)), "failures", "Failures")
 
 
 def failures(table: pd.DataFrame) -> Table:
     """Return the runs that failed or were skipped."""
     rows = without_outcome(table[~table["study"].isin(_ELSEWHERE)], OutcomeKind.OK, OutcomeKind.NO_ORDER, *_ABSENT)
     rows = rows.assign(text=list(map(outcome_text, outcomes(rows))))
-    body = [
-        [*map(str, key), ", ".join(members["study"].unique()), _steps(members)]
-        for key, members in rows.groupby(["scene", "name", "text"], sort=False)
-    ]
+    body = []
+    for key, members in rows.groupby(["scene", "name", "text"], sort=False):
+        steps = sorted(members["dt"].dropna().unique(), reverse=True)
+        body.append([*map(str, key), ", ".join(members["study"].unique()), ", ".join(f"{step:.3g}" for step in steps) or DASH])
     header = ["scene", "method", "outcome", "studies", "at steps, s"]
     return Table(header, body, "Runs that failed or were skipped", Style.FILTERED)
-
-
-def _steps(members: pd.DataFrame) -> str:
-    steps = sorted(members["dt"].dropna().unique(), reverse=True)
-    return ", ".join(f"{step:.3g}" for step in steps) or "–"
 
 
 def unsupported(table: pd.DataFrame) -> Table:
@@ -55,13 +50,15 @@ def unsupported(table: pd.DataFrame) -> Table:
         [*map(str, key), ", ".join(members["name"].unique())]
         for key, members in rows.groupby(["scene", "outcome", "reason"], sort=False)
     ]
-    return Table(["scene", "outcome", "why (numbers: of the first)", "methods"], body)
+    return Table(["scene", "outcome", "reason (its numbers are those of the first run)", "methods"], body)
 
 
 def truths(table: pd.DataFrame) -> Table:
     """Return the difference of the two independent reference solutions, for each scene and step."""
     rows = table[table["measure"] == Measure.AGREEMENT.text]
-    body = [[row["scene"], f"{row['dt']:g}", row["label"], number(row["value"])] for _, row in rows.iterrows()]
+    body = [
+        [row["scene"], numeric(row["dt"], f"{row['dt']:g}"), row["label"], numeric(row["value"])] for _, row in rows.iterrows()
+    ]
     header = ["scene", "dt, s", "reference solutions", "largest angle between them, rad"]
     return Table(header, body, "Agreement of two independent reference solutions")
 

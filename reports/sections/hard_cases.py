@@ -1,4 +1,4 @@
-"""The hard cases: how each method does on each, judged twice, and the longest step that works."""
+"""Each method on each hard case, judged by its motion and by its invariants, and the longest step that works."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any
 
 import pandas as pd
 
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import outcome_of
 from conservative.method import Role
 from conservative.outcome import Outcome, OutcomeKind
 
-from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
+from ..document.cells import DASH, grade, number, outcome_cell, tolerance
 from ..document.model import Cell, Grade, Paragraph, Row, Section, Style, Table
 from ..rows.names import of_study
 
@@ -32,12 +33,8 @@ def sections(table: pd.DataFrame) -> list[Section]:
         f"run failed; {DASH}: not supported, or nothing to judge."
     )
     cases, steps = hard_cases(table), stability(table)
-    found = []
-    if cases:
-        found.append(Section("Hard cases", [Paragraph(words), cases], "hard-cases"))
-    if steps:
-        found.append(Section("Stability", [steps], "stability"))
-    return found
+    judged = Section("Hard cases", [Paragraph(words), cases], "hard-cases") if cases else None
+    return [each for each in (judged, Section("Stability", [steps], "stability") if steps else None) if each]
 
 
 def hard_cases(table: pd.DataFrame) -> Table | None:
@@ -47,16 +44,17 @@ def hard_cases(table: pd.DataFrame) -> Table | None:
         return None
     judged = {key: judge(members) for key, members in _by_method_and_scene(rows).items()}
     cases, missing = list(rows["scene"].unique()), _judgement(_NOT_RUN, _NOT_RUN)
-    methods = sorted(rows["method"].unique(), key=lambda method: _rank([judged.get((method, case), missing) for case in cases]))
+
+    def rank(method: str) -> tuple[int, ...]:
+        """Return the number of cases in which the motion is not good, and the invariants."""
+        cells = [judged.get((method, case), missing) for case in cases]
+        return tuple(sum(cell.parts[half].grade is not Grade.GOOD for cell in cells) for half in (0, 1))
+
+    methods = sorted(rows["method"].unique(), key=rank)
     names = dict(zip(rows["method"], rows["name"], strict=True))
     body: list[Row] = [[str(case), *(judged.get((method, case), missing) for method in methods)] for case in cases]
     caption = "Each cell: first the motion, then the invariants. Hover or tap for the numbers."
     return Table(["case", *(str(names[method]) for method in methods)], body, caption, Style.GRID)
-
-
-def _rank(judgements: list[Cell]) -> tuple[int, ...]:
-    """Return how many cases a method does not do well: of the motion, then of the invariants."""
-    return tuple(sum(each.parts[half].grade is not Grade.GOOD for each in judgements) for half in (0, 1))
 
 
 def _by_method_and_scene(rows: pd.DataFrame) -> dict[tuple[str, str], list[Record]]:
@@ -76,25 +74,18 @@ def judge(records: list[Record]) -> Cell:
         if record["outcome"] != OutcomeKind.OK:
             cell = outcome_cell(outcome_of(record))
             return _judgement(cell, cell)
-    errors, motion, invariants = _values(records, Measure.ATTITUDE_MAX), _NOTHING, _NOTHING
+    errors = _values(records, Measure.ATTITUDE_MAX)
+    motion = grade(max(errors), f"{number(max(errors))} rad", (RIGHT, USABLE)) if errors else _NOTHING
     drifts = [each for each in records if each["measure"] == Measure.DRIFT_MAX.text and not math.isnan(each["value"])]
-    if errors:
-        motion = _motion(max(errors))
-    if drifts:
-        worst = max(drifts, key=lambda each: each["value"])
-        drift = grade_drift(worst["value"])
-        invariants = Cell(f"{drift.text} {worst['quantity']}", drift.grade)
-    return _judgement(motion, invariants)
+    if not drifts:
+        return _judgement(motion, _NOTHING)
+    worst = max(drifts, key=lambda each: each["value"])
+    return _judgement(motion, grade(worst["value"], f"{number(worst['value'])} {worst['quantity']}"))
 
 
 def _judgement(motion: Cell, invariants: Cell) -> Cell:
     text = str(motion) if motion == invariants else f"motion {motion}, invariants {invariants}"
     return Cell(text, parts=(motion, invariants))
-
-
-def _motion(error: float) -> Cell:
-    symbol, grade = ("✓", Grade.GOOD) if error <= RIGHT else ("≈", Grade.FAIR) if error <= USABLE else ("✗", Grade.BAD)
-    return Cell(f"{symbol} {number(error)} rad", grade)
 
 
 def stability(table: pd.DataFrame) -> Table | None:
@@ -121,4 +112,6 @@ def _longest(records: list[Record]) -> Cell:
     if not (steps := _values(records, Measure.LONGEST_STEP)):
         return outcome_cell(Outcome(OutcomeKind(ends[0]))) if ends else _NOT_RUN
     text = f"{number(max(steps))} rad"
-    return Cell(f"≈ {text}, then {ends[0]}", Grade.FAIR) if ends else Cell(f"✓ {text} and more", Grade.GOOD)
+    if ends:
+        return Cell(f"≈ {text}, then {ends[0]}", Grade.FAIR, value=max(steps))
+    return Cell(f"✓ {text} and more", Grade.GOOD, value=max(steps))

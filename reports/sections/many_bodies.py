@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import pandas as pd
 
-from conservative.benchmarks.contest import Cheapest, Contest, cheapest, costs
+from conservative.benchmarks.contest import Contest, cheapest, costs
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.studies import THROUGHPUT
 from conservative.benchmarks.studies.throughput import ERRORS, MEDIAN, MOST
@@ -15,10 +14,9 @@ from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
 from ..charts.style import families_of
-from ..document.cells import DASH, number, tolerance
-from ..document.model import Cell, Emphasis, Figure, Items, Layout, Paragraph, Section, Style, Table, filled
+from ..document.cells import DASH, grade_ratio, number, numeric, tolerance
+from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
 from ..rows.names import OF_ENGINES, MethodClass, class_of
-from .random_bodies import grade, ratio_text
 
 TERMS = (
     "All bodies differ: asymmetric, in rotated frames, heavy tops with no point on an axis, or free, drawn from a seed. "
@@ -35,28 +33,22 @@ STATISTICS = (MEDIAN, MOST)
 
 
 def section(table: pd.DataFrame) -> Section:
-    """Return the section of a report from named rows of the study (see `labels.with_names`)."""
+    """Return the section of a report from named rows of the study (see `names.with_names`)."""
     rows = lines(table)
     reached = body_costs(rows)
-    compared, figure = list(contests(rows, reached)), None
+    figure = None
     points = reached[reached["statistic"] == MEDIAN].assign(time=reached["time"] * 1e6)
     points = points.rename(columns={"scene": "kind", "bodies": "size"})[["kind", "error", "name", "family", "size", "time"]]
     if len(points):
+        title = "Many bodies: the cost of one of them"
         summary = "Time per body and simulated second at equal error, against the number of bodies; lower is better."
         picture = figures.body_costs(points)
         panels = vega_embed.embed(picture, ("name", "size", "time"), 240)
         legend = vega_embed.legend(families_of(points), marks=False)
-        title = "Many bodies: the cost of one of them"
         figure = Figure("many_bodies", title, summary, picture, panels, legend, Layout.PANELS)
-    more = Section("What did not run", filled(absent(table)), folded=True)
-    blocks = filled(
-        Items.of(statements(compared)),
-        figure,
-        as_table(compared),
-        cost_table(rows, reached),
-        more,
-        Paragraph(TERMS, Emphasis.NOTE),
-    )
+    more = Section("Methods that did not run", filled(absent(table)), folded=True)
+    compared = as_table(contests(rows, reached))
+    blocks = filled(figure, compared, cost_table(rows, reached), more, Paragraph(TERMS, Emphasis.NOTE))
     return Section("Many bodies", blocks, "many-bodies")
 
 
@@ -115,44 +107,37 @@ def _largest(kind: str, error: float, sides: tuple[pd.DataFrame, pd.DataFrame], 
     return size, Contest(kind, error, ours, theirs)
 
 
-Compared = tuple[MethodClass, str, str, int, Contest]
-
-
-def as_table(compared: Iterable[Compared]) -> Table:
-    """Return the contests, a row for each kind, engine and error."""
-    header = ["bodies", "of our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
-    rows = [_contest_row(*each) for each in compared]
-    return Table([*header, "ours is", "engine is"], rows, "Many bodies: an engine's time over ours", Style.FILTERED)
-
-
-def _contest_row(group: MethodClass, engine: str, statistic: str, size: int, contest: Contest) -> list[str | Cell]:
-    sides: tuple[Cheapest | None, Cheapest | None] = (contest.ours, contest.theirs)
-    times = [number(each.time * 1e6, 3) if each else DASH for each in sides]
-    names = [each.name if each else "no time" for each in sides]
-    at = [contest.scene.replace("_", " "), group.value, engine, tolerance(contest.error), statistic, f"{size:,}"]
-    return [*at, grade(contest.ratio), *times, *names]
+def as_table(compared: Iterable[tuple[MethodClass, str, str, int, Contest]]) -> Table:
+    """Return the results of `contests`, a row for each kind, engine and error."""
+    header = ["bodies", "our methods", "engine", "error, rad", "at", "number", "engine / ours", "ours, µs", "engine, µs"]
+    rows: list[Row] = []
+    for group, engine, statistic, size, contest in compared:
+        sides = (contest.ours, contest.theirs)
+        times = [numeric(each.time * 1e6, digits=3) if each else DASH for each in sides]
+        names = [each.name if each else "no time" for each in sides]
+        error, count = numeric(contest.error, tolerance(contest.error)), numeric(size, f"{size:,}")
+        kind = contest.scene.replace("_", " ")
+        rows.append([kind, group.value, engine, error, statistic, count, grade_ratio(contest.ratio), *times, *names])
+    return Table([*header, "ours is", "engine is"], rows, "Many bodies: an engine's time divided by ours", Style.FILTERED)
 
 
 def cost_table(rows: pd.DataFrame, reached: pd.DataFrame) -> Table:
     """Return every line: body-steps per second at best, the least preparation, and the time among most bodies at each error."""
     header = ["bodies", "method", "class", "10^6 body-steps/s, best", "preparation, µs a body, least"]
+    header += [f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS]
     body = []
     for (kind, name, _, _, _, group), members in rows.groupby(LINE, sort=False):
         rate, prepare = (members[members["measure"] == each.text]["value"] for each in (Measure.BODY_STEPS, Measure.PREPARE))
         mine = reached[(reached["scene"] == kind) & (reached["name"] == name) & (reached["statistic"] == MEDIAN)]
-        times = [_cost_text(mine[mine["error"] == error]) for error in ERRORS]
-        figures = [number(float(rate.max()) / 1e6, 3), number(float(prepare.min()) * 1e6, 3)]
-        body.append([str(kind).replace("_", " "), str(name), str(group), *figures, *times])
-    header += [f"µs a body and second at {tolerance(error)} rad (number)" for error in ERRORS]
+        values = (float(rate.max()) / 1e6, float(prepare.min()) * 1e6)
+        cells: list[str | Cell] = [numeric(value, digits=3) for value in values]
+        for error in ERRORS:
+            sizes = mine[mine["error"] == error].sort_values("bodies")
+            most = sizes.iloc[-1] if len(sizes) else None
+            text = DASH if most is None else f"{number(most['time'] * 1e6, 3)} ({most['bodies']:,})"
+            cells.append(DASH if most is None else numeric(most["time"], text))
+        body.append([str(kind).replace("_", " "), str(name), str(group), *cells])
     return Table(header, body, "Many bodies: the cost of one of them", Style.FILTERED)
-
-
-def _cost_text(found: pd.DataFrame) -> str:
-    """Return the time among the most bodies at which a line reaches an error, and their number."""
-    if found.empty:
-        return DASH
-    most: pd.Series[Any] = found.sort_values("bodies").iloc[-1]
-    return f"{number(most['time'] * 1e6, 3)} ({most['bodies']:,})"
 
 
 def absent(table: pd.DataFrame) -> Table:
@@ -163,24 +148,4 @@ def absent(table: pd.DataFrame) -> Table:
     ]
     grouped = failed.groupby(["scene", "name", "outcome", "reason"], sort=False).size()
     rows = [[str(scene).replace("_", " "), str(name), f"{kind}: {reason}"] for scene, name, kind, reason in grouped.index]
-    return Table(["bodies", "method", "why not"], rows, "Many bodies: what did not run")
-
-
-def statements(compared: Iterable[Compared]) -> Iterator[str]:
-    """Yield the results at the median, a sentence for each kind, engine and class of ours."""
-    groups: dict[tuple[str, str, MethodClass], list[str]] = {}
-    for group, engine, statistic, size, contest in compared:
-        if statistic == MEDIAN:
-            groups.setdefault((contest.scene, engine, group), []).append(_words(engine, size, contest))
-    for (kind, engine, group), words in groups.items():
-        yield f"{kind.replace('_', ' ')}, the cheapest of {group} against {engine}: {'; '.join(words)}."
-
-
-def _words(engine: str, size: int, contest: Contest) -> str:
-    at, ratio = f"at {tolerance(contest.error)} rad", contest.ratio
-    if not contest.ours or not contest.theirs:
-        missing = [name for name, side in (("ours", contest.ours), (engine, contest.theirs)) if not side]
-        return f"{at} there is no time of {' and '.join(missing)}"
-    if ratio >= 1:
-        return f"{at} {engine} takes {ratio_text(ratio)} times as long (among {size:,})"
-    return f"{at} {engine} is {ratio_text(1 / ratio)} times as fast as ours (among {size:,})"
+    return Table(["bodies", "method", "reason"], rows, "Many bodies: methods that did not run")

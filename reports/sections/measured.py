@@ -1,4 +1,4 @@
-"""What the sections of a report are made from."""
+"""The plan, measurements and origin of a report, and selections of rows that its sections share."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
+from conservative.benchmarks.studies.step_ladder import SAMPLES
 from conservative.benchmarks.studies.studies import ENGINES, RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
@@ -17,6 +18,7 @@ from ..run.measure import Measurements
 from ..run.plan import Plan
 from ..run.provenance import Provenance
 from . import random_bodies
+from .scene_contests import EachStep, each_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,15 @@ class Measured:
 
     @cached_property
     def points(self) -> pd.DataFrame:
-        """Errors and times on the scenes (see `rows.points`)."""
-        return points.all_points(self.rows)
+        """Errors and times on the scenes (see `rows.points`), and the time per `sample`, s."""
+        every = points.all_points(self.rows)
+        intervals = {scene.name: scene.t_end / SAMPLES for scene in self.plan.scenes}
+        return every.assign(sample=every["time"] * every["scene"].map(intervals))
+
+    @cached_property
+    def every_step(self) -> dict[str, EachStep | None]:
+        """Costs with every step stored on each scene; None without the study."""
+        return {scene.name: each_step(self.scene_rows, scene.name) for scene in self.plan.scenes}
 
     @cached_property
     def long_drifts(self) -> pd.DataFrame:

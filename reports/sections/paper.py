@@ -11,11 +11,9 @@ from ..document.model import Figure, Layout, Section, Table, filled
 from ..rows import lines
 from ..rows.names import of_study
 
-_MEASURES = (Measure.PERIOD, Measure.PERIOD_X1, Measure.PERIOD_DISTANCE)
-
 
 def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:
-    """Return the section; figures whose scene is not in the report are left out."""
+    """Return the section, without figures whose scene is not in the report."""
     rates, errors, positions = lines.body_rates(samples), lines.conservation_errors(samples), lines.centre_of_mass(samples)
     figures = []
     if len(rates):
@@ -37,7 +35,9 @@ def position_errors(table: pd.DataFrame) -> Table | None:
     if rows.empty:
         return None
     wide = rows.pivot(index="dt", columns="measure", values="value").sort_index(ascending=False)
-    values = [(dt, *(row[measure.text] for measure in _MEASURES)) for dt, row in wide.iterrows()]
-    body = [[f"{dt:g}", f"{t:g}", f"{x1:.4f}", f"{distance:.4f}"] for dt, t, x1, distance in values]
+    body = []
+    for dt, row in wide.iterrows():
+        t, x1, distance = (row[measure.text] for measure in (Measure.PERIOD, Measure.PERIOD_X1, Measure.PERIOD_DISTANCE))
+        body.append([f"{dt:g}", f"{t:g}", f"{x1:.4f}", f"{distance:.4f}"])
     caption = "Error of the centre of mass of the top after one period of precession (the nearest whole number of steps)"
     return Table(["dt, s", "t, s", "error of x1, m", "distance, m"], body, caption)

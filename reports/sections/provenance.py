@@ -1,4 +1,4 @@
-"""How a report was made: command, machine, versions."""
+"""Origin of a report: command, machine, versions."""
 
 from __future__ import annotations
 
@@ -10,18 +10,12 @@ from ..run.provenance import LockedEngine, Provenance
 
 def section(source: Provenance) -> Section:
     """Return the section."""
-    facts = [
-        ("command", f"`{source.command}`"),
-        ("date", source.date),
-        *(("resumed", part) for part in source.resumed),
-        ("commit", source.commit),
-        *source.machine.items(),
-        ("python", source.python),
-        *source.compared.items(),
-    ]
-    others = Section("Every other package", [Paragraph(", ".join(source.others))], folded=True)
+    facts = {**source.facts, "command": f"`{source.command}`"}
+    resumed = [("resumed", part) for part in source.resumed]
+    packages = [f"{name} {version}" for name, version in source.packages.items() if name not in source.compared]
+    others = Section("Every other package", [Paragraph(", ".join(packages))], folded=True)
     locks = Section("Environments of engines", lock_sections(source.environments))
-    return Section("How this was made", filled(Facts(facts), others, locks), "made")
+    return Section("How this was made", filled(Facts([*facts.items(), *resumed]), others, locks), "made")
 
 
 def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:

@@ -15,10 +15,10 @@ from ..document.model import Block, Document, Emphasis, Items, Paragraph, Sectio
 from ..rows.names import method_text, setting_text
 
 REACHING = ("method", "setting", "µs per simulated s", "error to expect, rad", "drift to expect")
-FAILING = ("method", "nearest setting", "µs per simulated s", "keeps the error for", "to expect, rad", "drift to expect")
+FAILING = ("method", "nearest setting", "µs per simulated s", "reaches the error for", "to expect, rad", "drift to expect")
 PROBES = ("method", "setting", "run, s", "error, rad", "to expect, rad")
 NEGLIGIBLE = 1e-13
-"""Relative drift up to which the tables show `kept`."""
+"""Relative drift up to which the tables show `conserved`."""
 
 
 def build(recommendation: Recommendation) -> Document:
@@ -117,7 +117,7 @@ def notes(recommendation: Recommendation) -> list[str]:
     return [
         f"Fastest: {_fastest(recommendation)}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
-        f"kept: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
+        f"conserved: relative drifts below {NEGLIGIBLE:g}; ↗: a drift that grows steadily; lost: an error of π rad or more.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {truth.agreement_rad:.1e} rad over the "
         f"first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
@@ -150,6 +150,6 @@ def _expected(probe: Probe) -> str:
 
 
 def drift_text(drifts: Sequence[ExpectedDrift]) -> str:
-    """Return the relative drifts to expect; an arrow marks a steady drift, `kept` stands for a few rounding units."""
+    """Return the relative drifts to expect; an arrow marks a steady drift, `conserved` stands for round-off."""
     large = [f"{d.name} {d.expected:.0e}{' ↗' if d.secular else ''}" for d in drifts if d.expected > NEGLIGIBLE]
-    return ", ".join(large) or "kept"
+    return ", ".join(large) or "conserved"

@@ -33,12 +33,13 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
     blocks += hard_cases.sections(rows)
     blocks += filled(paper.section(rows, measured.samples), failures.section(rows), provenance.section(source))
     tables = [closing.scene_table(measured.rows, of_scene(measured.points, scene.name), scene.name) for scene in plan.scenes]
-    sentence = closing.verdict(measured.points, [scene.name for scene in plan.scenes])
+    sentences = [random_bodies.sentence(measured.ratios)] if measured.ratios else []
+    sentences += [summary.sentence for summary in summaries.values()]
     return Document(
         "conservative report",
         "Which integrator for a rotating body?",
         blocks,
-        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), Paragraph(sentence)],
+        brief=[*tables, Paragraph(f"{closing.LEGEND}\n"), *map(Paragraph, sentences)],
         data={"schema": SCHEMA, **vars(source), "rows": records(measurements.table)},
         failures=failures.failures_of_ours(rows),
     )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import pandas as pd
 
+from conservative.benchmarks.measures.errors import CONSERVED, SMALL
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies import long_runs, sphere_curves, step_ladder
 from conservative.deferred_imports import DEFAULT_METHOD
@@ -15,8 +15,8 @@ from conservative.scene import Scene
 
 from ..charts import figures, spheres, vega_embed
 from ..charts.style import colours, families_of
-from ..document.cells import CONSERVED, DASH, SMALL, grade_drift, number, outcome_cell, tolerance
-from ..document.model import Block, Emphasis, Figure, Layout, LegendEntry, Paragraph, Row, Section, Style, Table, filled
+from ..document.cells import DASH, grade, number, numeric, outcome_cell, tolerance
+from ..document.model import Block, Cell, Emphasis, Figure, Layout, LegendEntry, Paragraph, Row, Section, Style, Table, filled
 from ..rows import lines
 from ..rows.names import of_measure, of_study, outcomes, without_solutions
 from ..rows.points import front, under
@@ -28,24 +28,18 @@ from .summary import of_scene as summary_of_scene
 
 def summarize(measured: Measured, scene: Scene) -> Summary:
     """Return the summary of a scene."""
-    return summary_of_scene(
-        _points(measured, scene),
-        of_scene(measured.long_drifts, scene.name),
-        of_scene(scenes_in_trouble(measured.scene_rows), scene.name),
-        scene.integrable,
-        scene_contests.each_step(measured.scene_rows, scene.name),
-    )
+    troubles = scenes_in_trouble(measured.scene_rows)
+    points, drifts, failed = (of_scene(rows, scene.name) for rows in (measured.points, measured.long_drifts, troubles))
+    return summary_of_scene(points, drifts, failed, scene.integrable, measured.every_step[scene.name])
 
 
 def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     """Return the section of a scene."""
-    name, rows = scene.name, measured.scene_rows
-    errors = of_scene(lines.errors(rows, Measure.ATTITUDE_MAX), name)
-    fits, rate_fits = (lines.fits(found) for found in (errors, of_scene(lines.errors(rows, Measure.RATES_MAX), name)))
-    contests = scene_contests.as_table(_points(measured, scene), _interval(scene), scene_contests.each_step(rows, name))
+    name, rows, points = scene.name, measured.scene_rows, of_scene(measured.points, scene.name)
+    contests = scene_contests.as_table(points, scene.t_end / step_ladder.SAMPLES, measured.every_step[name])
     sample = f"A sample is one of {step_ladder.SAMPLES} in the duration; in the last rows, each of the scene's own steps."
     classes = replace(summary.classes, caption=f"{name}: µs of computing per simulated second, by class of methods")
-    decades = replace(contests, caption=f"{name}: fastest of each class at each decade of the error")
+    decades = replace(contests, caption=f"{name}: fastest method of each class at each decade of the error")
     drift_words = (
         f"Largest drift over {long_runs.DURATIONS:g} durations, relative (✓ up to {tolerance(CONSERVED)}, ≈ up to "
         f"{tolerance(SMALL)}, ✗ more). The picture shows zero as 1e-17."
@@ -60,10 +54,13 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
         'compiled code available, and "first call" the first run after that. The first column of numbers is the time per step '
         f"relative to `{DEFAULT_METHOD}`."
     )
-    work: list[Block] = [_work_figure(measured, scene, summary), classes]
+    picture = figures.work_precision(points, front(without_solutions(points)), name)
+    work: list[Block] = [families_figure(summary, f"work_precision_{name}", name, picture), classes]
     if decades.rows:
         work.append(Section("Each decade of error", [Paragraph(sample), decades], folded=True))
-    drifts = filled(_drift_figure(measured, name), Paragraph(drift_words), conservation(rows, name))
+    errors, rate_errors = (of_scene(lines.errors(rows, each), name) for each in (Measure.ATTITUDE_MAX, Measure.RATES_MAX))
+    fits = lines.fits(errors)
+    orders = filled(order(fits, lines.fits(rate_errors), name), accuracy(rows, name))
     curves = _sphere_figure(measured, scene)
     return Section(
         name,
@@ -71,10 +68,10 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
             Paragraph(summary.sentence, Emphasis.LEAD),
             Paragraph(f"{scene.source}{'. ' * bool(scene.source)}{scene.t_end:g} s; the scene's own step is {scene.dt:g} s."),
             Section("Work against precision", work),
-            Section("Drift over time", drifts),
+            Section("Drift over time", filled(_drift_figure(measured, name), Paragraph(drift_words), conservation(rows, name))),
             Section("Drift at the scene's own step", filled(drift(rows, name)), folded=True),
             Section("Convergence", [_convergence_figure(errors, fits, name), Paragraph(order_words)]),
-            Section("Orders and errors as tables", filled(order(fits, rate_fits, name), accuracy(rows, name)), folded=True),
+            Section("Orders and errors as tables", orders, folded=True),
             Section("Wall time", [Paragraph(time_words), time(rows, name)]),
             Section("The motion itself", [curves]) if curves else None,
         ),
@@ -82,44 +79,26 @@ def section(measured: Measured, scene: Scene, summary: Summary) -> Section:
     )
 
 
-def _interval(scene: Scene) -> float:
-    """Return the time between two samples that errors are read at, s."""
-    return scene.t_end / step_ladder.SAMPLES
-
-
-def _points(measured: Measured, scene: Scene) -> pd.DataFrame:
-    points = of_scene(measured.points, scene.name)
-    return points.assign(sample=points["time"] * _interval(scene))
-
-
-def families_figure(summary: Summary, name: str, what: str, picture: object = None) -> Figure:
-    """Return work against precision with the best of each family; the legend shows the others."""
-    points = summary.points
+def families_figure(summary: Summary, name: str, motion: str, picture: object = None) -> Figure:
+    """Return time against error with the best of each family; the legend shows the others."""
+    points, legend, lines = summary.points, [], []
     best = points[~points["single"].astype(bool)]
-    members = [(str(line), rows) for line, rows in best.groupby("name", sort=False)]
-    hidden = [line for line, _ in members if line not in summary.shown]
+    for line, members in best.groupby("name", sort=False):
+        family, kind = members[["family", "class"]].iloc[0]
+        dash, path = " ".join(map(str, figures.CLASS_DASHES[kind])), vega_embed.PATHS[figures.CLASS_SHAPES[kind]]
+        legend.append(LegendEntry(str(line), colours({str(line): family})[str(line)], path, dash, line in summary.shown))
+        lines.append((str(line), members))
+    hidden = [entry.name for entry in legend if not entry.shown]
     shown = ("name", "setting", "error", "microseconds", *(["within"] if best["within"].any() else ["sample", "dt"]))
     return Figure(
         name,
-        f"{what}: computing time against attitude error, the best of each family",
-        " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(members, "error", "time")]),
+        f"{motion}: computing time against attitude error, the best of each family",
+        " ".join(["Lower left is better. Solid: ours, dashed: engines.", *under(lines, "error", "time")]),
         picture,
         vega_embed.embed(figures.best_of_families(points), shown, 310, hidden) if len(points) else (),
-        [_entry(line, rows, line in summary.shown) for line, rows in members],
+        legend,
         Layout.FAMILIES,
     )
-
-
-def _entry(line: str, members: pd.DataFrame, shown: bool) -> LegendEntry:
-    family, kind = members[["family", "class"]].iloc[0]
-    dash = " ".join(map(str, figures.CLASS_DASHES[kind]))
-    return LegendEntry(line, colours({line: family})[line], vega_embed.PATHS[figures.CLASS_SHAPES[kind]], dash, shown)
-
-
-def _work_figure(measured: Measured, scene: Scene, summary: Summary) -> Figure:
-    points, name = _points(measured, scene), scene.name
-    picture = figures.work_precision(points, front(without_solutions(points)), name)
-    return families_figure(summary, f"work_precision_{name}", name, picture)
 
 
 def _drift_figure(measured: Measured, name: str) -> Figure:
@@ -131,7 +110,7 @@ def _drift_figure(measured: Measured, name: str) -> Figure:
     return Figure(
         f"drift_{name}",
         f"{name}: drift over time",
-        " ".join(["Each quantity has a panel: a level line is conserved, a rising one drifts.", *under(members, "t", "shown")]),
+        " ".join(["A panel for each quantity: a level line is conserved, a rising one drifts.", *under(members, "t", "shown")]),
         figures.drift(drifts, name),
         vega_embed.embed(figures.drift(thin, name), ("name", "t", "drift"), 220),
         vega_embed.legend(families_of(drifts), marks=False),
@@ -152,49 +131,38 @@ def _convergence_figure(errors: pd.DataFrame, fits: pd.DataFrame, name: str) -> 
     )
 
 
-_POLHODE = (
-    "polhode on the momentum sphere",
-    "The angular momentum in body axes. The exact one is closed: a drift makes it a band, or leaves the sphere.",
-)
-_TRACE = (
-    "trace of the axis on the unit sphere",
-    "The axis in space. A band wider than the exact one shows a long step, a wandering one drift.",
-)
-
-
 def _sphere_figure(measured: Measured, scene: Scene) -> Figure | None:
     """Return the curves of a scene, a sphere each; None without that study."""
     curves = of_scene(lines.curves(measured.samples), scene.name)
     if curves.empty:
         return None
-    kind, words = _POLHODE if scene.free else _TRACE
+    title, words = "trace of the axis on the unit sphere", "The axis in space. Drift makes the curve wander or widen."
+    if scene.free:
+        title = "polhode on the momentum sphere"
+        words = "The angular momentum in body axes. The exact curve is closed; drift widens it or leaves the sphere."
     wanted = sphere_curves.select_methods(measured.plan.methods)
     absent = ", ".join(method.name for method in wanted if method.name not in set(curves["method"]))
     failed = f" Not drawn, as they fail or do not support the scene: {absent}." if absent else ""
     summary = f"At the scene's own step, over {long_runs.DURATIONS:g} durations. {words}{failed}"
     panels = [spheres.chart(curve) for _, curve in curves.groupby("name", sort=False)]
-    return Figure(f"sphere_{scene.name}", f"{scene.name}: {kind}", summary, panels=panels, layout=Layout.SPHERES)
+    return Figure(f"sphere_{scene.name}", f"{scene.name}: {title}", summary, panels=panels, layout=Layout.SPHERES)
 
 
 def _wide(table: pd.DataFrame, study: str, scene: str) -> pd.DataFrame:
-    """Return the values of a study at the scene's step: a row a method, ours first, and a column (measure, quantity)."""
+    """Return the values of a study at the scene's step: a row for each method, ours first, a column (measure, quantity)."""
     rows = of_study(table, study, scene)
     rows = rows[rows["dt"] == rows.groupby("method")["dt"].transform("max")]
     return rows.pivot_table(index="name", columns=["measure", "quantity"], values="value", sort=False)
 
 
-def _by_name(values: pd.DataFrame) -> list[tuple[str, pd.Series[float]]]:
-    return [(str(name), row) for name, row in values.iterrows()]
-
-
-def _ranked(values: pd.DataFrame, *columns: tuple[str, object]) -> list[tuple[str, pd.Series[float]]]:
-    """Return the lines by columns, the smallest first, those without it last: ours and the engines' among each other."""
+def _lines(values: pd.DataFrame, *ranks: tuple[str, object]) -> list[tuple[str, pd.Series[float]]]:
+    """Return name and values of each line, sorted by the columns `ranks`, without a value last."""
 
     def rank(line: tuple[str, pd.Series[float]]) -> list[tuple[bool, float]]:
-        numbers = (float(line[1].get(column, math.nan)) for column in columns)
+        numbers = (float(line[1].get(column, math.nan)) for column in ranks)
         return [(math.isnan(number), number) for number in numbers]
 
-    return sorted(_by_name(values), key=rank)
+    return sorted(((str(name), row) for name, row in values.iterrows()), key=rank)
 
 
 def _value(row: pd.Series[float], measure: Measure, quantity: str = "") -> float:
@@ -206,17 +174,17 @@ def drift(table: pd.DataFrame, scene: str) -> Table:
     values = _wide(table, "paper", scene)
     invariants = [column[1] for column in values.columns if column[0] == Measure.DRIFT_MAX.text]
     header = ["method", *(f"{name}{part}" for name in invariants for part in ("", ", 1/s")), "orthonormality"]
-    body = [
-        [name, *_drift_cells(row, invariants), number(_value(row, Measure.ORTHONORMALITY))] for name, row in _by_name(values)
-    ]
+    body: list[Row] = []
+    for name, row in _lines(values):
+        cells: list[str | Cell] = [name]
+        for invariant in invariants:
+            slope, error = _value(row, Measure.DRIFT_SLOPE, invariant), _value(row, Measure.DRIFT_SLOPE_STDERR, invariant)
+            cells += [
+                numeric(_value(row, Measure.DRIFT_MAX, invariant)),
+                numeric(slope, f"{number(slope)} ± {number(error, 1)}"),
+            ]
+        body.append([*cells, numeric(_value(row, Measure.ORTHONORMALITY))])
     return Table(header, body, f"{scene}: largest relative drift at the scene's step, and its slope", Style.FILTERED)
-
-
-def _drift_cells(row: pd.Series[float], invariants: Iterable[str]) -> Iterator[str]:
-    for name in invariants:
-        slope, error = _value(row, Measure.DRIFT_SLOPE, name), _value(row, Measure.DRIFT_SLOPE_STDERR, name)
-        yield number(_value(row, Measure.DRIFT_MAX, name))
-        yield f"{number(slope)} ± {number(error, 1)}"
 
 
 _ERRORS = ((Measure.ATTITUDE_MAX, "rad"), (Measure.ATTITUDE_FINAL, "rad"), (Measure.RATES_MAX, "relative"))
@@ -230,23 +198,22 @@ def accuracy(table: pd.DataFrame, scene: str) -> Table:
     wide = rows.pivot_table(index="name", columns=["measure", "dt"], values="value", sort=False)
     header = ["method", *(f"{measure}, {unit}, dt {step:g}" for measure, unit in _ERRORS for step in steps)]
     keys = [(measure.text, step) for measure, _ in _ERRORS for step in steps]
-    body = [[name, *(number(row.get(key, math.nan)) for key in keys)] for name, row in _ranked(wide, *keys)]
+    body: list[Row] = [[name, *(numeric(float(row.get(key, math.nan))) for key in keys)] for name, row in _lines(wide, *keys)]
     return Table(header, body, f"{scene}: error of attitude and rates", Style.FILTERED)
 
 
 def order(attitude: pd.DataFrame, rates: pd.DataFrame, scene: str) -> Table:
     """Return observed orders of attitude and rates, from `lines.fits`, and the window of steps of the attitude's fit."""
     header = ["method", "order, attitude", "order, rates", "fit window, s", "points", "floor, rad"]
-    of_rates = dict(zip(rates["name"], rates["text"], strict=True))
-    fits = [fit for _, fit in attitude.iterrows()]
-    body = [[str(fit["name"]), str(fit["text"]), str(of_rates.get(fit["name"], DASH)), *_window(fit)] for fit in fits]
+    of_rates = {str(fit["name"]): numeric(fit["slope"], str(fit["text"])) for _, fit in rates.iterrows()}
+    body: list[Row] = []
+    for _, fit in attitude.iterrows():
+        window = [f"{fit['coarse']:.3g} to {fit['fine']:.3g}", str(int(fit["points"]))]
+        slopes = numeric(fit["slope"], str(fit["text"])), of_rates.get(str(fit["name"]), DASH)
+        body.append(
+            [str(fit["name"]), *slopes, *([str(fit["reason"]), DASH] if fit["reason"] else window), numeric(fit["floor"])]
+        )
     return Table(header, body, f"{scene}: observed order", Style.FILTERED)
-
-
-def _window(fit: pd.Series[float]) -> list[str]:
-    if fit["reason"]:
-        return [str(fit["reason"]), DASH, number(fit["floor"])]
-    return [f"{fit['coarse']:.3g} to {fit['fine']:.3g}", str(int(fit["points"])), number(fit["floor"])]
 
 
 _TIMES = (
@@ -261,37 +228,29 @@ _TIMES = (
 
 def time(table: pd.DataFrame, scene: str) -> Table:
     """Return wall times at the scene's step: minimum and median of interleaved rounds, and the costs before the first step."""
-    values = _wide(table, "speed", scene)
     rows = of_measure(of_study(table, "speed", scene), Measure.TIME)
     details = rows.set_index("name")["detail"]
     header = ["method", f"steps of {DEFAULT_METHOD}", *(title for _, _, title in _TIMES), "timed"]
-    ranked = _ranked(values, (Measure.TIME.text, ""))
+    ranked = _lines(_wide(table, "speed", scene), (Measure.TIME.text, ""))
     unit = next((_value(row, Measure.TIME_PER_STEP) for name, row in ranked if name == DEFAULT_METHOD), math.nan)
-    body = [[name, *_times(row, unit), str(details.get(name, ""))] for name, row in ranked]
+    body: list[Row] = []
+    for name, row in ranked:
+        values = _value(row, Measure.TIME_PER_STEP) / unit, *(_value(row, measure) * scale for measure, scale, _ in _TIMES)
+        body.append([name, *(numeric(value, digits=3) for value in values), str(details.get(name, ""))])
     return Table(header, body, f"{scene}: wall time at the scene's step", Style.FILTERED)
-
-
-def _times(row: pd.Series[float], unit: float) -> Row:
-    steps = number(_value(row, Measure.TIME_PER_STEP) / unit, 3)
-    return [steps, *(number(_value(row, measure) * scale, 3) for measure, scale, _ in _TIMES)]
 
 
 def conservation(table: pd.DataFrame, scene: str) -> Table:
     """Return the drift of every quantity with every method in the long runs, the best methods first, and the outcomes."""
-    rows = long_run_drifts(table)
-    rows = rows[rows["scene"] == scene]
+    rows = of_scene(long_run_drifts(table), scene)
     quantities = list(rows["quantity"].unique())
-    members = sorted((group for _, group in rows.groupby("method", sort=False)), key=_worst)
-    body = [_conservation(group, quantities) for group in members]
+
+    def rank(members: pd.DataFrame) -> tuple[bool, float]:
+        return bool(members["value"].isna().any()), float(members["value"].max())  # complete runs, then the largest drift
+
+    body: list[Row] = []
+    for members in sorted((group for _, group in rows.groupby("method", sort=False)), key=rank):
+        values = members.set_index("quantity")["value"]
+        cells = [grade(float(values.get(quantity, math.nan))) for quantity in quantities]
+        body.append([str(members["name"].iloc[0]), *cells, outcome_cell(outcomes(members)[0])])
     return Table(["method", *quantities, "run"], body, f"{scene}: largest drift in long runs", Style.FILTERED)
-
-
-def _worst(rows: pd.DataFrame) -> tuple[bool, float]:
-    """Return the rank of a method: complete runs first, then the largest drift."""
-    return bool(rows["value"].isna().any()), float(rows["value"].max())
-
-
-def _conservation(rows: pd.DataFrame, quantities: list[str]) -> Row:
-    first, values = rows.iloc[0], rows.set_index("quantity")["value"]
-    cells = [grade_drift(float(values.get(quantity, math.nan))) for quantity in quantities]
-    return [first["name"], *cells, outcome_cell(outcomes(rows)[0])]

@@ -12,7 +12,7 @@ from conservative.benchmarks.studies.studies import RANDOM, THROUGHPUT
 from conservative.outcome import OutcomeKind
 
 from ..document.cells import DASH, number
-from ..document.model import Document, Facts, Items, Paragraph, Row, Section, Table, filled
+from ..document.model import Block, Document, Facts, Paragraph, Row, Section, Table, filled
 from ..rows.names import prefix_quantity, with_names
 from ..run.measure import Measurements
 from . import many_bodies, random_bodies
@@ -33,14 +33,15 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     """
     data: dict[str, Any] = {"study": name, **made}
     named = with_names(measured.table)
+    shown: list[Block]
     if name == RANDOM:
         ratios = random_bodies.ratios(named)
-        found = (random_bodies.as_table(ratios), random_bodies.by_engine(ratios), Items.of(random_bodies.statements(ratios)))
-        shown, terms = filled(*found), random_bodies.TERMS
+        sentence = Paragraph(random_bodies.sentence(ratios))
+        shown, terms = filled(random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence), random_bodies.TERMS
         data["ratios"] = random_bodies.records(ratios)
     elif name == THROUGHPUT:
-        section = many_bodies.section(named)
-        shown, terms = [block for block in section.blocks if isinstance(block, Items | Table | Section)], many_bodies.TERMS
+        shown = [block for block in many_bodies.section(named).blocks if isinstance(block, Table | Section)]
+        terms = many_bodies.TERMS
     else:
         shown, terms = [rows_table(name, named)], ""
     data |= {"rows": records(measured.table), "samples": records(measured.samples)}
@@ -50,7 +51,7 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
 
 
 def rows_table(name: str, table: pd.DataFrame) -> Table:
-    """Return named rows (see `labels.with_names`) as a table."""
+    """Return named rows (see `names.with_names`) as a table."""
     header = ["scene", "method", "step, s", "measure", "value", "unit", "outcome"]
     rows = [_row(row) for row in prefix_quantity(table).to_dict("records")]
     return Table(header, rows, f"{name}: {len(table)} rows")

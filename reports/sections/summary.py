@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from conservative.benchmarks.contest import cheapest, costs
@@ -26,9 +27,8 @@ MIDDLE = ERRORS[1]
 """Attitude error, rad, of the sentence, and of the cost at which errors are compared."""
 FINE = tuple(10 ** (-quarter / 4) for quarter in range(4, 57))
 """Errors, rad, for the comparison at equal cost."""
-HEADER = ("class", "keeps", "error at equal cost", *(f"µs at {tolerance(error)} rad" for error in ERRORS), "where it fails")
-SCENE_HEADER = (*HEADER[:-1], "µs a sample, each step kept", HEADER[-1])
-"""Header for a scene; random bodies have no study `each_step`."""
+MOST = 0.9
+"""Share of the bodies on which an error must be reached for a mean to be shown, so that the others bias it little."""
 TERMS = (
     "µs of wall time per simulated second at an attitude error, for the fastest method of the class; – if the error was not "
     "reached. Error at equal cost: the error of a class at the cost at which the fastest engine reaches "
@@ -39,9 +39,9 @@ TERMS = (
 SAMPLE_TERMS = (
     f"All methods have the same {SAMPLES} samples in the duration of a scene. An exact solution can take one step from sample "
     "to sample, so its cost per simulated second depends on their number. The cost of a sample is therefore measured with "
-    f"every step of the scene stored, at {tolerance(ERROR)} rad over all samples: for a run that stores them all as attitude "
-    "matrices and rates (for an engine including our conversion of its state, which is a large part for heyoka), and for a run "
-    "that stores the final state only, in which a solver can take longer steps."
+    f"every step of the scene stored, at {tolerance(ERROR)} rad over all samples: for a run that stores attitude matrices and "
+    "rates at every step (for an engine including our conversion of its state, which is a large part for heyoka), and for a "
+    "run that stores the final state only, in which a solver can take longer steps."
 )
 """Explanation of samples and their cost."""
 CAVEAT = (
@@ -60,56 +60,106 @@ class Summary:
     ----------
     sentence
         The verdict with its ratio.
-    points, shown
-        Data of the chart (see `families`), and the families that are visible at first.
+    points
+        Data of the chart (see `rows.points`).
     classes
         A row for each class of methods.
     """
 
     sentence: str
     points: pd.DataFrame
-    shown: tuple[str, ...]
     classes: Table
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Families that the chart shows at first."""
+        return first_names(self.points)
 
 
 def of_scene(
     points: pd.DataFrame, drifts: pd.DataFrame, troubles: pd.DataFrame, integrable: bool, each: EachStep | None = None
 ) -> Summary:
-    """Return the summary of a scene: its points, drifts over long runs, failures (see `overview`), samples at each step."""
-    data, reached, fine = picture(points), costs(points, ERRORS), costs(points, FINE)
+    """Return the summary of a scene from its points, drifts of long runs, failures, and runs with every step stored."""
+    reached = costs(points, dict.fromkeys((*ERRORS, *FINE)))
     scene = str(points["scene"].iloc[0]) if len(points) else "This scene"
+    failures = {}
+    for kind in MethodClass:
+        # A formulation that does not support a scene is not a failure of its class.
+        failed = troubles[troubles["family"].isin(of_classes(points, kind)["family"])] if len(troubles) else troubles
+        outcomes = without_outcome(failed, OutcomeKind.UNSUPPORTED).groupby("outcome", sort=False) if len(failed) else ()
+        failures[kind] = "; ".join(f"{name} at some settings: {', '.join(rows['family'].unique())}" for name, rows in outcomes)
+    samples = {kind: each.sample_text(kind) for kind in MethodClass} if each else None
     sentence = _sentence(scene, reached[reached["error"] == MIDDLE], integrable)
-    engine = cheapest(of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES))
-    budget = engine.time if engine else math.nan
+    return Summary(sentence, picture(points), classes_table(points, reached, drifts, failures, samples))
+
+
+def classes_table(
+    points: pd.DataFrame,
+    reached: pd.DataFrame,
+    drifts: pd.DataFrame,
+    failures: Mapping[MethodClass, str],
+    samples: Mapping[MethodClass, str] | None = None,
+) -> Table:
+    """Return a row for each class of methods; costs are geometric means over the scenes of `points`.
+
+    Parameters
+    ----------
+    points
+        Errors and times (see `rows.points`).
+    reached
+        Their costs (see `contest.costs`), at `ERRORS` at least.
+    drifts
+        Drifts of long runs (see `measured.long_run_drifts`).
+    failures
+        Failures of each class in words.
+    samples
+        Cost of a sample in each class, for a column of its own.
+    """
+    bodies = points["scene"].nunique()
+    engines = of_classes(reached[reached["error"] == MIDDLE], *OF_ENGINES)
+    budget = engines.groupby("scene")["time"].min()
+    header = ["class", "conserves", "error at equal cost", *(f"µs at {tolerance(error)} rad" for error in ERRORS)]
+    header += ["µs a sample, every step stored"] * bool(samples) + ["where it fails"]
     rows: list[Row] = []
     for kind in MethodClass:
-        members = of_classes(points, kind)
-        row: Row = [kind.value, *[DASH] * (len(HEADER) - 2), "does not support the scene, or was not measured"]
-        if len(members):
-            families = members["family"].unique()
-            best = [cheapest(of_classes(reached[reached["error"] == error], kind)) for error in ERRORS]
-            row = [
+        families = of_classes(points, kind)["family"].unique()
+        sample = [samples[kind]] if samples else []
+        if not len(families):
+            missing = "does not support these motions, or was not measured"
+            rows.append([kind.value, *[DASH] * (2 + len(ERRORS)), *sample, missing])
+            continue
+        best = cheapest_of_each(of_classes(reached, kind), "class")
+        at_errors = {error: best[best["error"] == error] for error in ERRORS}
+        within = best[best["time"] <= best["scene"].map(budget).fillna(0.0) * (1 + 1e-9)].groupby("scene")["error"].min()
+        affordable = number(geometric_mean(within), 1) if len(within) else f"over {FINE[0]:g}" if len(budget) else DASH
+        missed = {tolerance(error): bodies - len(rows) for error, rows in at_errors.items()} if bodies > 1 else {}
+        misses = (f"misses {error} on {count} of {bodies} bodies" for error, count in missed.items() if count)
+        rows.append(
+            [
                 Cell(kind.value, note=", ".join(families)),
-                keeps(drifts[drifts["family"].isin(families)]),
-                _error_at(of_classes(fine, kind), budget),
-                *(Cell(microseconds(found.time), note=found.name) if found else DASH for found in best),
-                "; ".join(_failures(troubles[troubles["family"].isin(families)])) or "nowhere here",
+                _conserved_text(drifts[drifts["family"].isin(families)]) if len(drifts) else "not measured",
+                affordable,
+                *(
+                    Cell(microseconds(geometric_mean(lines["time"])), note=lines["name"].mode().iloc[0])
+                    if len(lines) >= max(1, MOST * bodies)
+                    else DASH
+                    for lines in at_errors.values()
+                ),
+                *sample,
+                "; ".join(filter(None, [*misses, failures.get(kind, "")])) or "nowhere here",
             ]
-        rows.append(row)
-    if each is None or each.kept.empty:  # the report has no study `each_step`
-        return Summary(sentence, data, first_names(data), Table(HEADER, rows, style=Style.CARDS))
-    rows = [[*row[:-1], _sample(kind, each), row[-1]] for kind, row in zip(MethodClass, rows, strict=True)]
-    return Summary(sentence, data, first_names(data), Table(SCENE_HEADER, rows, style=Style.CARDS))
+        )
+    return Table(header, rows, style=Style.CARDS)
 
 
-def _sample(kind: MethodClass, each: EachStep) -> str:
-    """Return the cost of a sample in a class with every step stored and with the final state only, and the methods."""
-    kept, alone = (cheapest(of_classes(found, kind)) for found in (each.kept, each.alone))
-    if kept is None or alone is None:
-        return DASH
-    other = "" if alone.name == kept.name else f" {alone.name}"
-    stored, final = (microseconds(found.time * each.interval) for found in (kept, alone))
-    return f"{stored} {kept.name}; final state only: {final}{other}"
+def cheapest_of_each(reached: pd.DataFrame, by: str) -> pd.DataFrame:
+    """Return the cheapest line of each family, or of each class, for each scene and error."""
+    return reached.loc[reached.groupby([by, "scene", "error"], sort=False)["time"].idxmin()]
+
+
+def geometric_mean(values: pd.Series[float]) -> float:
+    """Return the geometric mean."""
+    return math.exp(float(np.log(values).mean()))
 
 
 def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
@@ -120,16 +170,19 @@ def _sentence(scene: str, reached: pd.DataFrame, integrable: bool) -> str:
     goal = f"{tolerance(MIDDLE)} rad"
     if ours and engine:
         first, second = (ours, engine) if ours.time <= engine.time else (engine, ours)
-        sides = ["our cheapest general integrator", "the cheapest engine"][:: 1 if first is ours else -1]
+        sides = ["our fastest general integrator", "the fastest engine"][:: 1 if first is ours else -1]
         times = f"{factor(second.time / first.time)} times as fast as {sides[1]}, {second.name}."
         parts.append(f"{sides[0].capitalize()}, {first.name}, reaches {goal} {times}")
     elif there := ours or engine:
         parts.append(f"Only {there.name} reaches {goal}.")
     else:
-        parts.append(f"Nothing measured reaches {goal}.")
+        parts.append(f"No measured method reaches {goal}.")
     if solution and engine:
-        ratio = factor(engine.time / solution.time)
-        parts.append(f"{solution.name}, which solves integrable motions only, is {ratio} times as fast as {engine.name} there.")
+        ratio, only = engine.time / solution.time, ", which solves integrable motions only"
+        if ratio >= 1:
+            parts.append(f"{solution.name}{only}, is {factor(ratio)} times as fast as {engine.name}.")
+        else:
+            parts.append(f"{engine.name} is {factor(1 / ratio)} times as fast as {solution.name}{only}.")
     return " ".join(parts)
 
 
@@ -138,30 +191,11 @@ def microseconds(time: float) -> str:
     return factor(1e6 * time)
 
 
-def keeps(drifts: pd.DataFrame) -> str:
-    """Return the invariants that the best setting of some methods conserves, and the drifts of the others."""
+def _conserved_text(drifts: pd.DataFrame) -> str:
+    """Return the invariants by how well the best setting conserves them; different momenta count as one."""
     rows = drifts.dropna(subset=["value"])
-    if rows.empty:
-        return "not measured"
     best = rows.groupby("quantity", sort=False)["value"].min()
-    best = best.groupby(best.index.map(_kind), sort=False).max()
-    marks = [("✓", -1.0, CONSERVED), ("≈", CONSERVED, SMALL), ("✗", SMALL, math.inf)]
-    parts = ((mark, [str(name) for name, value in best.items() if low < value <= high]) for mark, low, high in marks)
-    return "; ".join(f"{mark} {', '.join(names)}" for mark, names in parts if names)
-
-
-def _kind(quantity: str) -> str:
-    """Return the kind of an invariant in one word: the momentum differs between scenes."""
-    return "momenta" if "moment" in quantity else quantity
-
-
-def _error_at(found: pd.DataFrame, budget: float) -> str:
-    """Return the smallest error of `FINE` that a class reaches at a cost, s per simulated second."""
-    within = found[found["time"] <= budget * (1 + 1e-9)]["error"]
-    return number(float(within.min()), 1) if len(within) else DASH if math.isnan(budget) else f"over {FINE[0]:g}"
-
-
-def _failures(troubles: pd.DataFrame) -> Iterator[str]:
-    """Yield each kind of failure with its families. An unsupported formulation does not count."""
-    for outcome, members in without_outcome(troubles, OutcomeKind.UNSUPPORTED).groupby("outcome", sort=False):
-        yield f"{outcome} at some settings: {', '.join(members['family'].unique())}"
+    best = best.groupby(best.index.map(lambda name: "momenta" if "moment" in name else name), sort=False).max()
+    limits = {"✓": (-1.0, CONSERVED), "≈": (CONSERVED, SMALL), "✗": (SMALL, math.inf)}
+    parts = {mark: best.index[(best > low) & (best <= high)] for mark, (low, high) in limits.items()}
+    return "; ".join(f"{mark} {', '.join(names)}" for mark, names in parts.items() if len(names)) or "not measured"

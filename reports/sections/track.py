@@ -1,4 +1,4 @@
-"""Versions of an engine, and what changed from one to the next."""
+"""Versions of an engine, and the changes from one to the next."""
 
 from __future__ import annotations
 
@@ -7,26 +7,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from conservative.benchmarks.measures.convergence_order import Order
-from conservative.benchmarks.measures.errors import SMALL, DriftClass, classify
 from conservative.benchmarks.versions.changes import Aspect, Change, Transition, list_transitions
 from conservative.benchmarks.versions.engine import EngineComparison, EngineLine, Observation, Spread, ratio
 from conservative.outcome import Outcome, OutcomeKind
 
-from ..document.cells import DASH, number, outcome_cell, outcome_text
-from ..document.model import Cell, Check, Document, Emphasis, Facts, Grade, Items, Paragraph, Row, Section, Style, Table, filled
+from ..document.cells import DASH, grade, number, numeric, outcome_cell, outcome_text
+from ..document.model import Check, Document, Emphasis, Facts, Items, Paragraph, Row, Section, Style, Table, filled
 
-NOTHING_CHANGED = "No conclusion changed."
-NO_END = "no setting reaches the end of a run"
+NOTHING_CHANGED = "No change."
+NO_END = "no run reaches its end"
 PERCENT = 0.01
 """Smallest relative drift that is written in percent."""
 WHOLE = 0.25
 """An order within this distance of a whole number is written as that number."""
-_GRADES = {DriftClass.CONSERVED: ("✓", Grade.GOOD), DriftClass.SMALL: ("≈", Grade.FAIR), DriftClass.LARGE: ("✗", Grade.BAD)}
 _FITTED = ("slope", "stderr", "reason")
 """Fields of an order in the JSON."""
 _WORDS = (
-    "Orders are over shorter and shorter steps; everything else is at the step of the scene. A time ratio is relative to "
-    "the first version, from rounds that interleave all versions; in parentheses, the variation between repeats."
+    "Orders are fitted over a range of steps; everything else is at the step of the scene. A time ratio is relative to the "
+    "first version, from rounds that interleave all versions; in parentheses, the variation between repeats."
 )
 
 
@@ -48,15 +46,15 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
     lost_last = [each for each in transitions if each.lost and each.now.version == names[-1]]
     failures = []
     if gated:
-        failures = [sentence(each) for each in lost_last]
+        failures = [changes_text(each) for each in lost_last]
         if not any(line.results[-1] and line.results[-1].outcome.ok for line in comparison.lines):
             failures.append(f"{names[-1]}: {NO_END}")
-    sentences = [text for each in transitions if (text := sentence(each))]
+    sentences = [text for each in transitions if (text := changes_text(each))]
     by_scene: dict[str, list[EngineLine]] = {}
     for line in comparison.lines:
         by_scene.setdefault(line.scene, []).append(line)
     tables = [_table(scene, lines) for scene, lines in by_scene.items()]
-    changed = Section("What changed", [Items.of(sentences) if sentences else Paragraph(NOTHING_CHANGED)])
+    changed = Section("Changes", [Items.of(sentences) if sentences else Paragraph(NOTHING_CHANGED)])
     failed = [text for line in comparison.lines for text in _unfinished(line)]
     unfinished = Section("Runs that failed or show no order", filled(Items.of(failed)))
     verdict = []
@@ -81,7 +79,7 @@ def build(comparison: EngineComparison, gated: bool = False, made: Mapping[str, 
         filled(
             *verdict,
             changed,
-            Section("What was measured", [Paragraph(_WORDS), *tables]),
+            Section("Measurements", [Paragraph(_WORDS), *tables]),
             unfinished,
             Section("Versions", [Table(("version", "Python", "packages"), versions, "Packages of each version")]),
             Section("How this was made", [Facts(list(made.items()))]) if made else None,
@@ -97,7 +95,7 @@ def _checks(transitions: Sequence[Transition], failed: Sequence[Transition], fai
     """Return a check for each setting, scene and pair of consecutive versions."""
     checks = []
     for each in transitions:
-        text = sentence(each)
+        text = changes_text(each)
         name = f"{each.now.setting or 'default'}: {each.was.version} to {each.now.version}"
         checks.append(Check(each.now.scene, name, text or NOTHING_CHANGED, text if each in failed else ""))
     if failures and not failed:
@@ -110,19 +108,17 @@ def _seen(line: EngineLine) -> list[Observation]:
 
 
 def _unfinished(line: EngineLine) -> Iterator[str]:
-    reasons = [(each.version, *_reason(each)) for each in _seen(line)]
-    for kind in dict.fromkeys(kind for _, kind, _ in reasons if kind):
-        found = [(version, reason) for version, this, reason in reasons if this == kind]
-        versions = ", ".join(version for version, _ in found)
-        yield f"{line.setting or 'default'} on {line.scene} in {versions}: {found[-1][1]}"
-
-
-def _reason(seen: Observation) -> tuple[str, str]:
-    """Return the kind of a failure, which versions can have in common, and its full text; both empty if there is none."""
-    if not seen.outcome.ok:
-        return seen.outcome.kind.value, str(seen.outcome)
-    reason = seen.attitude_order.reason
-    return reason and OutcomeKind.NO_ORDER.value, reason and f"{OutcomeKind.NO_ORDER.value} ({reason})"
+    """Yield each kind of failure, and each missing order, with its versions and the last of their reasons."""
+    kinds: dict[str, list[tuple[str, str]]] = {}
+    for seen in _seen(line):
+        if not seen.outcome.ok:
+            kinds.setdefault(seen.outcome.kind.value, []).append((seen.version, str(seen.outcome)))
+        elif reason := seen.attitude_order.reason:
+            kind = OutcomeKind.NO_ORDER.value
+            kinds.setdefault(kind, []).append((seen.version, f"{kind} ({reason})"))
+    for failures in kinds.values():
+        versions = ", ".join(version for version, _ in failures)
+        yield f"{line.setting or 'default'} on {line.scene} in {versions}: {failures[-1][1]}"
 
 
 def _table(scene: str, lines: list[EngineLine]) -> Table:
@@ -134,24 +130,20 @@ def _table(scene: str, lines: list[EngineLine]) -> Table:
 
 
 def _row(line: EngineLine, seen: Observation, quantities: list[str]) -> Row:
-    drifts = [_drift_cell(seen.drifts[name].value if name in seen.drifts else math.nan) for name in quantities]
-    fits = (seen.attitude_order, seen.rates_order)
-    orders = [DASH if math.isnan(fit.slope) else order_text(fit.slope) for fit in fits]
-    shown, step_time = _ratio(line, seen), min((line.times or {}).get(seen.version, (math.nan,)))
-    ratio_text = DASH if shown is None else number(shown.value)
-    if shown is not None and shown.low != shown.high:
-        ratio_text += f" ({number(shown.low)} to {number(shown.high)})"
-    outcome = outcome_cell(Outcome(seen.outcome.kind))  # the reason is below the tables
-    names = (seen.setting or "default", seen.version)
-    return (*names, *orders, *drifts, number(seen.error.value), outcome, ratio_text, number(1e6 * step_time))
-
-
-def _drift_cell(drift: float) -> Cell:
-    grade = classify(drift)
-    if grade is None:
-        return Cell(DASH, Grade.NONE)
-    symbol, colour = _GRADES[grade]
-    return Cell(f"{symbol} {drift_text(drift)}", colour)
+    drifts = [seen.drifts[name].value if name in seen.drifts else math.nan for name in quantities]
+    slopes = [fit.slope for fit in (seen.attitude_order, seen.rates_order)]
+    time, step_time = _ratio(line, seen), min((line.times or {}).get(seen.version, (math.nan,)))
+    varies = time is not None and time.low != time.high
+    return (
+        seen.setting or "default",
+        seen.version,
+        *(numeric(slope, DASH if math.isnan(slope) else order_text(slope)) for slope in slopes),
+        *(grade(abs(drift), drift_text(drift)) for drift in drifts),
+        numeric(seen.error.value),
+        outcome_cell(Outcome(seen.outcome.kind)),  # its reason is in the list of unfinished runs
+        DASH if time is None else numeric(time.value, _spread_text(time) if varies else number(time.value)),
+        numeric(1e6 * step_time),
+    )
 
 
 def _ratio(line: EngineLine, seen: Observation) -> Spread | None:
@@ -164,7 +156,7 @@ def _ratio(line: EngineLine, seen: Observation) -> Spread | None:
 def _record(line: EngineLine, seen: Observation) -> dict[str, Any]:
     return {
         **{name: getattr(seen, name) for name in ("scene", "setting", "version", "label", "dt", "outcome")},
-        **{name: {key: vars(getattr(seen, name))[key] for key in _FITTED} for name in ("attitude_order", "rates_order")},
+        **{name: {key: getattr(getattr(seen, name), key) for key in _FITTED} for name in ("attitude_order", "rates_order")},
         "attitude_error_rad": seen.error,
         "drifts": seen.drifts,
         "step_times_s": (line.times or {}).get(seen.version, ()),
@@ -176,20 +168,34 @@ def _change_record(transition: Transition) -> dict[str, Any]:
     was, now = transition.was, transition.now
     names = {"scene": now.scene, "setting": now.setting, "from": was.version, "to": now.version}
     aspects = [{"aspect": each.aspect.value, "quantity": each.quantity, "lost": each.lost} for each in transition.changes]
-    return {**names, "sentence": sentence(transition), "lost": bool(transition.lost), "changes": aspects}
+    return {**names, "sentence": changes_text(transition), "lost": bool(transition.lost), "changes": aspects}
 
 
-def sentence(transition: Transition) -> str:
-    """Return the changes of a transition in one sentence; empty if there are none."""
-    if not transition.changes:
-        return ""
-    now = transition.now
-    texts = [_phrase(change, f"at dt = {now.dt:g} s") for change in transition.changes]
-    attitude, rates = Aspect.ATTITUDE_ORDER.value, Aspect.RATES_ORDER.value
-    if attitude in texts[0] and [texts[0].replace(attitude, rates)] == texts[1:2]:  # both orders changed in the same way
-        texts[:2] = [texts[0].replace(f"the {attitude}", "the orders of attitude and rates")]
-    head = f"{now.setting or 'default'} on {now.scene}: from {transition.was.version} to {now.version} "
-    return head + ", ".join(texts)
+def changes_text(transition: Transition) -> str:
+    """Return the changes of a transition in one line; empty if there are none."""
+    was, now = transition.was, transition.now
+    changes = "; ".join(map(_change_text, transition.changes))
+    return f"{now.setting or 'default'} on {now.scene}, {was.version} → {now.version}: {changes}" if changes else ""
+
+
+def _change_text(change: Change) -> str:
+    name = f"{change.quantity} {change.aspect.value}".strip()
+    match change.was, change.now:
+        case Outcome() as was, Outcome() as now:
+            return f"{name} {outcome_text(was)} → {now if now.kind is OutcomeKind.CRASHED else outcome_text(now)}"
+        case Order() as was, Order() as now:
+            orders = (f"none ({fit.reason})" if math.isnan(fit.slope) else order_text(fit.slope) for fit in (was, now))
+            return f"{name} {' → '.join(orders)}"
+        case Spread(), Spread() as now if change.aspect is Aspect.TIME:
+            return f"{name} {_spread_text(now)} times as long"
+        case Spread(before), Spread(after):
+            drift = change.aspect is Aspect.DRIFT
+            return f"{name} {' → '.join(map(drift_text if drift else number, (before, after)))}{'' if drift else ' rad'}"
+    raise AssertionError(change)
+
+
+def _spread_text(spread: Spread) -> str:
+    return f"{number(spread.value)} ({number(spread.low)} to {number(spread.high)})"
 
 
 def order_text(order: float) -> str:
@@ -201,40 +207,3 @@ def order_text(order: float) -> str:
 def drift_text(drift: float) -> str:
     """Return a relative drift as text, in percent from `PERCENT` on."""
     return f"{100 * drift:.2g} %" if PERCENT <= abs(drift) < math.inf else number(drift, 1)
-
-
-def _phrase(change: Change, at: str) -> str:
-    match change.was, change.now:
-        case Outcome() as was, Outcome() as now:
-            return _outcome_change(was, now, at)
-        case Order() as was, Order() as now:
-            return _order_change(was, now, change.aspect.value)
-        case Spread(), Spread(value, low, high) if change.aspect is Aspect.TIME:
-            return f"a step takes {number(value)} times as long ({number(low)} to {number(high)})"
-        case Spread(before), Spread(after) if change.aspect is Aspect.ERROR:
-            verb = "rose" if after > before else "fell"
-            return f"the attitude error {at} {verb} from {number(before)} to {number(after)} rad"
-        case Spread(before), Spread(after):
-            turned = before * after < 0 and min(abs(before), abs(after)) > SMALL
-            verb = "turned" if turned else "rose" if abs(after) > abs(before) else "fell"
-            texts = [("+" if turned and value > 0 else "") + drift_text(value) for value in (before, after)]
-            return f"the {change.quantity} drift {at} {verb} from {texts[0]} to {texts[1]}"
-    raise AssertionError(change)
-
-
-def _outcome_change(was: Outcome, now: Outcome, at: str) -> str:
-    text = str(now) if now.kind is OutcomeKind.CRASHED else outcome_text(now)
-    if was.kind is OutcomeKind.UNSUPPORTED:
-        return "it appeared" + ("" if now.ok else f", {text} {at}")
-    if now.kind is OutcomeKind.UNSUPPORTED:
-        return "it disappeared"
-    return f"the outcome {at} went from {outcome_text(was)} to {text}"
-
-
-def _order_change(was: Order, now: Order, name: str) -> str:
-    if math.isnan(now.slope):
-        return f"no {name} can be fitted any more, which was {order_text(was.slope)} ({now.reason})"
-    if math.isnan(was.slope):
-        return f"an {name} can be fitted, {order_text(now.slope)}, which was not so before ({was.reason})"
-    verb = "rose" if now.slope > was.slope else "fell"
-    return f"the {name} {verb} from {order_text(was.slope)} to {order_text(now.slope)}"

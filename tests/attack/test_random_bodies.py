@@ -21,7 +21,7 @@ from conservative.check import LARGEST
 from conservative.errors import NotConserved
 from conservative.grid import Grid
 from conservative.invariants import kept_sizes, sizes
-from conservative.methods.bounds import LOOSEST, condition
+from conservative.methods.bounds import LOOSEST
 from conservative.methods.units import bound_rate
 from conservative.references.engines.catalogue import MuJoCo, Pinocchio
 from conservative.references.engines.heyoka import Heyoka
@@ -118,7 +118,7 @@ def check_conservation(found, method, grid, turn):
     scene, bounds = found.scene, method.bounds(found.scene, grid)
     if not found.ok:
         loose = getattr(method, "tol", 0.0) * grid.n_steps > LOOSEST / 10  # allows more than is ever called ok
-        tame = turn <= SHORT and condition(scene) <= TAME and not loose
+        tame = turn <= SHORT and scene.body.condition <= TAME and not loose
         assert not (tame and isinstance(found.failure, NotConserved)), f"false alarm: {found.failure}"
         return
     assert orthonormality(found.R_WB).max() <= min(LOOSEST, bounds.orthonormality)

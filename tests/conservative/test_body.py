@@ -10,6 +10,7 @@ import conservative as cv
 from conservative import shapes
 from conservative.attitude import rotation_about
 from conservative.invariants import axial_direction
+from conservative.methods.principal_axes import principal_start
 from conservative.references.exact.method import free_body
 
 from .one_body import body_in_axes
@@ -53,6 +54,28 @@ def test_a_body_symmetric_to_round_off_has_an_axis():
     np.testing.assert_array_equal(axial_direction(cv.RigidBody((1, 1 + round_off, 2)), None), (0, 0, 1))
     field = cv.UniformGravity(1, (round_off, 0, -1))
     np.testing.assert_array_equal(axial_direction(cv.RigidBody((1, 1, 2)), field), (0, 0, -1))
+
+
+def test_moments_are_compared_relative_to_each_other():
+    assert cv.RigidBody((1, 1e-13, 5e-13)).symmetry_axis(1e-12) is None
+    assert cv.RigidBody((1, 1e-13, 1e-13)).symmetry_axis(1e-12) == 0
+    assert cv.RigidBody((1, 1, 1e-13)).symmetry_axis(1e-12) == 2
+
+
+def test_rounding_a_tensor_leaves_a_body_symmetric():
+    draw = np.random.default_rng(0)
+    for _ in range(100):
+        R = rotation_about(draw.normal(size=3), draw.uniform(0, 3))
+        tensor = R @ np.diag([1e-9, 1e-9, 1.0]) @ R.T
+        assert cv.RigidBody((tensor + tensor.T) / 2).symmetry_axis(1e-12) == 2
+
+
+@pytest.mark.parametrize("small", [1e-3, 1e-15, 1e-28])
+def test_a_rod_has_all_digits_of_its_small_moment(small):
+    scene = cv.Scene("rod", cv.RigidBody((small, 1.0, small)), np.eye(3), (0.1, 0.2, 0.3), 1.0)
+    start = principal_start(scene, "non_spinning")
+    assert (small, small, small) == start.J
+    assert start.spin[1] == 1.0
 
 
 DENSITY = 731.0

@@ -175,3 +175,18 @@ def test_substepping_has_the_properties_of_its_method() -> None:
     assert found.conserves == found.inner.conserves
     top = cv.Substepped("reduced:order=2/frame=non_spinning")
     assert top.unsupported(cv.scenes.brick_flip()) == top.inner.unsupported(cv.scenes.brick_flip())
+
+
+EXTREME = [  # one overflows, two have a singular matrix
+    (cv.Convected(), 8e17, (4e5, 4e6, 1e30), (3e29, 2e9, 2e-23)),
+    (cv.Gauss(2), 3.5e18, [2.7e21] * 3, (2.3e29, 1.6e-24, 2.3e-21)),
+    (cv.Convected(), 1.2786236075884442e15, [437731692.49836576] * 3, (1.8e-20, 1.9e29, 6.0)),
+]
+
+
+@pytest.mark.parametrize(("method", "dt", "moments", "w"), EXTREME)
+def test_an_extreme_step_is_an_outcome(method, dt, moments, w) -> None:
+    scene = cv.Scene("extreme", cv.RigidBody(moments), np.eye(3), w, 10 * dt)
+    run = cv.integrate(scene, dt, method, on_failure="return")
+    assert run.outcome.kind is cv.OutcomeKind.NOT_CONVERGED
+    assert 1 <= len(run) < 10

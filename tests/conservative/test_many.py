@@ -1,4 +1,4 @@
-"""Many bodies at once: numbers, drifts and failures are those of each alone; what cannot be used is refused first."""
+"""Many bodies at once: numbers, drifts and failures equal those of each body alone; bad input is refused first."""
 
 from __future__ import annotations
 
@@ -21,24 +21,23 @@ from conservative.integration import blocks, shared_choice
 from conservative.integration.inputs import read_bodies
 from conservative.invariants import Invariant, kept_sizes, momentum_W, sizes
 from conservative.method import Method, Role
-from conservative.methods.between import Samples
+from conservative.methods.between import SampleTimes
 from conservative.methods.many import Block, pause
 from conservative.methods.trials import Estimate
 from conservative.trajectory import Trajectory
 
-TURN = rotation_about((3, -1, 2), 1.3)
-BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
+from .one_body import BODY, TURN, body_in_axes
 
 
 def starts(n, seed=14):
-    """Attitudes (n, 3, 3) and rates (n, 3), rad/s."""
+    """Return attitudes (n, 3, 3) and rates (n, 3), rad/s."""
     rng = np.random.default_rng(seed)
     q = rng.normal(size=(n, 4))
     return from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]), rng.normal(size=(n, 3))
 
 
 def tensors(n, seed=14):
-    """Inertia (n, 3, 3), kg m^2, with moments that are well apart."""
+    """Return inertia (n, 3, 3), kg m^2, with moments that are well apart."""
     rng = np.random.default_rng(seed)
     axes = from_quaternion(rng.normal(size=(n, 4)))
     axes /= np.cbrt(np.linalg.det(axes))[:, None, None]
@@ -48,12 +47,11 @@ def tensors(n, seed=14):
 
 
 def scene(potential=None, body=BODY, **more):
-    """A scene of 2 s."""
     return cv.Scene("generic", body, rotation_about((1, 0.2, -1), 0.7), (0.3, -2.0, 1.0), 2.0, potential, **more)
 
 
 def fields(n, seed=14):
-    """Potentials by a name, and numbers of them that differ from body to body."""
+    """Return potentials by name, and parameters that differ from body to body."""
     rng = np.random.default_rng(seed)
     points, anchors = rng.uniform(0.1, 0.3, (n, 3)), rng.uniform(0.6, 0.9, (n, 3))
     size = rng.uniform(1.0, 3.0, n)
@@ -82,7 +80,7 @@ SAMPLES = {"dt": 0.05, "t_end": 0.5, "sample_every": 3}
 
 
 def rename(given):
-    """The scene of a body as users write it, with nothing that `take` has left unchecked."""
+    """Return the scene of a body as users write it, with every check."""
     return cv.Scene("one", cv.RigidBody(given.body.inertia), given.R_WB0, given.w_WB_B0, given.t_end, given.potential)
 
 
@@ -110,7 +108,7 @@ def test_numbers_are_those_of_one_at_a_time(way, field):
     assert set(found.drifts) == {"orthonormality", *(each.name for each in scene(potential).invariants)}
 
 
-def test_what_is_not_given_is_that_of_the_scene():
+def test_missing_arguments_are_those_of_the_scene():
     R, w = starts(2)
     own = scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3)))
     for given in (
@@ -150,11 +148,11 @@ def test_numbers_depend_neither_on_blocks_nor_on_threads(monkeypatch):
 
 def test_blocks_are_as_large_as_their_samples_allow():
     assert blocks.list_blocks(2500, cv.Grid(0.1, 10)) == range(0, 2500, 1024)
-    assert blocks.count_bodies(cv.Grid(0.1, 10**4)) == 17  # 16.3 MB
-    assert blocks.count_bodies(cv.Grid(0.1, 10**6)) == 1
+    assert blocks.list_blocks(1, cv.Grid(0.1, 10**4)).step == 17  # 16.3 MB
+    assert blocks.list_blocks(1, cv.Grid(0.1, 10**6)).step == 1
 
 
-def test_progress_is_told_after_each_block(monkeypatch):
+def test_progress_is_reported_after_each_block(monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BODIES", 4)
     told = []
     cv.integrate_many(scene(), *starts(N), progress=told.append, threads=1, **SAMPLES)
@@ -225,7 +223,7 @@ def test_a_body_that_fails_verification_shortens_the_step_of_all(monkeypatch):
         return Estimate(worst, 0.0), number
 
     monkeypatch.setattr(shared_choice, "find_worst", find_worst)
-    choice = shared_choice.choose_for_all(bodies, error, 2.0, Samples(None, 1))
+    choice = shared_choice.choose_for_all(bodies, error, 2.0, SampleTimes(None, 1))
     assert choice.reached
     assert choice.grid.dt < steps[0] * 5e5 ** (-1 / choice.method.order)
 
@@ -293,14 +291,14 @@ def test_without_numbers_of_their_own_bodies_have_the_field_of_the_scene():
         require_drifts(read_bodies(scene(potential), *starts(FIVE), None, None))
 
 
-def test_bodies_at_rest_have_the_scale_of_what_their_field_can_do():
+def test_bodies_at_rest_have_the_scale_of_their_field():
     R, w = starts(FIVE)
     require_drifts(read_bodies(scene(cv.UniformGravity(3.0, (0.1, 0.2, 0.3))), R, 0 * w, None, None))
     require_drifts(read_bodies(scene(), R, 0 * w, None, None))
 
 
 def test_axial_momentum_is_that_of_the_bodies_that_have_one():
-    symmetric = cv.RigidBody(TURN @ np.diag([1.0, 1.0, 2.0]) @ TURN.T)
+    symmetric = body_in_axes(TURN, 1.0, 1.0, 2.0)
     inertia = tensors(FIVE)
     inertia[2] = 3 * symmetric.inertia
     for own in (None, inertia):
@@ -441,7 +439,7 @@ def test_failures_come_back_from_other_processes(failure):
 
 
 def wait_for_ever(block):
-    """A run in pieces that does not end by itself."""
+    """Run in pieces without end."""
     while True:
         time.sleep(0.01)
         pause()
@@ -478,14 +476,22 @@ GRAVITY = cv.UniformGravity(3.0, (0.1, 0.2, 0.3))
 
 
 def changed(values, i, value):
-    """A copy with another value in place i."""
+    """Return a copy with another value at index i."""
     found = np.array(values, dtype=float)
     found[i] = value
     return found
 
 
 R, W, J = *starts(THOUSAND), tensors(THOUSAND)
-SHAPES = {
+
+
+def bad_field(field, name, value):
+    """Return arguments for a field with a bad value of the third body."""
+    potential, parameters = fields(5)[field]
+    return {"scene": scene(potential), "parameters": parameters | {name: changed(parameters[name], 2, value)}}
+
+
+REFUSED = {
     "n differs": (
         {"R_WB0": R, "w_WB_B0": W[:7]},
         r"^w_WB_B0: got shape \(7, 3\); expected .* \(1000, 3\): 1000 bodies, as R_WB0 has",
@@ -499,17 +505,6 @@ SHAPES = {
     "a text": ({"w_WB_B0": "fast"}, r"^w_WB_B0: got 'fast'"),
     "unknown number": ({"parameters": {"wieght": [1.0]}}, r"^parameters: got 'wieght'; expected 'weight' \(nearest\)"),
     "no mapping": ({"parameters": [1.0]}, r"^parameters: got \[1.0\]; expected a mapping"),
-}
-
-
-@pytest.mark.parametrize("what", SHAPES)
-def test_shapes_that_do_not_match(what):
-    given, message = SHAPES[what]
-    with pytest.raises(cv.BadInput, match=message):
-        cv.integrate_many(scene(GRAVITY), **given)
-
-
-ONE_BAD = {
     "nan": ({"w_WB_B0": changed(W, 7, np.nan)}, r"^w_WB_B0\[7\]: got \[nan, nan, nan\], not finite"),
     "too fast": ({"w_WB_B0": changed(W, 5, (0, 1e101, 0))}, r"^w_WB_B0\[5\]: got .*1e\+101.* the largest 0 or of magnitude"),
     "too slow": ({"w_WB_B0": changed(W, 5, (0, 1e-101, 0))}, r"^w_WB_B0\[5\]: got .*1e-101.* the largest 0 or of magnitude"),
@@ -529,42 +524,17 @@ ONE_BAD = {
     ),
     "nan weight": ({"parameters": {"weight": changed(np.ones(THOUSAND), 8, np.nan)}}, r"^parameters\['weight'\]\[8\]: got nan"),
     "huge lever": ({"parameters": {"com_B": changed(W, 8, 1e101)}}, r"^parameters\['com_B'\]\[8\]: got \[1e\+101"),
-}
-
-
-@pytest.mark.parametrize("what", ONE_BAD)
-def test_one_bad_body_is_named(what, monkeypatch):
-    monkeypatch.setattr(cv.Gauss, "prepare", None)  # no work
-    given, message = ONE_BAD[what]
-    with pytest.raises(cv.BadInput, match=message):
-        cv.integrate_many(scene(GRAVITY), **given, method=cv.Gauss())
-
-
-BAD_FIELDS = {
-    "stiffness": ("spring", "stiffness", 0.0, r"^parameters\['stiffness'\]\[2\]: got 0.0"),
-    "rate": ("gradient", "rate", -1.0, r"^parameters\['rate'\]\[2\]: got -1.0"),
-    "inertia of a field": ("gradient", "inertia", -np.eye(3), r"^parameters\['inertia'\]\[2\]: got principal moments"),
-    "direction": ("gradient", "direction_W", 0.0, r"^parameters\['direction_W'\]\[2\]: got \[0.0, 0.0, 0.0\]"),
-    "inertia in an orbit": ("orbit", "inertia", -np.eye(3), r"^parameters\['inertia'\]\[2\]: got principal moments"),
-}
-
-
-@pytest.mark.parametrize("what", BAD_FIELDS)
-def test_what_one_potential_refuses_is_refused_of_many(what):
-    field, name, value, message = BAD_FIELDS[what]
-    potential, parameters = fields(5)[field]
-    parameters = parameters | {name: changed(parameters[name], 2, value)}
-    with pytest.raises(cv.BadInput, match=message):
-        cv.integrate_many(scene(potential), parameters=parameters)
-
-
-def test_numbers_of_a_field_are_those_that_it_makes_of_them():
-    potential, parameters = fields(5)["gradient"]
-    found = read_bodies(scene(potential), None, None, None, parameters)
-    np.testing.assert_allclose(np.linalg.norm(found.parameters["direction_W"], axis=1), 1, rtol=1e-15)
-
-
-OTHERS = {
+    "stiffness": (bad_field("spring", "stiffness", 0.0), r"^parameters\['stiffness'\]\[2\]: got 0.0"),
+    "rate": (bad_field("gradient", "rate", -1.0), r"^parameters\['rate'\]\[2\]: got -1.0"),
+    "inertia of a field": (
+        bad_field("gradient", "inertia", -np.eye(3)),
+        r"^parameters\['inertia'\]\[2\]: got principal moments",
+    ),
+    "direction": (bad_field("gradient", "direction_W", 0.0), r"^parameters\['direction_W'\]\[2\]: got \[0.0, 0.0, 0.0\]"),
+    "inertia in an orbit": (
+        bad_field("orbit", "inertia", -np.eye(3)),
+        r"^parameters\['inertia'\]\[2\]: got principal moments",
+    ),
     "threads": ({"threads": 0}, r"^threads: got 0"),
     "progress": ({"progress": 3}, r"^progress: got 3"),
     "error": ({"error": 0.0}, r"^error: got 0"),
@@ -575,17 +545,23 @@ OTHERS = {
     "memory": ({"dt": 1e-6, "w_WB_B0": W}, r"^sample_every: got 2000001000 samples of 1000 bodies"),
     "two inertias": (
         {"scene": scene(cv.GravityGradient(0.7, BODY.inertia)), "inertia": J},
-        r"^parameters: got None; expected .* an inertia of its own",
+        r"^parameters: got None; expected .* has an inertia",
     ),
     "cannot do": ({"method": cv.Projected(), "scene": scene(), "w_WB_B0": W}, r"^method: got projected"),
 }
 
 
-@pytest.mark.parametrize("what", OTHERS)
-def test_other_arguments(what):
-    given, message = OTHERS[what]
+@pytest.mark.parametrize("what", REFUSED)
+def test_bad_arguments_and_bad_bodies_are_named(what):
+    given, message = REFUSED[what]
     with pytest.raises(cv.BadInput, match=message):
         cv.integrate_many(**{"scene": scene(GRAVITY), "threads": 1} | given)
+
+
+def test_directions_of_a_field_are_normalised():
+    potential, parameters = fields(5)["gradient"]
+    found = read_bodies(scene(potential), None, None, None, parameters)
+    np.testing.assert_allclose(np.linalg.norm(found.parameters["direction_W"], axis=1), 1, rtol=1e-15)
 
 
 def test_a_step_that_is_too_long_for_the_fastest_is_refused_before_any_work():

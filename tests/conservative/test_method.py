@@ -114,3 +114,10 @@ def test_the_smallest_interval_of_samples_that_fits_is_named(rest):
     with pytest.raises(cv.BadInput) as caught:
         require_memory("sample_every", n_steps, least - 1)
     assert caught.value.allowed.startswith(f"{least} or more")
+
+
+def test_default_step():
+    body = cv.RigidBody((0.7, 1.3, 0.9))
+    assert cv.Scene("body", body, np.eye(3), (0, 0, 10.0), 6.0).dt == pytest.approx(0.05 / 10)
+    assert cv.Scene("body", body, np.eye(3), (0, 0, 0.01), 6.0).dt == pytest.approx(0.06)
+    assert cv.integrate(BRICK, t_end=0.1).t[1] == 0.01

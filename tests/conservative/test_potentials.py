@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import conservative as cv
-from conservative.attitude import angle_between, cayley, rotation_about
+from conservative.attitude import angle_between, cayley, from_quaternion, rotation_about
 from conservative.potentials.potential import torque_W
 
 TURNED = rotation_about((1, 2, 3), 0.7)
@@ -154,3 +154,35 @@ def test_an_exception_of_a_function_is_reported():
         with pytest.raises(cv.PotentialFailed, match="the hundredth") as caught:
             cv.integrate(scene_in(potential), 0.02, method)
         assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+@pytest.mark.parametrize("name", ["gravity", "spring", "gravity gradient"])
+def test_the_scale_of_a_field_is_its_largest_energy(name):
+    potential, q = POTENTIALS[name], np.random.default_rng(4).normal(size=(4000, 4))
+    largest = np.abs(potential.energy(from_quaternion(q / np.linalg.norm(q, axis=1)[:, None]))).max()
+    assert 0.95 * potential.scale() < largest <= potential.scale() * (1 + 1e-12)
+
+
+def test_the_scale_of_an_attraction_is_its_energy_at_right_angles():
+    potential = cv.PointAttraction(-1.7, (3, 0, 0), (0, 0, 4))
+    assert potential.scale() == pytest.approx(1.7 / 5, rel=1e-14) == potential.energy(np.eye(3))
+
+
+def test_the_scale_of_a_long_spring_is_that_of_its_rest_length():
+    spring = cv.LinearSpring(3.0, (0, 0, 1), (0, 2, 0), 1e6)
+    assert spring.scale() == pytest.approx(1.5e12)
+    assert spring.scale() == pytest.approx(spring.energy(np.eye(3)), rel=1e-5)
+    assert cv.integrate(cv.Scene("pushed", cv.RigidBody(INERTIA), np.eye(3), (0, 0, 1), 0.1, spring), 1e-4).ok
+
+
+def scales(w_WB_B0):
+    scene = cv.Scene("body", cv.RigidBody((0.7, 1.3, 0.9)), np.eye(3), w_WB_B0, 1.0, cv.UniformGravity(3.0, (0, 0.3, 0.4)))
+    return {invariant.name: invariant.scale for invariant in scene.invariants}
+
+
+def test_energy_is_relative_to_motion_and_field_and_momentum_to_its_initial_value():
+    assert scales((0, 2.0, 0)) == pytest.approx({"energy": 1.3 * 4 / 2 + 3.0 * 0.5, "vertical momentum": 1.3 * 2})
+
+
+def test_at_rest_momentum_is_relative_to_the_momentum_that_the_field_can_make():
+    assert scales((0, 0, 0)) == pytest.approx({"energy": 3.0 * 0.5, "vertical momentum": np.sqrt(1.3 * 1.5)})

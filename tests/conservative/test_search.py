@@ -17,7 +17,7 @@ from conservative.card import Card, Cost
 from conservative.errors import AccuracyNotReached, MissingEngine
 from conservative.grid import Grid
 from conservative.methods import automatic, search, trials
-from conservative.methods.between import Samples
+from conservative.methods.between import SampleTimes
 from conservative.outcome import Progress
 from conservative.trajectory import Counters
 
@@ -74,7 +74,7 @@ def fresh():
     ],
 )
 def test_grids_have_an_even_number_of_steps(dt, t_end, spacing, every, expected):
-    grid = automatic.grid_of(dt, t_end, Samples(spacing, every))
+    grid = automatic.grid_of(dt, t_end, SampleTimes(spacing, every))
     assert (grid.dt, grid.n_steps, grid.every) == pytest.approx(expected)
 
 
@@ -113,7 +113,7 @@ def choose(monkeypatch):
 
 def test_the_step_is_cut_until_the_error_is_reached(choose):
     choose(Known(size=0.1))
-    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples())
+    found = automatic.integrate_to_error(SCENE, 1e-5, 8.0, SampleTimes())
     choice = found.choice
     assert choice.reached
     assert choice.estimate <= 1e-5
@@ -128,16 +128,16 @@ def test_the_step_is_cut_until_the_error_is_reached(choose):
 def test_the_cheapest_at_its_step_is_taken(choose):
     expensive, cheap = Known(size=0.1, step=50.0), Known(size=0.1, step=1.0)
     choose(expensive, cheap)
-    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, Samples()).choice.method == cheap
+    assert automatic.integrate_to_error(SCENE, 1e-5, 8.0, SampleTimes()).choice.method == cheap
     high = Known(size=0.1, power=4, step=50.0)
     choose(cheap, high)
-    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, Samples()).choice.method == high
+    assert automatic.integrate_to_error(SCENE, 1e-6, 8.0, SampleTimes()).choice.method == high
 
 
 def test_too_many_steps_are_refused_before_they_are_taken(choose):
     choose(Known(size=0.1))
     with pytest.raises(cv.BadInput, match=r"error: got one that takes .* steps; expected one that takes at most 1e\+10 steps"):
-        automatic.integrate_to_error(SCENE, 1e-9, 1e9, Samples(None, 10**12))
+        automatic.integrate_to_error(SCENE, 1e-9, 1e9, SampleTimes(None, 10**12))
     assert max(grid.n_steps for grid in Known.taken) <= search.MOST_PROBED
     candidate = drive(Known(size=1.0), 1e-15, 8.0)
     assert candidate.hopeless

@@ -1,4 +1,4 @@
-"""Random starts are distributed as they say. 20,000 bodies: a standard deviation is right to 0.5 %, one sigma."""
+"""Random initial states have the requested distribution. With 20,000 bodies a standard deviation is known to 0.5 %."""
 
 import math
 
@@ -11,17 +11,17 @@ import conservative as cv
 from conservative.attitude import orthonormality, rotation_about
 from conservative.integration.spread import list_parameters, spread
 
+from .one_body import BODY, TURN
+
 N = 20_000
-TURN = rotation_about((3, -1, 2), 1.3)
-BODY = cv.RigidBody(TURN @ np.diag([1.0, 1.4, 2.0]) @ TURN.T)
 START = {"R_WB0": rotation_about((1, 0.2, -1), 0.7), "w_WB_B0": (0.3, -2.0, 1.0), "t_end": 2.0}
 TOP = cv.Scene("top", BODY, **START, potential=cv.UniformGravity(-3.0, (0.1, 0.2, -0.4)))
 LEAST = 1e-3
-"""Significance below which a sample is not of the distribution: the seed is fixed, so that this happens never or always."""
+"""Significance below which a sample does not have the distribution; the seed is fixed."""
 
 
 def is_normal(values, deviation):
-    """Whether all columns (n, k) are normal about 0 with a standard deviation, and do not depend on one another."""
+    """Return whether all columns (n, k) are normal about 0 with a standard deviation, and independent."""
     each = [kstest(column, "norm", (0, deviation)).pvalue for column in values.T]
     off = np.corrcoef(values.T) - np.eye(values.shape[1])
     return min(each) > LEAST and np.abs(off).max() < 4 / math.sqrt(len(values))
@@ -81,7 +81,7 @@ def test_inertia_is_that_of_a_body_whose_second_moments_of_mass_vary(share):
     assert not all(kstest(column, "norm", (1, 1.05 * share)).pvalue > LEAST for column in shares.T)
 
 
-def test_a_plate_stays_one():
+def test_a_plate_remains_a_plate():
     plate = cv.Scene("plate", cv.RigidBody((1.0, 2.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
     J = spread(plate, 1000, inertia="5%")["inertia"]
     assert J[:, 0] + J[:, 1] == pytest.approx(J[:, 2], rel=1e-15)
@@ -146,7 +146,7 @@ ODD = cv.Scene("odd", cv.RigidBody((1.0, 1.0, 3.0)), np.eye(3), (0, 0, 1), 1.0)
         (REST, {"rate": "any"}, "rate", "'any' of 0", "in rad/s"),
         (TOP, {"inertia": "101%"}, "inertia", "'101%'", "up to 100%"),
         (ODD, {"inertia": "1%"}, "inertia", "[1.0, 1.0, 3.0]", "none is larger than the sum"),
-        (ORBIT, {"inertia": "1%"}, "inertia", "a field that turns", "none"),
+        (ORBIT, {"inertia": "1%"}, "inertia", "a turning field", "none"),
         (TOP, {"parameters": {"wieght": "1%"}}, "parameters", "'wieght'", "'weight' (nearest)"),
         (TOP, {"parameters": {"weight": "1kg"}}, "potential.weight", "'1kg'", "its own SI unit"),
         (TOP, {"seed": -1}, "seed", "-1", "0 or more"),

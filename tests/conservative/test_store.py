@@ -1,4 +1,4 @@
-"""Ensembles on disk: what is read is what was run, whatever was in the way; and what is something else stays as it is."""
+"""Ensembles on disk are read as they were run, after interrupts and damage too; other files are not changed."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ from conservative.integration.inputs import read_bodies
 zarr = pytest.importorskip("zarr")
 
 N = 22
-"""Bodies: three blocks of which the last is not full."""
+"""Number of bodies: three blocks, and the last is not full."""
 
 
 @pytest.fixture(autouse=True)
@@ -27,14 +27,14 @@ def _small_blocks(monkeypatch):
 
 
 def starts(n=N):
-    """Rates (n, 3), rad/s, of which the fourth is beyond what any step takes."""
+    """Return rates (n, 3), rad/s; the fourth is too fast for any step."""
     w = np.random.default_rng(14).normal(size=(n, 3)) * 3
     w[3] = 1e9
     return w
 
 
 def run(path=None, **changes):
-    """Run tops in uniform gravity, each of its own weight."""
+    """Run tops in uniform gravity with different weights."""
     given = {
         "w_WB_B0": starts(),
         "dt": 0.05,
@@ -47,12 +47,12 @@ def run(path=None, **changes):
 
 
 def digest(folder):
-    """What lies in a folder, by its paths."""
+    """Return the digests of the files in a folder by path."""
     return {str(p.relative_to(folder)): sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def stop_after(count):
-    """A function of progress that interrupts a run after so many blocks."""
+    """Return a progress function that interrupts a run after `count` blocks."""
 
     def tell(progress):
         tell.calls += 1
@@ -72,7 +72,7 @@ def in_memory():
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The folder of a run without a break."""
+    """Return the folder of a run without a break."""
     place = tmp_path_factory.mktemp("store") / "whole.zarr"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blocks, "MOST_BODIES", 8)
@@ -90,7 +90,7 @@ def assert_same(found, wanted):
     assert (found.label, found.grid, len(found)) == (wanted.label, wanted.grid, len(wanted))
 
 
-def test_what_is_read_is_what_was_run(whole, in_memory):
+def test_an_ensemble_is_read_as_it_was_run(whole, in_memory):
     found = cv.open_ensemble(whole)
     assert_same(found, in_memory)
     assert list(found.failures) == [3]
@@ -103,7 +103,7 @@ def test_what_is_read_is_what_was_run(whole, in_memory):
 def test_samples_stay_on_the_disk(whole):
     found = cv.open_ensemble(whole)
     assert isinstance(found.R_WB, zarr.Array)
-    (whole / "R_WB/c/2/0/0/0").rename(whole / "away")  # what a slice of other blocks does not miss
+    (whole / "R_WB/c/2/0/0/0").rename(whole / "away")  # slices of other blocks do not read it
     try:
         assert np.isfinite(found.R_WB[8:16, -1]).all()
         assert np.isnan(found.R_WB[16:]).all()
@@ -111,13 +111,13 @@ def test_samples_stay_on_the_disk(whole):
         (whole / "away").rename(whole / "R_WB/c/2/0/0/0")
 
 
-def test_what_was_in_memory_is_written_as_what_was_not(whole, in_memory, tmp_path):
+def test_an_ensemble_in_memory_is_written_to_the_same_bytes(whole, in_memory, tmp_path):
     in_memory.to_zarr(tmp_path / "copy.zarr")
     assert digest(tmp_path / "copy.zarr") == digest(whole)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path, threads):
+def test_an_interrupted_run_continues_to_the_same_bytes(whole, tmp_path, threads):
     place = tmp_path / "a.zarr"
     with pytest.raises(KeyboardInterrupt):
         run(place, progress=stop_after(1), threads=threads)
@@ -154,7 +154,7 @@ run(sys.argv[2])
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on_to_the_same_bytes(whole, tmp_path):
+def test_a_killed_run_continues_to_the_same_bytes(whole, tmp_path):
     place = tmp_path / "a.zarr"
     command = [sys.executable, "-c", KILLED, str(Path(__file__).parent), str(place)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
@@ -166,7 +166,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(whole, tmp_path):
     assert digest(place) == digest(whole)
 
 
-def test_a_full_disk_keeps_what_is_done(whole, tmp_path, monkeypatch):
+def test_a_full_disk_leaves_the_finished_blocks(whole, tmp_path, monkeypatch):
     place, put, files = tmp_path / "a.zarr", zarr.storage._local._put, []
 
     def fill_up(path, value, exclusive=False):
@@ -177,7 +177,7 @@ def test_a_full_disk_keeps_what_is_done(whole, tmp_path, monkeypatch):
         return put(path, value, exclusive)
 
     monkeypatch.setattr(zarr.storage._local, "_put", fill_up)
-    with pytest.raises(cv.NotWritten, match=r"No space left on device.*blocks that are done are kept, and resume=True"):
+    with pytest.raises(cv.NotWritten, match=r"No space left on device.*finished blocks stay there, and resume=True"):
         run(place)
     monkeypatch.undo()
     monkeypatch.setattr(blocks, "MOST_BODIES", 8)
@@ -218,7 +218,7 @@ def test_a_damaged_block_is_not_opened_and_is_computed_again(whole, tmp_path, ch
     place = tmp_path / "a.zarr"
     shutil.copytree(whole, place)
     damage(place / chunk)
-    if damage is flip_a_bit and chunk.startswith(("R_WB", "parameters")):  # what stays on the disk is checked when it is read
+    if damage is flip_a_bit and chunk.startswith(("R_WB", "parameters")):  # arrays on the disk are checked when they are read
         found = cv.open_ensemble(place)
         with pytest.raises(ValueError, match="checksum"):
             np.asarray((found.R_WB if chunk.startswith("R_WB") else found.bodies.parameters["weight"])[:])
@@ -241,7 +241,7 @@ def test_an_ensemble_without_its_metadata_is_refused(whole, tmp_path, lost):
             use(place)
 
 
-def test_every_row_counts_when_inputs_are_compared():
+def test_every_row_of_the_inputs_is_compared():
     w = np.random.default_rng(1).normal(size=(70_000, 3))
     scene, other = cv.scenes.brick_flip(), w.copy()
     other[-1, 2] *= 1 + 1e-15
@@ -252,11 +252,11 @@ def test_every_row_counts_when_inputs_are_compared():
 
 
 def stiff(k):
-    """A field that pulls a point of the body upwards with a constant force."""
+    """Return a field that pulls a point of the body upwards with a constant force."""
     return cv.FunctionPotential(lambda R: -k * R[2, 0], lambda R: np.array([[0, 0, 0], [0, 0, 0], [-k, 0, 0]]))
 
 
-def test_scenes_with_functions_are_known_by_their_code(tmp_path):
+def test_scenes_with_functions_are_identified_by_their_code(tmp_path):
     def scene(k):
         return cv.scenes.brick_flip().rename("pulled", potential=stiff(k))
 
@@ -286,7 +286,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_another_run_does_not_go_on(whole, change):
+def test_another_run_is_not_resumed(whole, change):
     before, (changes, said) = digest(whole), CHANGES[change]
     with pytest.raises(cv.BadInput) as refused:
         run(whole, resume=True, **changes)
@@ -294,7 +294,7 @@ def test_another_run_does_not_go_on(whole, change):
     assert digest(whole) == before
 
 
-def test_a_folder_that_is_there_is_left_alone(whole, tmp_path):
+def test_an_existing_folder_is_not_changed(whole, tmp_path):
     before = digest(whole)
     with pytest.raises(cv.BadInput, match="where an ensemble is; expected a new folder, or resume=True"):
         run(whole)
@@ -308,7 +308,7 @@ def test_a_folder_that_is_there_is_left_alone(whole, tmp_path):
     assert [path.read_text() for path in sorted(tmp_path.rglob("file"))] == ["mine", "mine"]
 
 
-def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path):
+def test_an_unwritable_place_is_refused_before_any_work(tmp_path):
     def fail(progress):
         raise AssertionError("a block was run")
 
@@ -327,7 +327,7 @@ def test_two_do_not_write_to_one_folder(whole, in_memory):
             pass
 
 
-def test_what_is_no_ensemble_is_not_opened(tmp_path):
+def test_other_folders_and_files_are_not_opened(tmp_path):
     for place in (tmp_path, tmp_path / "missing", Path(__file__)):
         with pytest.raises(cv.BadInput, match="not an ensemble"):
             cv.open_ensemble(place)

@@ -11,7 +11,7 @@ from . import trial_engine
 from .local_wheels import write_numpy, write_wheel
 from .trial_engine import make_environment
 
-# Nothing special about any of these: turned body and world axes, an inertia with off-diagonal terms, a weight that is not 1.
+# Generic parameters: turned body and world axes, an inertia with off-diagonal terms, a weight that is not 1.
 R_BP = rotation_about((1, 2, 3), 0.7)
 R_WB0 = rotation_about((1, -1, 0.3), 1.1)
 ASYMMETRIC = cv.RigidBody(R_BP @ [[2.1, 0, 0], [0, 3.3, 0], [0, 0, 4.2]] @ R_BP.T)
@@ -47,7 +47,7 @@ def generic(request):
 
 @pytest.fixture
 def trial_registered(tmp_path, monkeypatch):
-    """Register the engine of the tests, as a package that is installed does."""
+    """Register the test engine, as an installed package does."""
     info = tmp_path / "trial_engine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: trial_engine\nVersion: 1.0\n")
@@ -62,7 +62,7 @@ def trial_registered(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def trial_home(tmp_path_factory):
-    """A user's cache folder with an environment of the trial engine."""
+    """Return a cache folder with an environment of the test engine."""
     home = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(home))
@@ -72,14 +72,14 @@ def trial_home(tmp_path_factory):
 
 @pytest.fixture
 def trial_cache(trial_home, monkeypatch):
-    """The folder of all environments, of which the trial engine has one."""
+    """Return the folder of all environments; there is one of the test engine."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(trial_home))
     return environment.folder_of_all()
 
 
 @pytest.fixture(scope="session")
 def wheels(tmp_path_factory):
-    """A folder of wheels of NumPy and of three versions of the trial engine's package."""
+    """Return a folder of wheels of NumPy and of three versions of the trial engine's package."""
     folder = tmp_path_factory.mktemp("wheels")
     for version in ("1.0", "1.10", "1.9"):
         write_wheel(folder, version)
@@ -89,6 +89,6 @@ def wheels(tmp_path_factory):
 
 @pytest.fixture
 def no_environments(tmp_path, monkeypatch, trial_registered):
-    """The folder of all environments, of which there are none."""
+    """Return the folder of all environments, which is empty."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return environment.folder_of_all()

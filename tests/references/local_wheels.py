@@ -1,4 +1,4 @@
-"""A folder of wheels to install from without a network: an engine of no size, and the NumPy that is here."""
+"""Wheels to install from without a network: a test engine of one file, and the installed NumPy."""
 
 import hashlib
 import zipfile
@@ -23,14 +23,14 @@ def write_wheel(folder, version, tag=TAG, code="VALUE = 1\n", name="trial"):
 
 
 def write_numpy(folder):
-    """Write a wheel of the NumPy that is installed here."""
-    found = metadata.distribution("numpy")
-    info = f"numpy-{found.version}.dist-info"
-    paths = [path for path in found.files if path.parts[0] in ("numpy", "numpy.libs", info) and path.suffix != ".pyc"]
-    tag = next(line.partition(": ")[2] for line in found.read_text("WHEEL").splitlines() if line.startswith("Tag: "))
+    """Write a wheel of the installed NumPy."""
+    package = metadata.distribution("numpy")
+    info = f"numpy-{package.version}.dist-info"
+    paths = [path for path in package.files if path.parts[0] in ("numpy", "numpy.libs", info) and path.suffix != ".pyc"]
+    tag = next(line.partition(": ")[2] for line in package.read_text("WHEEL").splitlines() if line.startswith("Tag: "))
     left_out = ("RECORD", "INSTALLER", "REQUESTED", "direct_url.json")  # written by who installs
     files = {str(path): path.locate().read_bytes() for path in paths if path.name not in left_out}
-    write_zip(folder / f"numpy-{found.version}-{tag}.whl", files, info)
+    write_zip(folder / f"numpy-{package.version}-{tag}.whl", files, info)
 
 
 def write_zip(path, files, info):
@@ -46,7 +46,7 @@ def digest(data):
 
 
 def write_sdist(folder, marker):
-    """Write a source distribution whose setup.py writes a file when it is run."""
+    """Write a source distribution whose setup.py writes a file."""
     import io
     import tarfile
 

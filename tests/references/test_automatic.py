@@ -1,4 +1,4 @@
-"""The automatic choice is honest: what it promises against what an independent truth says, over random bodies and starts."""
+"""The errors of the automatic choice against an independent reference solution, over random bodies and initial states."""
 
 import warnings
 
@@ -18,7 +18,7 @@ KINDS = ("free", "top", "heavy body", "heavy body, tilted axes")
 
 
 def random_scene(rng, kind):
-    """A physical body in turned axes with a generic start; rates 1 to 40 rad/s, durations 0.5 to 5 s."""
+    """Return a physical body in turned axes with a generic start; rates 1 to 40 rad/s, durations 0.5 to 5 s."""
     halves = rng.uniform(0.2, 1, 3)
     moments = (halves.sum() - halves) * rng.uniform(0.1, 3)
     R_BP = random_rotation(rng) if kind != "heavy body" else np.eye(3)
@@ -41,20 +41,20 @@ def true_error(trajectory):
     return angle_between(truth.prepare(trajectory.scene, grid)().R_WB, trajectory.R_WB).max()
 
 
-def test_true_errors_are_within_ten_times_what_was_asked_for():
+def test_true_errors_are_at_most_ten_times_the_target():
     rng = np.random.default_rng(20)
     worse = []
     for number in range(SCENES):
         scene = random_scene(rng, KINDS[number % len(KINDS)])
         error = 10 ** rng.uniform(-11, -2)
         trajectory = cv.integrate(scene, error=error)
-        found = true_error(trajectory)
-        if found > 10 * error:
-            worse.append((scene.name, error, found, trajectory.choice))
+        measured = true_error(trajectory)
+        if measured > 10 * error:
+            worse.append((scene.name, error, measured, trajectory.choice))
     assert len(worse) <= 0.02 * SCENES, worse  # measured 0 of 200, and no true error above 3 times the target
 
 
-def test_a_choice_that_trusts_too_much_is_caught(monkeypatch):
+def test_estimates_that_are_too_small_are_detected(monkeypatch):
     """The negative control of the test above: estimates that are far too small."""
 
     monkeypatch.setattr(trials, "convergence_factor", lambda method: 1e9)

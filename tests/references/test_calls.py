@@ -1,4 +1,4 @@
-"""Functions with a time limit: after the limit they are ended, with an outcome, and nothing is left running."""
+"""Functions with a time limit: after the limit their process is ended, and no process remains."""
 
 import contextlib
 import ctypes
@@ -41,7 +41,7 @@ def children():
 
 
 @pytest.mark.parametrize("work", [hang, lambda: ctypes.PyDLL(None).sleep(600)])  # PyDLL does not release the interpreter
-def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running(work):
+def test_work_beyond_its_limit_is_ended_and_no_process_remains(work):
     before = threading.enumerate()
     with pytest.raises(EngineTimeout, match=r"did not answer within 0\.2 s"):
         run_within(0.2, work)
@@ -50,7 +50,7 @@ def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running(work):
 
 
 @pytest.mark.parametrize(
-    ("work", "said"),
+    ("work", "description"),
     [
         (lambda: ctypes.string_at(0), "signal 11 (SIGSEGV)"),
         (os.abort, "signal 6 (SIGABRT)"),
@@ -58,10 +58,10 @@ def test_work_beyond_its_limit_is_ended_and_nothing_is_left_running(work):
         (lambda: os._exit(3), "exit code 3"),
     ],
 )
-def test_the_death_of_its_process_is_told(work, said):
+def test_the_end_of_its_process_is_described(work, description):
     with pytest.raises(EngineCrashed) as caught:
         run_within(LONG, work)
-    assert caught.value.reason == said
+    assert caught.value.reason == description
     assert children() == []
     assert run_within(LONG, lambda: 3) == 3
 
@@ -72,26 +72,26 @@ def close_all():
 
 
 def answer_by_half():
-    """The prefix of an answer, and less than it announces."""
+    """Write the prefix of an answer, and less than it announces."""
     for descriptor in range(3, 256):
         with contextlib.suppress(OSError):
             os.write(descriptor, PREFIX.pack(MAGIC, 100, 0) + b"half")
     os._exit(4)
 
 
-@pytest.mark.parametrize(("work", "said"), [(close_all, "signal 9"), (answer_by_half, "exit code 4")])
-def test_an_answer_that_does_not_come_whole_is_the_end_of_its_process(work, said, monkeypatch):
+@pytest.mark.parametrize(("work", "description"), [(close_all, "signal 9"), (answer_by_half, "exit code 4")])
+def test_a_process_with_an_incomplete_answer_is_ended(work, description, monkeypatch):
     monkeypatch.setattr(client, "_PATIENCE", 0.5)
-    with pytest.raises(EngineCrashed, match=said):
+    with pytest.raises(EngineCrashed, match=description):
         run_within(LONG, work)
     assert children() == []
 
 
-def test_a_limit_may_be_as_long_as_any_number():
+def test_a_limit_may_be_any_number():
     assert run_within(1e100, int) == 0
 
 
-def test_what_it_returns_or_raises_comes_back():
+def test_results_and_exceptions_are_returned():
     local = {"factor": 7}
     assert run_within(LONG, lambda: 6 * local["factor"]) == 42
     with pytest.raises(ZeroDivisionError):
@@ -112,7 +112,7 @@ def test_one_process_does_one_piece_of_work_after_the_other():
     assert not process.is_running()
 
 
-def test_it_runs_in_the_working_directory_of_the_moment(tmp_path, monkeypatch):
+def test_it_runs_in_the_current_working_directory(tmp_path, monkeypatch):
     run_within(LONG, int)
     monkeypatch.chdir(tmp_path)
     assert run_within(LONG, os.getcwd) == str(tmp_path)
@@ -121,15 +121,15 @@ def test_it_runs_in_the_working_directory_of_the_moment(tmp_path, monkeypatch):
 
 
 def test_threads_have_processes_of_their_own():
-    found = []
+    results = []
     threads = [
-        threading.Thread(target=lambda k=k: found.append(run_within(LONG, lambda: (time.sleep(0.2), k)[1]))) for k in range(3)
+        threading.Thread(target=lambda k=k: results.append(run_within(LONG, lambda: (time.sleep(0.2), k)[1]))) for k in range(3)
     ]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert sorted(found) == [0, 1, 2]
+    assert sorted(results) == [0, 1, 2]
 
 
 def test_an_interrupt_ends_the_work():
@@ -142,7 +142,7 @@ def test_an_interrupt_ends_the_work():
     assert children() == []
 
 
-def test_what_cannot_be_sent_is_refused_and_the_process_stays():
+def test_objects_that_cannot_be_sent_are_refused():
     lock = threading.Lock()
     with pytest.raises(NotTransferable, match="lock"):
         run_within(LONG, lambda: lock)
@@ -151,7 +151,7 @@ def test_what_cannot_be_sent_is_refused_and_the_process_stays():
     assert run_within(LONG, lambda: 3) == 3
 
 
-def test_what_is_shared_is_the_same_object_again():
+def test_shared_objects_keep_their_identity():
     scene = cv.scenes.brick_flip()
     again, renamed = run_within(LONG, lambda: (scene, scene.rename("other")), (scene,))
     assert again is scene
@@ -159,7 +159,7 @@ def test_what_is_shared_is_the_same_object_again():
     assert np.array_equal(renamed.body.inertia, scene.body.inertia)
 
 
-def test_frozen_values_stay_frozen_and_leave_behind_what_they_keep():
+def test_frozen_values_stay_frozen_and_are_sent_without_caches():
     scene = cv.scenes.brick_flip()
     assert scene.energy_scale
     scene.derive(lambda scene: threading.Lock())

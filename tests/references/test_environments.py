@@ -1,4 +1,4 @@
-"""Environments of releases and of builds are made whole or not at all, and mended: from local wheels, without a network."""
+"""Environments of releases and of builds are created completely or not at all, from local wheels without a network."""
 
 import os
 import shutil
@@ -35,37 +35,33 @@ def installed(wheels, name="trial"):
 
 
 def everything(folder):
-    """Return all files below a folder, but what uv keeps for itself and what Python compiles."""
+    """Return all files below a folder, without compiled Python files."""
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file() or path.is_symlink()}
     return {name for name in names if "__pycache__" not in name}
 
 
 def test_the_newest_version_is_installed_with_numpy_and_recorded(cache, wheels):
     done = installed(wheels)
-    found = done.environment
-    assert (found.engine, found.version, done.new, done.trouble) == ("trial", "1.10", True, "")
-    assert [package.partition("==")[0] for package in found.packages] == ["numpy", "trial"]
-    assert environment.list_environments() == (found,)
-    lock = (found.folder / environment.LOCK).read_text()
+    created = done.environment
+    assert (created.engine, created.version, done.new, done.trouble) == ("trial", "1.10", True, "")
+    assert [package.partition("==")[0] for package in created.packages] == ["numpy", "trial"]
+    assert environment.list_environments() == (created,)
+    lock = (created.folder / environment.LOCK).read_text()
     assert "trial==1.10" in lock
     assert "--hash=sha256:" in lock
+    stamp = (created.folder / environment.RECORD).stat().st_mtime_ns
+    assert not installed(wheels).new
+    assert (created.folder / environment.RECORD).stat().st_mtime_ns == stamp
 
 
-def test_what_is_there_is_not_made_again(cache, wheels):
-    before = installed(wheels, "trial==1.9").environment
-    stamp = (before.folder / environment.RECORD).stat().st_mtime_ns
-    assert not installed(wheels, "trial==1.9").new
-    assert (before.folder / environment.RECORD).stat().st_mtime_ns == stamp
-
-
-def test_versions_live_side_by_side_and_go_one_by_one(cache, wheels):
+def test_versions_are_installed_and_removed_independently(cache, wheels):
     for version in ("1.0", "1.10", "1.9"):
         installed(wheels, f"trial=={version}")
-    assert [found.version for found in environment.list_environments("trial")] == ["1.0", "1.9", "1.10"]
+    assert [each.version for each in environment.list_environments("trial")] == ["1.0", "1.9", "1.10"]
     assert registry.method("trial").label == "trial==1.10/integrate"
     with pytest.raises(cv.BadInput, match=r"'trial==1\.9' \(nearest\)"):
         install.remove("trial==1.99")
-    assert [found.version for found in install.remove("trial==1.10")] == ["1.10"]
+    assert [each.version for each in install.remove("trial==1.10")] == ["1.10"]
     assert registry.method("trial").label == "trial==1.9/integrate"
     assert len(install.remove("trial")) == 2
     with pytest.raises(MissingEngine, match="conservative engines install trial"):
@@ -74,7 +70,7 @@ def test_versions_live_side_by_side_and_go_one_by_one(cache, wheels):
         install.remove("trial")
 
 
-def test_nothing_is_written_elsewhere(cache, wheels, tmp_path):
+def test_all_files_are_in_the_cache_folder(cache, wheels, tmp_path):
     before = everything(tmp_path) | everything(wheels)
     installed(wheels)
     outside = everything(tmp_path) | everything(wheels)
@@ -97,7 +93,7 @@ BAD = [
 
 
 @pytest.mark.parametrize("text", BAD)
-def test_a_name_with_anything_odd_in_it_is_refused(text):
+def test_a_name_with_other_characters_is_refused(text):
     with pytest.raises(cv.BadInput, match="NAME or NAME==VERSION"):
         split_requirement(text)
 
@@ -110,10 +106,11 @@ def test_an_unknown_engine_names_the_nearest(cache):
 def test_an_unknown_version_names_those_that_exist(cache, wheels):
     with pytest.raises(cv.BadInput, match=r"'trial==1.9.5'; expected 1.9 \(nearest\), or one of 1.10, 1.9, 1.0"):
         installed(wheels, "trial==1.9.5")
-    assert environment.describe_versions("0.1", ["1.0", "2.0"]).startswith("1.0 (nearest)")
+    with pytest.raises(cv.BadInput, match=r"'trial==0.1'; expected 1.0 \(nearest\)"):
+        installed(wheels, "trial==0.1")
 
 
-def test_a_version_for_other_pythons_alone_is_refused(cache, tmp_path):
+def test_a_version_for_other_pythons_only_is_refused(cache, tmp_path):
     write_wheel(tmp_path, "2.0", "cp27-cp27m-any")
     write_numpy(tmp_path)
     with pytest.raises(cv.BadInput, match=r"'trial==2.0', which has no wheel for Python 3\.\d+.*--allow-build"):
@@ -129,7 +126,7 @@ def test_no_code_of_a_package_runs_unless_allowed(cache, tmp_path):
     assert not marker.exists()
 
 
-def test_no_network_is_said(cache, monkeypatch):
+def test_a_missing_network_is_reported(cache, monkeypatch):
     monkeypatch.setenv("UV_DEFAULT_INDEX", "https://127.0.0.1:9/simple")
     monkeypatch.setenv("UV_HTTP_RETRIES", "0")
     with pytest.raises(
@@ -138,12 +135,12 @@ def test_no_network_is_said(cache, monkeypatch):
         install.install("trial")
 
 
-def test_what_uv_says_has_no_password():
+def test_errors_of_uv_contain_no_password():
     failure = uv_command.UvFailed("error: Failed to fetch: https://me:secret@somewhere/simple/x/")
     assert "secret" not in str(failure)
 
 
-def test_an_engine_that_cannot_be_imported_is_said(tmp_path, monkeypatch):
+def test_an_engine_that_cannot_be_imported_is_reported(tmp_path, monkeypatch):
     write_wheel(tmp_path, "4.0", code="import os\nos.abort()\n")
     write_numpy(tmp_path)
     monkeypatch.setattr(registry.engine("trial"), "data", Distribution("trial", "trial"))
@@ -162,7 +159,7 @@ def test_force_rebuilds_from_the_lock(cache, wheels):
     assert [path.name for path in (cache / "trial").iterdir()] == ["1.9"]
 
 
-def test_an_environment_that_cannot_be_made_again_is_not_lost(cache, wheels):
+def test_an_environment_without_a_lock_is_not_rebuilt(cache, wheels):
     before = installed(wheels).environment
     (before.folder / environment.LOCK).unlink()  # as of an environment that somebody made by hand
     with pytest.raises(cv.BadInput, match="without a lock"):
@@ -193,7 +190,7 @@ def renamed_never_from(rename, start):
     return fail
 
 
-def test_an_environment_without_a_record_is_made_again(cache, wheels):
+def test_an_environment_without_a_record_is_created_again(cache, wheels):
     (installed(wheels).environment.folder / environment.RECORD).unlink()
     assert environment.list_environments() == ()
     again = installed(wheels)
@@ -220,7 +217,7 @@ def start_install(start, wheels):
     )
 
 
-def test_a_kill_leaves_nothing_half_installed(cache, wheels, start):
+def test_a_kill_leaves_no_incomplete_environment(cache, wheels, start):
     began = time.monotonic()
     process = start_install(start, wheels)
     assert process.communicate(timeout=120)[0] == "start\nwhole\n"
@@ -237,7 +234,7 @@ def test_a_kill_leaves_nothing_half_installed(cache, wheels, start):
     assert whole < 6
 
 
-def test_a_full_disk_leaves_nothing_and_is_said(wheels, tmp_path, monkeypatch, trial_registered):
+def test_a_full_disk_leaves_nothing_and_is_reported(wheels, tmp_path, monkeypatch, trial_registered):
     small = tmp_path / "small"
     small.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "none", small], capture_output=True, check=False).returncode:
@@ -257,40 +254,40 @@ def build(wheels, folder, version="1.10", code="VALUE = 2\n"):
     return install_build("trial", folder / f"trial-{version}-py3-none-any.whl", Source(wheels))
 
 
-def test_a_build_has_a_version_of_its_own_and_integrates(wheels, tmp_path):
-    found = build(wheels, tmp_path)
-    assert (found.new, found.trouble) == (True, "")
-    version = found.environment.version
+def test_a_build_has_its_own_version_and_integrates(wheels, tmp_path):
+    installation = build(wheels, tmp_path)
+    assert (installation.new, installation.trouble) == (True, "")
+    version = installation.environment.version
     assert version.startswith("1.10+build.")
-    assert found.environment.is_build
+    assert installation.environment.is_build
     assert not install_build("trial", tmp_path / "trial-1.10-py3-none-any.whl", Source(wheels)).new
     method = registry.method(f"trial@{version}")
     assert method.label == f"trial=={version}/integrate"
     assert cv.integrate(cv.scenes.brick_flip(t_end=0.1), 0.01, method=method).ok
 
 
-def test_builds_of_one_version_are_environments_of_their_own(wheels, tmp_path):
+def test_builds_of_one_version_have_different_environments(wheels, tmp_path):
     first, second = build(wheels, tmp_path), build(wheels, tmp_path, code="VALUE = 3\n")
     assert second.new
     assert first.environment.version != second.environment.version
     assert build(wheels, tmp_path, "2.0+g12").environment.version.startswith("2.0+g12.build.")  # a local part stays
 
 
-def test_no_build_is_taken_for_the_newest_release(wheels, tmp_path):
+def test_a_build_is_not_the_newest_release(wheels, tmp_path):
     install.install("trial==1.0", Source(wheels))
     build(wheels, tmp_path, "9.0")
     assert environment.find_environment("trial").version == "1.0"
 
 
 @pytest.mark.parametrize("name", ["other-1.0-py3-none-any.whl", "trial.whl", "trial-1.0.whl"])
-def test_a_file_that_is_no_wheel_of_the_engine_is_refused(name, tmp_path):
+def test_wheels_of_other_packages_are_refused(name, tmp_path):
     with zipfile.ZipFile(tmp_path / name, "w"):
         pass
     with pytest.raises(cv.BadInput, match=r"against: got .*expected a wheel of trial"):
         install_build("trial", tmp_path / name, Source())
 
 
-def test_what_is_neither_wheel_nor_sources_is_refused(tmp_path):
+def test_a_path_without_wheel_or_sources_is_refused(tmp_path):
     for path in (tmp_path, tmp_path / "nothing.whl"):
         with pytest.raises(cv.BadInput, match="expected a wheel, or a folder with"):
             install_build("trial", path, Source())
@@ -304,7 +301,7 @@ def test_a_wheel_for_another_python_is_refused(cache, tmp_path):
     assert environment.list_environments() == ()
 
 
-def test_sources_are_built_only_where_that_is_allowed(tmp_path):
+def test_sources_are_not_built_without_permission(tmp_path):
     marker = tmp_path / "it_ran"
     (tmp_path / "setup.py").write_text(f"open({str(marker)!r}, 'w')\n")
     with pytest.raises(cv.BadInput, match="has to be built; expected a wheel, or --allow-build"):
@@ -328,15 +325,15 @@ version = "3.0"
 """
 
 
-def test_sources_are_built_where_that_is_allowed(wheels, tmp_path):
+def test_sources_are_built_with_permission(wheels, tmp_path):
     write_wheel(tmp_path, "3.0")
     project = tmp_path / "project"
     project.mkdir()
     (project / "pyproject.toml").write_text(PROJECT)
     (project / "backend.py").write_text(BACKEND.format(source=str(tmp_path / "trial-3.0-py3-none-any.whl")))
-    found = install_build("trial", project, Source(wheels, allow_build=True))
-    assert found.environment.version.startswith("3.0+build.")
-    assert found.trouble == ""
+    installation = install_build("trial", project, Source(wheels, allow_build=True))
+    assert installation.environment.version.startswith("3.0+build.")
+    assert installation.trouble == ""
 
 
 def test_sources_that_do_not_build_are_refused(wheels, tmp_path):
@@ -351,17 +348,17 @@ def test_the_newest_releases_are_those_of_the_index_oldest_first(wheels):
     assert newest_releases("trial", 9, Source(wheels)) == ("1.0", "1.9", "1.10")
 
 
-def test_releases_that_nobody_can_list_are_said(tmp_path):
+def test_a_missing_list_of_releases_is_reported(tmp_path):
     with pytest.raises(cv.BadInput, match=r"no list of versions of trial .*expected a network, --find-links FOLDER"):
         newest_releases("trial", 2, Source(tmp_path))
 
 
-def test_releases_are_installed_once_and_told_before(wheels):
-    told = []
+def test_releases_are_installed_once_and_announced(wheels):
+    announced = []
     for _ in range(2):
-        found = install_releases("trial", ("1.9", "1.0"), Source(wheels), told.append)
-        assert [each.version for each in found] == ["1.9", "1.0"]
-    assert told == ["installing trial==1.9", "installing trial==1.0"]
+        environments = install_releases("trial", ("1.9", "1.0"), Source(wheels), announced.append)
+        assert [each.version for each in environments] == ["1.9", "1.0"]
+    assert announced == ["installing trial==1.9", "installing trial==1.0"]
     with pytest.raises(cv.BadInput, match="NAME or NAME==VERSION"):
-        install_releases("trial", ("1.10", "; true"), Source(wheels), told.append)
-    assert len(told) == 2
+        install_releases("trial", ("1.10", "; true"), Source(wheels), announced.append)
+    assert len(announced) == 2

@@ -1,8 +1,9 @@
 """heyoka, SciPy and multi-precision in every kind of field, also in fields that turn.
 
-No wrong convention can hide: axes are turned, inertias are not diagonal and sizes are not 1. No two programs write the
-equations of fields that turn the same way: `Precise` has the field as a function of time in the world's axes, heyoka and SciPy
-have it in axes that turn, and `Projected` at the times of its stages (compared with the textbook in `test_turning.py`).
+Axes are turned, inertias are not diagonal and sizes are not 1, so that a wrong convention shows. The programs write the
+equations of fields that turn in different ways: `Precise` has the field as a function of time in the world's axes, heyoka and
+SciPy have it in axes that turn, and `Projected` has it at the times of its stages (compared with the textbook in
+`test_turning.py`).
 """
 
 import numpy as np
@@ -30,7 +31,7 @@ POINT, ANCHOR, CENTRE = (0.3, -0.2, 0.4), (1.0, 0.5, 2.0), (0.2, -0.3, -1.0)
 
 
 def make_fields(strength=1.0):
-    """Return fields by name, with energies so many times as large."""
+    """Return fields by name, with energies multiplied by `strength`."""
     rate = 1.7 * strength**0.5
     return {
         "gravity": cv.UniformGravity(3.1 * strength, POINT),
@@ -80,7 +81,7 @@ def test_expressions_are_the_gradients(name):
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_every_parameter_matters(name):
-    """So that the agreement above cannot be by chance: each number changed by a thousandth is seen."""
+    """A change of any parameter by a thousandth is detected, so the agreement above is not by chance."""
     scene = scene_in(FIELDS[name])
     right, parameters = accelerations(scene), express_field(scene).parameters
     assert any(parameters) == (name not in ("spring at the pivot", "repulsion of the pivot"))
@@ -89,7 +90,7 @@ def test_every_parameter_matters(name):
         assert value == 0 or np.abs(accelerations(scene, wrong) - right).max() > 1e-7 * np.abs(right).max()
 
 
-def test_truth_and_engines_know_the_same_fields():
+def test_precise_and_engines_support_the_same_fields():
     assert READERS.keys() == precise.FIELDS.keys() == {type(field) for field in FIELDS.values()}
 
 
@@ -99,18 +100,18 @@ INTEGRATED = ["gravity", "spring", "attraction", "gradient on another inertia"]
 @pytest.mark.parametrize("frame", ["body", "base_vectors"])
 @pytest.mark.parametrize("name", INTEGRATED)
 def test_heyoka_agrees_with_truth(name, frame):
-    """Errors near the tolerance, measured over both frames."""
+    """Check errors near the tolerance, measured over both frames."""
     scene = scene_in(FIELDS[name])
     truth = Precise(128).prepare(scene, GRID)()
     for tol, bound in ((1e-9, 1e-10), (1e-15, 4e-14)):  # measured 1e-11, 4e-15
-        found = Heyoka(tol, frame).prepare(scene, GRID)()
-        assert found.ok
-        assert angle_between(truth.R_WB, found.R_WB).max() < bound
-        assert np.abs(truth.w_WB_B - found.w_WB_B).max() < bound
+        trajectory = Heyoka(tol, frame).prepare(scene, GRID)()
+        assert trajectory.ok
+        assert angle_between(truth.R_WB, trajectory.R_WB).max() < bound
+        assert np.abs(truth.w_WB_B - trajectory.w_WB_B).max() < bound
 
 
 @pytest.mark.parametrize("name", INTEGRATED)
-def test_a_slightly_wrong_field_would_be_seen(name):
+def test_a_slightly_wrong_field_is_detected(name):
     """The bounds above are far below what a millionth of the field changes."""
     stronger = scene_in(make_fields(1 + 1e-6)[name])
     right, wrong = (Precise(128).prepare(scene, GRID)() for scene in (scene_in(FIELDS[name]), stronger))
@@ -120,50 +121,43 @@ def test_a_slightly_wrong_field_would_be_seen(name):
 @pytest.mark.parametrize("name", FIELDS)
 def test_scipy_agrees_with_truth(name):
     scene = scene_in(FIELDS[name])
-    truth, found = (method.prepare(scene, GRID)() for method in (Precise(128), SciPy(rtol=3e-14)))
-    assert angle_between(truth.R_WB, found.R_WB).max() < 2e-12  # measured 4e-13
-    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 5e-12
-
-
-def test_scipy_takes_functions_through_their_gradient():
-    field = FIELDS["spring"]
-    functions = cv.FunctionPotential(field.energy, field.gradient)
-    written_out, called = (SciPy(rtol=1e-12).prepare(scene_in(each), GRID)() for each in (field, functions))
-    assert angle_between(written_out.R_WB, called.R_WB).max() < 1e-9  # measured 3e-11, as steps differ
+    truth, trajectory = (method.prepare(scene, GRID)() for method in (Precise(128), SciPy(rtol=3e-14)))
+    assert angle_between(truth.R_WB, trajectory.R_WB).max() < 2e-12  # measured 4e-13
+    assert np.abs(truth.w_WB_B - trajectory.w_WB_B).max() < 5e-12
 
 
 @pytest.mark.parametrize("field", ["spring", "attraction"])
-def test_scipy_takes_fields_at_loose_tolerances(field):
-    """Within a step the quaternion is longer than one; a distance made of it as it is would be a root of a negative number."""
+def test_scipy_supports_loose_tolerances(field):
+    """Within a step the quaternion is longer than one: without normalisation a distance is the root of a negative number."""
     scene = random_body(field, seed=7, index=1)
     outcome = SciPy(rtol=0.1).run(scene, scene.t_end / 12).outcome
     assert outcome.kind is cv.OutcomeKind.NOT_CONSERVED, outcome  # and not an exception from within its steps
 
 
-def test_both_take_every_scene_of_the_catalogue():
+def test_heyoka_and_scipy_support_every_registered_scene():
     for name in registry.list_scenes():
         for method in (Heyoka(), Heyoka(frame="lean"), Heyoka(frame="base_vectors"), SciPy()):
             assert method.unsupported(registry.scene(name)) is None
 
 
-def test_heyoka_names_a_field_without_expressions_and_where_they_belong():
+def test_the_reason_of_an_unsupported_field_names_the_table_of_expressions():
     gravity = FIELDS["gravity"]
     reason = Heyoka().unsupported(scene_in(cv.FunctionPotential(gravity.energy, gravity.gradient)))
     assert reason == f"no heyoka expressions for FunctionPotential; add them to {express_field.__module__}.READERS"
 
 
-def test_base_vectors_are_not_tidied_up():
-    """The rows of a loose run are off a rotation by about its tolerance, and nothing hides that."""
-    found = Heyoka(1e-4, "base_vectors").prepare(scene_in(FIELDS["gravity"]), GRID)()
-    off = cv.attitude.orthonormality(found.R_WB).max()
+def test_base_vectors_are_not_orthonormalised():
+    """At a loose tolerance, the rows differ from a rotation by about the tolerance."""
+    trajectory = Heyoka(1e-4, "base_vectors").prepare(scene_in(FIELDS["gravity"]), GRID)()
+    off = cv.attitude.orthonormality(trajectory.R_WB).max()
     assert 1e-9 < off < 1e-3  # measured 4e-6
-    np.testing.assert_allclose(found.R_WB[:, 1], np.cross(found.R_WB[:, 2], found.R_WB[:, 0]), atol=1e-15)
+    np.testing.assert_allclose(trajectory.R_WB[:, 1], np.cross(trajectory.R_WB[:, 2], trajectory.R_WB[:, 0]), atol=1e-15)
 
 
 @pytest.mark.parametrize("moments", [(1, 2, 2.5), (2, 1, 2.5), (2, 2.5, 1), (2.5, 2, 1), (1, 2.5, 2), (2.5, 1, 2)])
 @pytest.mark.parametrize("slow", [False, True])
 def test_a_free_bodys_third_axis_is_one_about_which_its_momentum_circulates(moments, slow):
-    """Its component stays above 0 about that axis, as it does about no other one."""
+    """Its component along that axis stays above 0, and no other component does."""
     axes = np.argsort(moments)
     w = np.zeros(3)
     w[axes] = (-3, 0.4, 0.1) if slow else (0.1, 0.4, -3)  # about the smallest moment, or about the largest
@@ -194,19 +188,19 @@ def test_every_formulation_gives_the_same_motion(field):
         (SciPy(rtol=2.3e-14), 1e-12),
         (cv.Projected(), 1e-13),
     ):
-        found = cv.integrate(
+        trajectory = cv.integrate(
             scene, 0.1 if method.order is None else 0.01, method, sample_every=1 if method.order is None else 10
         )
-        assert angle_between(truth.R_WB, found.R_WB).max() < allowed, method.name
-        assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 10 * allowed, method.name
+        assert angle_between(truth.R_WB, trajectory.R_WB).max() < allowed, method.name
+        assert np.abs(truth.w_WB_B - trajectory.w_WB_B).max() < 10 * allowed, method.name
 
 
 @pytest.mark.parametrize("method", [cv.Taylor(14), cv.Taylor(18)])
 def test_taylor_in_the_field_of_a_satellite(method):
     scene = scene_in(TURNING["satellite"])
-    truth, found = cv.integrate(scene, 0.1, Precise(128)), cv.integrate(scene, 0.02, method, sample_every=5)
-    assert angle_between(truth.R_WB, found.R_WB).max() < 1e-13  # measured up to 1.3e-15
-    assert np.abs(truth.w_WB_B - found.w_WB_B).max() < 1e-12
+    truth, trajectory = cv.integrate(scene, 0.1, Precise(128)), cv.integrate(scene, 0.02, method, sample_every=5)
+    assert angle_between(truth.R_WB, trajectory.R_WB).max() < 1e-13  # measured up to 1.3e-15
+    assert np.abs(truth.w_WB_B - trajectory.w_WB_B).max() < 1e-12
 
 
 def test_truth_of_a_satellite_is_multi_precision():
@@ -214,10 +208,10 @@ def test_truth_of_a_satellite_is_multi_precision():
     assert reference(scene, cv.Grid(0.1, 10)).trajectory.label.startswith("heyoka")
 
 
-def test_a_function_that_turns_has_scipy_alone_beside_ours():
+def test_only_scipy_supports_a_function_that_turns():
     gravity = FIELDS["gravity"]
     scene = scene_in(cv.Turning(cv.FunctionPotential(gravity.energy, gravity.gradient), ORBIT))
     assert "FunctionPotential" in Heyoka().unsupported(scene)
     assert "FunctionPotential" in Precise().unsupported(scene)
-    found, known = (cv.integrate(each, 0.1, SciPy()) for each in (scene, scene_in(TURNING["gravity"])))
-    assert angle_between(found.R_WB, known.R_WB).max() < 1e-10  # measured 1.8e-12
+    trajectory, known = (cv.integrate(each, 0.1, SciPy()) for each in (scene, scene_in(TURNING["gravity"])))
+    assert angle_between(trajectory.R_WB, known.R_WB).max() < 1e-10  # measured 1.8e-12

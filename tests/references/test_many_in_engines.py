@@ -1,4 +1,4 @@
-"""Engines that run many bodies at once: each body moves as it does alone."""
+"""Engines that run many bodies at once: the motion of each body equals its single run."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ HEYOKA = "heyoka:tol=1e-15,frame=base_vectors"
 
 
 def differences(block, method, bodies):
-    """The largest difference of each body from the run of it alone."""
+    """Return the largest difference of each body from its single run."""
     alone = [method.solve(bodies.take(i), GRID) for i in range(len(bodies))]
     R, w = (np.array([getattr(each, name) for each in alone]) for name in ("R_WB", "w_WB_B"))
     return np.maximum(np.abs(block.R_WB - R).max(axis=(1, 2, 3)), np.abs(block.w_WB_B - w).max(axis=(1, 2)))
@@ -34,7 +34,7 @@ def differences(block, method, bodies):
         ("pinocchio:scheme=RK4", TOPS, 1e-14),
     ],
 )
-def test_a_body_among_many_moves_as_it_does_alone(name, bodies, allowed):
+def test_many_bodies_equal_their_single_runs(name, bodies, allowed):
     method = registry.method(name)
     run = method.prepare_many(bodies, GRID)
     first, again = run(), run()
@@ -45,14 +45,14 @@ def test_a_body_among_many_moves_as_it_does_alone(name, bodies, allowed):
     assert differences(first, method, other)[0] > 1e-3
 
 
-def test_a_batch_that_does_not_get_there_says_so(monkeypatch):
+def test_a_batch_at_the_limit_of_steps_is_not_finished(monkeypatch):
     monkeypatch.setattr(heyoka, "STEP_LIMIT", 1)
     block = registry.method(HEYOKA).prepare_many(TOPS, GRID)()
     assert not block.finished.any()
     assert np.isnan(block.R_WB[:, -1]).all()
 
 
-def test_a_rollout_that_stands_still_is_not_finished():
+def test_a_rollout_that_diverges_is_not_finished():
     rates = TOPS.w_WB_B0.copy()
     rates[2] = 1e4
     many = Batch(TOPS.scene, TOPS.R_WB0, rates, TOPS.inertia, TOPS.parameters)
@@ -69,7 +69,7 @@ def test_a_rollout_in_pieces_is_the_same(monkeypatch):
     assert np.array_equal(run(TOPS, GRID)().R_WB, whole.R_WB)
 
 
-def test_a_worker_takes_bodies_apart_again():
+def test_a_worker_receives_many_bodies():
     axes = [principal_axes(TOPS.take(i)) for i in range(5)]
     runs = Runs()
     numbers = describe_many(axes, GRID)
@@ -84,7 +84,7 @@ def test_bad_settings_of_batches(settings):
         registry.method(f"heyoka:{settings}")
 
 
-def test_what_cannot_run_at_once_says_so():
+def test_bodies_that_cannot_run_at_once_are_refused():
     assert registry.method("heyoka:frame=lean").prepare_many(FREE, GRID) is None
     small = Batch(TOPS.scene, TOPS.R_WB0, TOPS.w_WB_B0, TOPS.inertia * 1e-29, TOPS.parameters)
     assert registry.method("mujoco:RK4").prepare_many(small, GRID) is None

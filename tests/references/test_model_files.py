@@ -18,7 +18,7 @@ QUATERNION = np.array([0.8, 0.2, -0.4, 0.4])  # scalar first, of unit length
 
 
 def about(com, inertia_com, mass=MASS):
-    """Return the inertia about the point from which `com` is, by the sum over (c.c 1 - c c')."""
+    """Return the inertia about the origin of `com`: J + m (c.c 1 - c c')."""
     return inertia_com + mass * (com @ com * np.eye(3) - np.outer(com, com))
 
 
@@ -42,6 +42,7 @@ def mjcf(inside, pose='pos="1 2 3" quat="0.5 0.5 -0.5 0.5"'):
 
 
 JOINT = f'<joint type="ball" pos="{numbers(ANCHOR)}"/>'
+HINGES = "".join(f'<joint type="hinge" axis="{axis}" pos="{numbers(ANCHOR)}"/>' for axis in ("1 0 0", "0 1 0.5"))
 FULL = (
     f'<inertial mass="{MASS}" pos="{numbers(COM)}" fullinertia="0.5 0.6 0.7 0.01 -0.02 0.03"/>',
     TENSOR_I,
@@ -52,42 +53,35 @@ TURNED = (
 )
 
 
+@pytest.mark.parametrize("joints", [JOINT, HINGES], ids=["ball", "hinges through one point"])
 @pytest.mark.parametrize(("inertial", "inertia_com"), [FULL, TURNED], ids=["fullinertia", "turned diaginertia"])
-def test_an_mjcf_body_turns_about_its_joint(written, inertial, inertia_com):
-    found = body_from_mjcf(written(mjcf(JOINT + inertial)), "arm")
-    assert found.mass == MASS
-    np.testing.assert_allclose(found.com_B, COM - ANCHOR, atol=1e-14)  # measured 2e-16
-    np.testing.assert_allclose(found.inertia, about(COM - ANCHOR, inertia_com), atol=1e-12)  # measured 7e-15
-
-
-def test_hinges_through_one_point_are_a_fixed_point(written):
-    hinges = "".join(f'<joint type="hinge" axis="{axis}" pos="{numbers(ANCHOR)}"/>' for axis in ("1 0 0", "0 1 0.5"))
-    found = body_from_mjcf(written(mjcf(hinges + FULL[0])), "arm")
-    np.testing.assert_allclose(
-        found.inertia, about(COM - ANCHOR, TENSOR_I), atol=1e-12
-    )  # measured 7e-15, MuJoCo's principal axes
+def test_an_mjcf_body_turns_about_its_joint(written, joints, inertial, inertia_com):
+    body = body_from_mjcf(written(mjcf(joints + inertial)), "arm")
+    assert body.mass == MASS
+    np.testing.assert_allclose(body.com_B, COM - ANCHOR, atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(body.inertia, about(COM - ANCHOR, inertia_com), atol=1e-12)  # measured 7e-15
 
 
 def test_a_free_mjcf_body_turns_about_its_centre(written):
     text = (
         f'<mujoco><worldbody><body name="arm" pos="1 2 3" euler="10 20 30"><freejoint/>{TURNED[0]}</body></worldbody></mujoco>'
     )
-    found = body_from_mjcf(written(text), "arm")
-    np.testing.assert_array_equal(found.com_B, np.zeros(3))
-    np.testing.assert_allclose(found.inertia, TURNED[1], atol=1e-12)  # measured 4e-16
+    body = body_from_mjcf(written(text), "arm")
+    np.testing.assert_array_equal(body.com_B, np.zeros(3))
+    np.testing.assert_allclose(body.inertia, TURNED[1], atol=1e-12)  # measured 4e-16
 
 
-def test_what_is_welded_to_an_mjcf_body_counts_and_what_hangs_on_a_joint_does_not(written):
+def test_an_mjcf_body_includes_welded_bodies_only(written):
     pose = f'pos="0.3 0.1 -0.2" quat="{numbers(QUATERNION)}"'
     welded = f'<body name="tip" {pose}><inertial mass="0.5" pos="0.01 0.02 0.03" diaginertia="0.05 0.06 0.07"/></body>'
     hanging = f'<body name="child" pos="1 1 1"><joint type="ball"/>{TURNED[0]}</body>'
-    found = body_from_mjcf(written(mjcf(JOINT + FULL[0] + welded + hanging)), "arm")
+    body = body_from_mjcf(written(mjcf(JOINT + FULL[0] + welded + hanging)), "arm")
     R = from_quaternion(QUATERNION)
     com_tip = np.array([0.3, 0.1, -0.2]) + R @ (0.01, 0.02, 0.03) - ANCHOR
     expected = about(COM - ANCHOR, TENSOR_I) + about(com_tip, R @ np.diag([0.05, 0.06, 0.07]) @ R.T, 0.5)
-    assert found.mass == pytest.approx(3.0, rel=1e-15)
-    np.testing.assert_allclose(found.com_B, (MASS * (COM - ANCHOR) + 0.5 * com_tip) / 3, atol=1e-14)  # measured 2e-16
-    np.testing.assert_allclose(found.inertia, expected, atol=1e-12)  # measured 7e-15
+    assert body.mass == pytest.approx(3.0, rel=1e-15)
+    np.testing.assert_allclose(body.com_B, (MASS * (COM - ANCHOR) + 0.5 * com_tip) / 3, atol=1e-14)  # measured 2e-16
+    np.testing.assert_allclose(body.inertia, expected, atol=1e-12)  # measured 7e-15
 
 
 SMALL = '<inertial><mass value="0.5"/><inertia ixx="0.05" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -106,28 +100,28 @@ def urdf(joint="revolute", inertial=True):
 
 @pytest.mark.parametrize("joint", ["revolute", "continuous"])
 def test_a_urdf_link_turns_about_its_joint(written, joint):
-    found = body_from_urdf(written(urdf(joint), "robot.urdf"), "arm")
-    assert found.mass == MASS
-    np.testing.assert_allclose(found.com_B, COM, atol=1e-15)  # measured 0
-    np.testing.assert_allclose(found.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T), atol=1e-14)  # measured 6e-17
+    body = body_from_urdf(written(urdf(joint), "robot.urdf"), "arm")
+    assert body.mass == MASS
+    np.testing.assert_allclose(body.com_B, COM, atol=1e-15)  # measured 0
+    np.testing.assert_allclose(body.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T), atol=1e-14)  # measured 6e-17
 
 
 def test_the_root_of_a_urdf_is_free(written):
-    found = body_from_urdf(written(urdf(), "robot.urdf"), "base")
-    np.testing.assert_array_equal(found.com_B, np.zeros(3))
-    np.testing.assert_allclose(found.inertia, np.diag([0.05, 0.06, 0.07]), atol=1e-16)
+    body = body_from_urdf(written(urdf(), "robot.urdf"), "base")
+    np.testing.assert_array_equal(body.com_B, np.zeros(3))
+    np.testing.assert_allclose(body.inertia, np.diag([0.05, 0.06, 0.07]), atol=1e-16)
 
 
-def test_what_is_welded_to_a_urdf_link_counts(written):
+def test_a_urdf_link_includes_welded_links(written):
     text = urdf().replace(
         '<link name="tip"/>',
         f'<link name="tip">{SMALL}</link>',
     )
     weld = '<child link="tip"/><origin xyz="0.3 0.1 -0.2" rpy="0.3 -0.5 0.7"/></joint></robot>'
-    found = body_from_urdf(written(text.replace('<child link="tip"/></joint></robot>', weld), "robot.urdf"), "arm")
+    body = body_from_urdf(written(text.replace('<child link="tip"/></joint></robot>', weld), "robot.urdf"), "arm")
     welded = about(np.array([0.3, 0.1, -0.2]), R_BI @ np.diag([0.05, 0.06, 0.07]) @ R_BI.T, 0.5)
-    assert found.mass == pytest.approx(3.0, rel=1e-15)
-    np.testing.assert_allclose(found.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T) + welded, atol=1e-14)  # measured 9e-16
+    assert body.mass == pytest.approx(3.0, rel=1e-15)
+    np.testing.assert_allclose(body.inertia, about(COM, R_BI @ TENSOR_I @ R_BI.T) + welded, atol=1e-14)  # measured 9e-16
 
 
 SCENE = """t_end = 1.0
@@ -155,7 +149,7 @@ def test_a_scene_file_takes_a_body_of_another_file_in_its_folder(written, tmp_pa
     np.testing.assert_allclose(overridden, about(np.array([0, 0, 0.5]), tensor), atol=1e-12)  # measured 7e-15
 
 
-def test_a_body_that_is_not_in_the_file_is_answered_at_the_line_of_its_name(written):
+def test_the_error_of_an_unknown_body_has_the_line_of_its_name(written):
     written(urdf(), "robot.urdf")
     path = written(SCENE.format(kind="urdf", file="robot.urdf", name="arn", more=""), "my.toml")
     with pytest.raises(cv.BadInput) as caught:
@@ -188,7 +182,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_named(written, tmp_path, case):
+def test_bad_input(written, tmp_path, case):
     read, text, name, argument, got, allowed = BAD[case]
     path = tmp_path / "no.xml" if text is None else written(text)
     with pytest.raises(cv.BadInput) as caught:
@@ -198,7 +192,7 @@ def test_bad_input_is_named(written, tmp_path, case):
     assert allowed in caught.value.allowed
 
 
-def test_loaders_are_registered_and_unknown_kinds_named():
+def test_loaders_are_registered():
     assert list(deferred_imports.list_entries(deferred_imports.BODY_FILES)) == ["mjcf", "urdf"]
     assert deferred_imports.load_entry(deferred_imports.BODY_FILES, "kind of file", "mjcf") is body_from_mjcf
     with pytest.raises(cv.BadInput) as caught:
@@ -210,7 +204,7 @@ def test_loaders_are_registered_and_unknown_kinds_named():
 COPIES = '<replicate count="99999"><replicate count="99999">{}</replicate></replicate>'
 
 
-def test_a_file_that_takes_too_much_is_given_up(written, monkeypatch):
+def test_reading_a_file_has_limits(written, monkeypatch):
     monkeypatch.setattr(model_files, "SECONDS", 2)
     path = written(mjcf(JOINT + FULL[0] + COPIES.format('<geom size="0.1"/>')))
     with pytest.raises(cv.BadInput) as caught:  # it filled the machine's memory, or took minutes
@@ -221,9 +215,9 @@ def test_a_file_that_takes_too_much_is_given_up(written, monkeypatch):
         body_from_mjcf(written(mjcf(JOINT + FULL[0])), "arm")
 
 
-def test_the_reader_hands_over_every_bit(written):
+def test_reading_in_another_process_changes_no_bit(written):
     path = written(mjcf(JOINT + TURNED[0]))
-    found, here = body_from_mjcf(path, "arm"), model_files.read_mjcf(str(path), "arm")
-    assert found.mass == here.mass
-    np.testing.assert_array_equal(found.com_B, here.com_B)
-    np.testing.assert_array_equal(found.inertia_com, here.inertia_com)
+    body, here = body_from_mjcf(path, "arm"), model_files.read_mjcf(str(path), "arm")
+    assert body.mass == here.mass
+    np.testing.assert_array_equal(body.com_B, here.com_B)
+    np.testing.assert_array_equal(body.inertia_com, here.inertia_com)

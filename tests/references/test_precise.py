@@ -1,4 +1,4 @@
-"""Truth against what others computed to 30 digits, and against double precision where it can follow."""
+"""Multi-precision solutions against published states of 30 digits, and against double precision."""
 
 import json
 from pathlib import Path
@@ -29,12 +29,12 @@ def test_thirty_digits_of_every_reference_state(name):
     q, w = precise.states(case["J"], case["q0"], case["w0"], times, moment_of(case), bits=208)
     with mpmath.workprec(208):
         for state, row in zip(case["states"], zip(q, w, strict=True), strict=True):
-            expected, found = state["q"] + state["w"], [*row[0], *row[1]]
-            off = max(abs(mpmath.mpf(x) - y) / max(abs(y), mpmath.mpf("1e-3")) for x, y in zip(expected, found, strict=True))
+            expected, computed = state["q"] + state["w"], [*row[0], *row[1]]
+            off = max(abs(mpmath.mpf(x) - y) / max(abs(y), mpmath.mpf("1e-3")) for x, y in zip(expected, computed, strict=True))
             assert off < 2e-28  # measured 8.6e-29 where the file's own inputs have 30 digits, 5e-30 elsewhere
 
 
-def test_more_bits_change_nothing_that_fewer_can_hold(heavy):
+def test_more_bits_change_no_double(heavy):
     coarse, fine = (Precise(bits).prepare(heavy, Grid(0.5, 4))() for bits in (80, 160))
     assert angle_between(coarse.R_WB, fine.R_WB).max() < 1e-15  # measured 0
     np.testing.assert_allclose(coarse.w_WB_B, fine.w_WB_B, rtol=1e-15)
@@ -43,7 +43,7 @@ def test_more_bits_change_nothing_that_fewer_can_hold(heavy):
 
 
 def test_inertia_with_off_diagonal_terms_in_many_digits(heavy):
-    """The same body in its principal axes, turned exactly, moves the same way."""
+    """Compare with the same body in its principal axes."""
     with mpmath.workprec(200):
         s = mpmath.sqrt(mpmath.mpf(1) / 3)
         # A half turn about (1, 1, 1)/sqrt 3, B = 2 n n' - 1, is its own inverse.
@@ -65,7 +65,7 @@ def test_inertia_with_off_diagonal_terms_in_many_digits(heavy):
 
 @pytest.mark.parametrize("name", ["sprung_body", "attracted_body", "gravity_gradient_body"])
 def test_other_fields_agree_with_their_own_gradients(name):
-    """SciPy knows functions through their gradient alone."""
+    """Compare with SciPy, which uses only the gradient of a function."""
     scene = getattr(cv.scenes, name)(t_end=2.0)
     field = cv.FunctionPotential(scene.potential.energy, scene.potential.gradient)
     truth = Precise(80).run(scene, 0.5)
@@ -75,7 +75,7 @@ def test_other_fields_agree_with_their_own_gradients(name):
     assert drift < 1e-14  # measured 4e-16
 
 
-def test_a_potential_without_expressions_is_unsupported_and_named(heavy):
+def test_a_potential_without_expressions_is_unsupported(heavy):
     reason = Precise().unsupported(
         heavy.rename("unknown", potential=cv.FunctionPotential(lambda R: R[2, 2], lambda R: np.diag((0, 0, 1.0))))
     )

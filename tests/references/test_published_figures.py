@@ -100,8 +100,8 @@ def spin(figure):  # the second world component of the angular velocity, rad/s
     return world_rates(end(figure))[1]
 
 
-def world_rates(found):
-    return found.R_WB[-1] @ found.w_WB_B[-1]
+def world_rates(trajectory):
+    return trajectory.R_WB[-1] @ trajectory.w_WB_B[-1]
 
 
 def quaternion(figure):
@@ -215,7 +215,7 @@ def agrees(figure, measured):
 
 
 def cases():
-    """Return a parameter for each figure that can be measured; one of an engine in an environment is marked with the engine."""
+    """Return a parameter for each figure that can be measured. Figures of engines in environments are marked."""
     inside = registry.list_engines()
     for figure in FIGURES:
         family, _, version = figure.method.partition(":")[0].partition("@")
@@ -245,7 +245,7 @@ def test_a_published_figure(figure):
         (">", "0.51", "", False),
     ],
 )
-def test_a_half_against_what_is_printed(relation, printed, tolerance, expected):
+def test_the_comparison_of_a_half_with_printed_numbers(relation, printed, tolerance, expected):
     figure = SimpleNamespace(relation=relation, printed=printed, tolerance=tolerance)
     assert agrees(figure, np.array([0.5])) == expected
 

@@ -1,4 +1,4 @@
-"""Samples at any times are as good as the steps that lead to them: against an independent truth, in all fields."""
+"""Samples at any times are as accurate as the steps, compared with an independent reference solution in all fields."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def scene_in(field):
 
 
 def truth_at(scene, times):
-    """Attitudes and rates at any times, each by a run of its own."""
+    """Return attitudes and rates at any times, from one run per time."""
     runs = [Precise(128).solve(scene, cv.Grid(t, 1)) for t in times if t > 0]
     start = [(scene.R_WB0, scene.w_WB_B0)] if times[0] == 0 else []
     return [np.array(values) for values in zip(*start, *((run.R_WB[-1], run.w_WB_B[-1]) for run in runs), strict=True)]
@@ -37,8 +37,8 @@ def case(request):
     return scene, *truth_at(scene, TIMES)
 
 
-def errors(found, R_WB, w_WB_B):
-    return angle_between(found.R_WB, R_WB).max(), np.abs(found.w_WB_B - w_WB_B).max()
+def errors(trajectory, R_WB, w_WB_B):
+    return angle_between(trajectory.R_WB, R_WB).max(), np.abs(trajectory.w_WB_B - w_WB_B).max()
 
 
 @pytest.mark.parametrize(
@@ -51,43 +51,43 @@ def errors(found, R_WB, w_WB_B):
         ("moser_veselov", 1.0, 1e-13),  # 3e-15
     ],
 )
-def test_a_sample_is_as_good_as_the_steps(case, name, dt, bound):
+def test_a_sample_is_as_accurate_as_the_steps(case, name, dt, bound):
     scene, R_WB, w_WB_B = case
     method = registry.method(name)
     if method.unsupported(scene):
         pytest.skip("not for this field")
-    found = cv.integrate(scene, dt, method, t_eval=TIMES)
-    assert found.t.tolist() == list(TIMES)
+    trajectory = cv.integrate(scene, dt, method, t_eval=TIMES)
+    assert trajectory.t.tolist() == list(TIMES)
     grid = cv.Grid(dt, round(3 / dt))
     steps, exact = method.solve(scene, grid), Precise(128).solve(scene, grid)
     largest = errors(steps, exact.R_WB, exact.w_WB_B)
-    for off, of_steps in zip(errors(found, R_WB, w_WB_B), largest, strict=True):
+    for off, of_steps in zip(errors(trajectory, R_WB, w_WB_B), largest, strict=True):
         assert off <= 1.5 * of_steps + 1e-14
         assert off < 5 * bound
     for invariant in scene.invariants:
         if invariant.name in method.conserves:
-            assert np.abs(found.drift(invariant)).max() < 3e-15  # measured up to 1e-15
+            assert np.abs(trajectory.drift(invariant)).max() < 3e-15  # measured up to 1e-15
 
 
 @pytest.mark.parametrize("error", [1e-4, 1e-9])
-def test_a_sample_is_as_good_as_the_error_asked_for(case, error):
+def test_a_sample_reaches_the_target_error(case, error):
     scene, R_WB, w_WB_B = case
-    found = cv.integrate(scene, error=error, t_eval=TIMES)
-    assert found.choice.reached
-    assert errors(found, R_WB, w_WB_B)[0] <= 3 * error
+    trajectory = cv.integrate(scene, error=error, t_eval=TIMES)
+    assert trajectory.choice.reached
+    assert errors(trajectory, R_WB, w_WB_B)[0] <= 3 * error
 
 
 def test_samples_of_the_exact_motion_are_exact_to_round_off(case):
-    """So that nothing of the above is due to the steps."""
+    """Errors of the tests above are therefore not errors of samples."""
     scene, R_WB, w_WB_B = case
-    found = cv.integrate(scene, 0.5, Precise(128), t_eval=TIMES)
-    off = errors(found, R_WB, w_WB_B)
+    trajectory = cv.integrate(scene, 0.5, Precise(128), t_eval=TIMES)
+    off = errors(trajectory, R_WB, w_WB_B)
     assert off[0] < 5e-15  # measured up to 1e-15
     assert off[1] < 1e-14  # up to 3e-15
 
 
-def test_a_straight_line_between_steps_is_found(case, monkeypatch):
-    """The negative control: the body turning on at the rates of the step."""
+def test_constant_rates_between_steps_are_detected(case, monkeypatch):
+    """The negative control: between steps the body turns at the rates of the step."""
     scene, R_WB, w_WB_B = case
 
     def turn_on(scene, t, gaps, R_WB, w_WB_B):
@@ -95,27 +95,27 @@ def test_a_straight_line_between_steps_is_found(case, monkeypatch):
         return R_WB @ np.array(turns), w_WB_B, len(t)
 
     monkeypatch.setattr(between, "move", turn_on)
-    monkeypatch.setattr(between, "cut_at_failure", lambda found, *_: found)
-    found = cv.integrate(scene, 0.1, "taylor:order=18", t_eval=TIMES)
-    assert errors(found, R_WB, w_WB_B)[0] > 1e-5
+    monkeypatch.setattr(between, "cut_at_failure", lambda trajectory, *_: trajectory)
+    trajectory = cv.integrate(scene, 0.1, "taylor:order=18", t_eval=TIMES)
+    assert errors(trajectory, R_WB, w_WB_B)[0] > 1e-5
 
 
 @pytest.mark.parametrize("dt", [0.1, 3.0])
 def test_the_exact_step_of_a_top_may_be_long(dt):
     scene = cv.scenes.lagrange_top(t_end=3.0)
-    found = cv.integrate(scene, dt, cv.Lame(), t_eval=TIMES)
+    trajectory = cv.integrate(scene, dt, cv.Lame(), t_eval=TIMES)
     R_WB, w_WB_B = truth_at(scene, TIMES)
-    off = errors(found, R_WB, w_WB_B)
+    off = errors(trajectory, R_WB, w_WB_B)
     assert off[0] < 1e-11  # measured below
     assert off[1] < 1e-10
 
 
-def test_a_field_that_turns_is_where_it_is_at_the_time():
+def test_samples_in_a_field_that_turns():
     field = cv.Orbit(0.7, (1, 2, 2)).gravity_gradient(INERTIA, (0, 1, -1))
     scene = scene_in("free").rename("satellite", potential=field)
-    found = cv.integrate(scene, 0.02, cv.Projected(), t_eval=TIMES)
+    trajectory = cv.integrate(scene, 0.02, cv.Projected(), t_eval=TIMES)
     fine = cv.Projected().solve(scene, cv.Grid(1e-4, 30000))
     index = np.rint(np.array(TIMES) / 1e-4).astype(int)
-    off = errors(found, fine.R_WB[index], fine.w_WB_B[index])
+    off = errors(trajectory, fine.R_WB[index], fine.w_WB_B[index])
     assert off[0] < 1e-11  # measured below
     assert off[1] < 1e-11

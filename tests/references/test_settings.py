@@ -1,4 +1,4 @@
-"""Names, labels, claims, and settings that cannot be used."""
+"""Labels, bad settings, formulations and degenerate scenes."""
 
 from importlib.metadata import version
 
@@ -48,6 +48,12 @@ BAD = [
 def test_bad_settings(method, settings, message):
     with pytest.raises(cv.BadInput, match=message):
         method(**settings)
+
+
+@pytest.mark.parametrize("name", ["colour", "variants", "suite", "rank", "candidates"])
+def test_an_entry_of_the_card_is_refused_as_a_class_attribute(name):
+    with pytest.raises(TypeError, match=rf"Mine\.{name} has no effect\. Write: card = Card\({name}="):
+        type("Mine", (cv.Method,), {name: ()})
 
 
 def test_a_non_spinning_frame_needs_symmetry(free, heavy, top):
@@ -109,7 +115,7 @@ def test_degenerate_scenes(inertia, w, moment):
     for method in (*(Heyoka(frame=frame) for frame in FRAMES), SciPy(), MuJoCo(), Pinocchio()):
         if method.unsupported(scene):
             continue
-        found = method.run(scene, 0.25) if method.order is None else method.run(scene, 0.005, sample_every=50)
-        assert found.ok
+        trajectory = method.run(scene, 0.25) if method.order is None else method.run(scene, 0.005, sample_every=50)
+        assert trajectory.ok
         bound = 1e-8 if method.order else 1e-10  # measured 1.2e-9 and 1.6e-11
-        assert cv.attitude.angle_between(truth.R_WB, found.R_WB).max() < bound
+        assert cv.attitude.angle_between(truth.R_WB, trajectory.R_WB).max() < bound

@@ -1,4 +1,4 @@
-"""Engines and truths in several threads give what they give one after the other, bit for bit."""
+"""Runs of engines and reference solutions in several threads are equal bit for bit to runs in one."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -29,7 +29,7 @@ def in_threads(calls):
         return list(pool.map(lambda call: call(), calls))
 
 
-def test_runs_of_mujoco_that_overlap_leave_its_handler_of_warnings_as_it_was():
+def test_overlapping_runs_of_mujoco_restore_its_handler_of_warnings():
     mj = pytest.importorskip("mujoco")
 
     def handler(message):
@@ -45,14 +45,14 @@ def test_runs_of_mujoco_that_overlap_leave_its_handler_of_warnings_as_it_was():
 
 
 def test_preparing_in_threads_and_precisions():
-    """Preparation computes in many digits too, and leaves the user's own precision alone."""
+    """Preparation computes in many digits too, and does not change the precision of the user."""
     body, grid = cv.RigidBody([[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]), cv.Grid(0.5, 4)
     scenes = [cv.Scene("own", body, np.eye(3), (0.1, k, 1.0), 2.0) for k in range(1, 1 + THREADS)]
     pairs = [(method, scene) for scene in scenes for method in (Exact(), Precise(80), Precise(300))]
     before = mpmath.mp.prec
     alone = [states(method.prepare(scene, grid)()) for method, scene in pairs]
-    found = in_threads([lambda pair=pair: states(pair[0].prepare(pair[1], grid)()) for pair in pairs * 3])
-    assert found == alone * 3
+    results = in_threads([lambda pair=pair: states(pair[0].prepare(pair[1], grid)()) for pair in pairs * 3])
+    assert results == alone * 3
     assert mpmath.mp.prec == before
 
 

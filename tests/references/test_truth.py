@@ -13,44 +13,44 @@ R0 = rotation_about((0.3, -1, 0.4), 2.1)
 
 def test_a_closed_form_is_checked_by_integration():
     scene = cv.scenes.brick_flip()
-    found = truth.reference(scene, Grid(0.1, 60, 3))
-    assert not found.approximate
-    assert found.names[0].endswith("/exact")
-    assert found.names[1].startswith("heyoka==")
-    assert found.agreement_rad < 2e-14  # measured 1.2e-15
-    assert found.checked_until == 6
-    np.testing.assert_array_equal(found.trajectory.t, np.arange(0, 61, 3) * 0.1)
+    solution = truth.reference(scene, Grid(0.1, 60, 3))
+    assert not solution.approximate
+    assert solution.names[0].endswith("/exact")
+    assert solution.names[1].startswith("heyoka==")
+    assert solution.agreement_rad < 2e-14  # measured 1.2e-15
+    assert solution.checked_until == 6
+    np.testing.assert_array_equal(solution.trajectory.t, np.arange(0, 61, 3) * 0.1)
 
 
 def test_only_the_first_hundred_radians_of_a_closed_form_are_checked():
     scene = cv.Scene("long", cv.RigidBody((1, 2, 2.5)), R0, (0.1, 0.2, 20), 1e6)
-    found = truth.reference(scene, Grid(1e5, 10))
-    assert found.checked_until == pytest.approx(truth.CHECKED_RADIANS / 20, rel=1e-2)
-    assert found.trajectory.t[-1] == 1e6
+    solution = truth.reference(scene, Grid(1e5, 10))
+    assert solution.checked_until == pytest.approx(truth.CHECKED_RADIANS / 20, rel=1e-2)
+    assert solution.trajectory.t[-1] == 1e6
 
 
 def test_without_a_closed_form_two_integrations_are_compared():
     scene = cv.Scene("heavy", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 3.0, cv.UniformGravity(1, (0, 0.2, 1)))
-    found = truth.reference(scene, Grid(0.5, 6))
-    assert [name.split("==")[0] for name in found.names] == ["heyoka", "scipy"]
-    assert not found.approximate
-    assert found.agreement_rad < 1e-11  # measured 3e-13
-    assert found.checked_until == 3
+    solution = truth.reference(scene, Grid(0.5, 6))
+    assert [name.split("==")[0] for name in solution.names] == ["heyoka", "scipy"]
+    assert not solution.approximate
+    assert solution.agreement_rad < 1e-11  # measured 3e-13
+    assert solution.checked_until == 3
 
 
 # A field without expressions
 BOWL_FIELD = cv.FunctionPotential(lambda R: R[2, 2] ** 2, lambda R: np.diag((0, 0, 2 * R[2, 2])), scale=1.0, axis_W=(0, 0, 1))
 
 
-def test_a_field_of_ones_own_gets_two_integrations_in_doubles():
+def test_a_user_s_field_has_two_integrations_in_doubles():
     scene = cv.Scene("bowl", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 2.0, BOWL_FIELD)
-    found = truth.reference(scene, Grid(0.5, 4))
-    assert [name.split("/")[1].split(",")[0] for name in found.names] == ["DOP853", "LSODA"]
-    assert found.approximate
-    assert found.agreement_rad < 1e-9  # measured 2e-11
+    solution = truth.reference(scene, Grid(0.5, 4))
+    assert [name.split("/")[1].split(",")[0] for name in solution.names] == ["DOP853", "LSODA"]
+    assert solution.approximate
+    assert solution.agreement_rad < 1e-9  # measured 2e-11
 
 
-def test_truths_that_differ_are_refused(monkeypatch):
+def test_solutions_that_differ_are_refused(monkeypatch):
     # the paper's own map is second order: no truth
     monkeypatch.setattr(truth, "Precise", cv.Reduced)
     scene = cv.scenes.brick_flip()
@@ -63,7 +63,7 @@ BOWL = cv.Scene("bowl", cv.RigidBody((0.5, 0.85, 1)), R0, (0.4, 1.2, 0.4), 1.0, 
 
 
 @pytest.mark.parametrize(("scene", "off"), [(cv.scenes.brick_flip(), 1e-11), (HEAVY, 1e-7), (BOWL, 1e-5)])
-def test_truths_that_differ_by_ten_times_what_their_errors_explain_are_refused(scene, off, monkeypatch):
+def test_differences_of_ten_times_the_errors_are_refused(scene, off, monkeypatch):
     exact = truth.difference
     monkeypatch.setattr(truth, "difference", lambda a, b: exact(a, b) + off)
     with pytest.raises(truth.Disagreement):
@@ -71,12 +71,12 @@ def test_truths_that_differ_by_ten_times_what_their_errors_explain_are_refused(s
 
 
 @pytest.mark.parametrize("what", ["R_WB", "w_WB_B"])
-def test_truths_have_to_agree_in_attitudes_and_in_rates(what):
+def test_attitudes_and_rates_are_compared(what):
     whole = truth.Exact().prepare(cv.scenes.brick_flip(), Grid(0.1, 20))()
     assert truth.difference(whole, replace(whole, **{what: getattr(whole, what)[::-1]})) > 0.1
 
 
-def test_a_trajectory_that_ended_early_agrees_with_nothing():
+def test_a_trajectory_that_ended_early_differs():
     scene = cv.scenes.brick_flip()
     whole, half = (truth.Exact().prepare(scene, Grid(0.1, n))() for n in (20, 10))
     assert truth.difference(whole, half) == np.inf

@@ -1,4 +1,4 @@
-"""An engine in another process: what it finds, and everything that it can do wrong, which becomes an outcome and no more."""
+"""An engine in another process: its results, and its failures, which become outcomes."""
 
 import multiprocessing
 import os
@@ -36,7 +36,7 @@ DT = 0.01
 
 @pytest.fixture(autouse=True)
 def folder(trial_cache):
-    """The folder of all environments."""
+    """Return the folder of all environments."""
     return trial_cache
 
 
@@ -45,14 +45,14 @@ def run(do, at="run", limit=60.0):
         return cv.integrate(SCENE, DT, method=Trial(do, at), on_failure="return")
 
 
-def test_it_integrates_and_comes_back_in_body_axes():
+def test_a_trajectory_is_in_body_axes():
     truth = cv.integrate(SCENE, DT, method=registry.method("exact"))
-    found = run("integrate")
-    assert found.ok
-    assert found.label == "trial==1.0/integrate"
-    assert np.abs(found.R_WB - truth.R_WB).max() < 1e-6
-    assert np.abs(found.w_WB_B - truth.w_WB_B).max() < 1e-5
-    assert (found.counters.steps, found.counters.evaluations) == (50, 200)
+    trajectory = run("integrate")
+    assert trajectory.ok
+    assert trajectory.label == "trial==1.0/integrate"
+    assert np.abs(trajectory.R_WB - truth.R_WB).max() < 1e-6
+    assert np.abs(trajectory.w_WB_B - truth.w_WB_B).max() < 1e-5
+    assert (trajectory.counters.steps, trajectory.counters.evaluations) == (50, 200)
 
 
 def test_samples_are_those_of_the_grid():
@@ -74,27 +74,27 @@ CRASHES = {
 
 @pytest.mark.parametrize("at", ["prepare", "run"])
 @pytest.mark.parametrize("do", CRASHES)
-def test_a_crash_is_an_outcome_and_the_next_run_a_fresh_start(do, at):
+def test_a_crash_is_an_outcome_and_the_next_run_succeeds(do, at):
     if do == "shape" and at == "prepare":
         at = "run"
     before = run("integrate")
-    found = run(do, at)
-    assert found.outcome.kind is OutcomeKind.CRASHED
-    assert found.outcome.reason.startswith(CRASHES[do])
-    assert len(found) == 0
+    trajectory = run(do, at)
+    assert trajectory.outcome.kind is OutcomeKind.CRASHED
+    assert trajectory.outcome.reason.startswith(CRASHES[do])
+    assert len(trajectory) == 0
     assert np.array_equal(run("integrate").R_WB, before.R_WB)
 
 
 @pytest.mark.parametrize("do", ["hang", "spin", "lock"])
 def test_an_engine_that_hangs_is_ended_after_its_limit(do):
     start = time.monotonic()
-    found = run(do, limit=0.5)
+    trajectory = run(do, limit=0.5)
     assert time.monotonic() - start < 60
-    assert str(found.outcome) == "timeout (after 0.5 s)"
+    assert str(trajectory.outcome) == "timeout (after 0.5 s)"
     assert run("integrate").ok
 
 
-def test_what_it_prints_disturbs_nothing(capfd):
+def test_output_of_an_engine_is_discarded(capfd):
     assert run("print").ok
     assert run("print", "prepare").ok
     assert capfd.readouterr() == ("", "")
@@ -106,7 +106,7 @@ def test_a_flood_of_output_ends_at_a_limit(folder):
     assert max(sizes) <= client.LARGEST_FILE
 
 
-def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
+def test_the_memory_of_an_engine_is_limited(folder):
     place = environment.read_environment(folder / "trial" / "1.0")
     small = place.start_worker(memory=1 << 29)
     given = {"adapter": trial.__file__, "settings": {"at": "prepare", "do": "allocate"}}
@@ -115,14 +115,14 @@ def test_an_engine_that_takes_all_memory_is_stopped_before_the_machine(folder):
     small.close()
 
 
-def test_what_it_writes_goes_with_it(folder):
+def test_files_of_an_engine_are_removed(folder):
     assert run("leave").ok
     client.close_workers()
     assert not list(folder.rglob("left_behind"))
     assert not list(environment.temporary_folder().iterdir())
 
 
-def test_one_failure_harms_no_other_run():
+def test_a_run_survives_the_crash_of_another():
     grid = grid_for(SCENE, DT)
     whole = Trial().prepare(SCENE, grid)
     before = whole()
@@ -130,7 +130,7 @@ def test_one_failure_harms_no_other_run():
     assert np.array_equal(whole().R_WB, before.R_WB)  # prepared before the crash, and prepared again without being asked
 
 
-def test_what_an_engine_does_not_have_is_unsupported():
+def test_a_refusal_is_unsupported():
     with pytest.raises(Unsupported, match="this version turns no bodies"):
         Trial("refuse", "prepare").prepare(SCENE, grid_for(SCENE, DT))
 
@@ -143,13 +143,13 @@ def test_a_process_that_is_killed_while_it_runs_is_a_crash():
     assert run("integrate").ok
 
 
-def test_time_is_taken_inside():
+def test_wall_time_grows_with_the_number_of_calls():
     timed = Trial().prepare(SCENE, grid_for(SCENE, DT))
     assert timed.wall_time(1) > 0
     assert timed.wall_time(20) > 3 * timed.wall_time(1)
 
 
-def test_what_a_run_does_before_each_call_is_in_no_time():
+def test_renewing_a_run_is_not_measured():
     renewed = Trial("renew").prepare(SCENE, grid_for(SCENE, SCENE.t_end))
     start = time.perf_counter()
     assert renewed.wall_time(4) < 2
@@ -158,13 +158,13 @@ def test_what_a_run_does_before_each_call_is_in_no_time():
 
 def test_runs_in_threads_do_not_mix():
     scenes = [cv.scenes.brick_flip(t_end=end) for end in (0.1, 0.2, 0.3, 0.4)]
-    found = {}
-    jobs = [threading.Thread(target=lambda s=s: found.update({s.t_end: len(Trial().run(s, DT))})) for s in scenes]
+    lengths = {}
+    jobs = [threading.Thread(target=lambda s=s: lengths.update({s.t_end: len(Trial().run(s, DT))})) for s in scenes]
     for job in jobs:
         job.start()
     for job in jobs:
         job.join()
-    assert found == {0.1: 11, 0.2: 21, 0.3: 31, 0.4: 41}
+    assert lengths == {0.1: 11, 0.2: 21, 0.3: 31, 0.4: 41}
 
 
 def _in_child(queue):
@@ -185,7 +185,7 @@ def test_a_forked_process_has_a_worker_of_its_own():
     assert mine.starts == starts
 
 
-def test_a_worker_ends_with_who_started_it(folder):
+def test_a_worker_ends_with_its_parent(folder):
     code = (
         "import os, sys, threading, time\n"
         "from conservative.references.environments.environment import find_environment\n"
@@ -216,7 +216,7 @@ def _ends(process):
 
 @pytest.fixture
 def first_preparation_is_lost(monkeypatch):
-    """Have the process killed in the first preparation, and in no other one."""
+    """Let the first preparation fail as if the process were killed."""
     lost, ask = [], Worker.ask
 
     def ask_once_in_vain(self, do, **values):
@@ -255,9 +255,9 @@ def rows(name, *methods):
 @pytest.mark.usefixtures("short_limits")
 @pytest.mark.parametrize("name", studies.ENGINES)
 @pytest.mark.parametrize("do", ENDS)
-def test_a_crash_or_a_hang_is_a_row_and_no_more(name, do):
-    found = rows(name, Trial(do), registry.method("pinocchio"), Trial())
-    measured = [row for row in found if row.measure in (Measure.ATTITUDE_MAX, Measure.TIME)]
+def test_a_crash_or_a_hang_is_a_row(name, do):
+    table = rows(name, Trial(do), registry.method("pinocchio"), Trial())
+    measured = [row for row in table if row.measure in (Measure.ATTITUDE_MAX, Measure.TIME)]
     wrong = [row for row in measured if row.method == Trial(do).name]
     assert wrong[0].outcome.kind is ENDS[do]
     assert not any(row.outcome.ok for row in wrong)
@@ -265,7 +265,7 @@ def test_a_crash_or_a_hang_is_a_row_and_no_more(name, do):
         assert any(row.measure is Measure.TIME and row.outcome.ok and row.value > 0 for row in measured if row.method == method)
 
 
-def test_a_run_that_crashes_while_it_is_timed_is_marked_and_the_others_are_timed():
+def test_a_run_that_crashes_while_it_is_timed_is_marked():
     runs = {do: Trial(do).prepare(SCENE, grid_for(SCENE, 0.01)) for do in ("integrate", "abort")}
     timings = time_interleaved(runs, rounds=3, min_time=1e-3)
     assert timings["integrate"].outcome.ok
@@ -277,9 +277,9 @@ def test_a_run_that_crashes_while_it_is_timed_is_marked_and_the_others_are_timed
 @pytest.mark.usefixtures("trial_registered")
 @pytest.mark.parametrize("within", [attempt_apart, attempt_here, attempt_within])
 def test_the_limit_of_a_study_ends_an_engine_that_hangs(within):
-    found = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
-    assert isinstance(found, Outcome)
-    assert str(found) == "timeout (after 0.5 s)"
+    outcome = within(0.5, Case("test", SCENE, Trial("hang"), grid_for(SCENE, 0.01)))
+    assert isinstance(outcome, Outcome)
+    assert str(outcome) == "timeout (after 0.5 s)"
 
 
 @pytest.mark.usefixtures("trial_registered")

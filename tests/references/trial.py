@@ -1,4 +1,4 @@
-"""The engine of the tests in its environment: it integrates free bodies, and does on purpose what engines do by mistake."""
+"""The adapter of the test engine: it integrates free bodies, and fails on request in every way that engines fail."""
 
 import ctypes
 import os
@@ -18,7 +18,7 @@ ENGINE = {
 def prepare(given):
     given.stages = 4
     if given.do == "as_packaged":
-        given.do, given.at, given.stages = what_is_packaged()
+        given.do, given.at, given.stages = read_package()
     if given.at == "prepare":
         misbehave(given.do)
     inertia = given.moments
@@ -59,8 +59,8 @@ def march(derivative, y, given):
     return np.array(states)
 
 
-def what_is_packaged():
-    """Return what the installed version of the engine does, where it does that, and the stages of its integrator."""
+def read_package():
+    """Return the behaviour of the installed version, where it occurs, and the stages of its integrator."""
     import trial
 
     return trial.DO, trial.AT, trial.STAGES
@@ -109,7 +109,7 @@ def flood():
 
 
 def babble():
-    """Write into every pipe that is open, the one of the answers among them."""
+    """Write into every open pipe, including the pipe of answers."""
     for descriptor in range(3, 64):
         try:
             os.write(descriptor, b"no message at all, but rather long")

@@ -1,4 +1,4 @@
-"""The engine of the tests: our side of it, and an environment for it that is made of this one in no time."""
+"""The class of the test engine, and an environment for it that links to the packages of this one."""
 
 import json
 import sys
@@ -17,7 +17,7 @@ Trial = engine_class(trial)
 
 
 def make_environment(folder, version=VERSION):
-    """Make an environment of the trial engine in a folder of all environments."""
+    """Create an environment of the test engine in a folder of all environments."""
     place = folder / "trial" / version
     place.parent.mkdir(parents=True, exist_ok=True)
     Environment.create(place)

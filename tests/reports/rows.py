@@ -1,4 +1,4 @@
-"""Made-up measurements, so that what tables and pictures say of them is known beforehand."""
+"""Made-up measurements, for which the contents of tables and pictures are known beforehand."""
 
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
@@ -53,5 +53,10 @@ def table(*groups):
 
 
 def frame(rows):
-    """The table of rows with their names, as a view has it."""
+    """The table of rows with the names of their methods."""
     return with_names(measurement.frame(rows))
+
+
+def texts(table):
+    """The rows of a table of a document as text."""
+    return [list(map(str, row)) for row in table.rows]

@@ -45,19 +45,15 @@ def test_time_against_error_is_in_microseconds_and_radians():
     assert drawn(spec, "error") == [1e-6, 1e-3]
 
 
-def test_convergence_is_in_seconds_and_radians():
+def test_convergence_is_in_seconds_and_drift_is_relative():
     rows = [row("convergence", "a", Measure.ATTITUDE_MAX, dt**2, dt) for dt in (0.4, 0.2, 0.1)]
     errors = lines.errors(frame(rows), Measure.ATTITUDE_MAX)
     spec = figures.convergence(errors, lines.fit_ends(lines.fits(errors)), "made_up").to_dict()
     assert set(axes(spec)) == {("x", "dt", "step, s"), ("y", "error", "largest attitude error over the run, rad")}
-
-
-def test_drift_is_relative_over_seconds():
     drifts = pd.DataFrame({"family": "a", "name": "a", "t": [1.0, 2.0], "quantity": "energy", "drift": [0.0, 1e-9]})
     spec = figures.drift(drifts, "made_up").to_dict()
     (panel,) = spec["vconcat"]
-    assert panel["encoding"]["x"]["title"] == "t, s"
-    assert panel["encoding"]["y"]["axis"]["title"] == "largest so far, relative"
+    assert (panel["encoding"]["x"]["title"], panel["encoding"]["y"]["axis"]["title"]) == ("t, s", "largest so far, relative")
     assert drawn(spec, "shown") == [figures.FLOOR, 1e-9]
 
 
@@ -68,7 +64,7 @@ def test_the_cost_of_a_recommendation_is_in_microseconds():
     assert found.to_dict("records") == [{"name": "reduced", "setting": "dt = 0.25 s", "cost": pytest.approx(3.0)}]
 
 
-def test_what_is_behind_the_sphere_is_pale():
+def test_the_far_side_of_a_sphere_is_faint():
     curve = pd.DataFrame({"name": "a", "family": "a", "x": [1.0, -1.0], "y": [0.0, 0.0], "z": [0.0, 0.0]})
     behind, before = spheres.chart(curve)["layer"][1:]
     assert ["values" in layer["data"] and layer["data"]["values"].count("\n") for layer in (behind, before)] == [2, 2]

@@ -71,7 +71,14 @@ def test_the_table_has_both_versions():
     assert [str(cell) for cell in cells[3:]] == ["–"] * 6
 
 
-def test_json_has_what_was_measured_and_null_for_what_was_not():
+def test_failed_rows_come_first_then_the_largest_changes_of_time():
+    times = {"lame": timed((1.01, 0.99, 1.02)), "gauss": timed(FAST), "reduced": timed(SLOW, (1.11, 1.09, 1.13))}
+    rows = shown(comparison(*((row(method=name), row(method=name), time) for name, time in times.items())))
+    assert [cells[1] for cells in rows] == ["reduced", "gauss", "lame"]
+    assert [cells[3].value for cells in rows] == [1.11, 0.8, 1.01]  # the page sorts by it
+
+
+def test_json_has_measurements_and_null_for_missing_ones():
     content = json.loads(text_of(document(time=timed((math.nan,) * 3, reason="crashed")), "json"))
     assert not content["passed"]
     (record,) = content["rows"]

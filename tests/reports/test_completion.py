@@ -37,7 +37,7 @@ def folder(tmp_path, monkeypatch):
         (".", [".hidden.toml"]),
     ],
 )
-def test_files_stand_beside_names(command, typed, offered, folder):
+def test_files_and_names_are_completed(command, typed, offered, folder):
     assert completed(f"{command} {typed}") == [("plain", value) for value in offered]
 
 
@@ -46,7 +46,7 @@ def test_absolute_paths(folder):
 
 
 @pytest.mark.parametrize("typed", ["to", "~/no_such", "no/such/folder/"])
-def test_the_shell_completes_what_is_one_folder_or_unknown(typed, folder):
+def test_the_shell_completes_a_single_folder_and_unknown_paths(typed, folder):
     assert completed(f"run {typed}") == [("file", typed)]
 
 
@@ -64,6 +64,8 @@ def test_the_last_of_several_is_completed(folder):
         ("recommend brick_flip --engine muj", ("plain", "mujoco")),
         ("report --re", ("plain", "--resume")),
         ("track exu", ("plain", "exudyn")),
+        ("report --engines al", ("plain", "all")),
+        ("report --engines exudyn,muj", ("plain", "exudyn,mujoco")),
         ("gate res", ("file", "res")),
         ("run brick_flip --csv s", ("file", "s")),
         ("sweep brick", ("plain", "brick_flip")),

@@ -94,7 +94,7 @@ def test_a_picture_needs_a_folder():
         text(DOCUMENT, "markdown")
 
 
-def test_json_has_null_for_what_is_no_number_and_the_values_of_enums():
+def test_json_has_null_for_nan_and_the_values_of_enums():
     content = json.loads(text(DOCUMENT, "json"))
     assert (content["value"], content["grade"], content["outcome"]["kind"]) == (None, "good", "ok")
     assert content["rows"] == [{"x": 1.0}]

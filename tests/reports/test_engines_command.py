@@ -27,7 +27,7 @@ def write_record(cache, version):
     (folder / environment.RECORD).write_text(json.dumps(record))
 
 
-def test_the_list_shows_what_there_is_and_what_could_be(cache):
+def test_the_list_shows_environments_and_engines_without_one(cache):
     write_record(cache, "1.9.0")
     write_record(cache, "1.10.0")
     code, text = run("list")
@@ -55,7 +55,7 @@ def test_the_list_as_json_has_every_version(cache):
         (("remove", "../exudyn"), "expected NAME or NAME==VERSION"),
     ],
 )
-def test_what_cannot_be_used_is_one_line_and_exit_code_2(arguments, message):
+def test_a_bad_name_is_one_line_and_exit_code_2(arguments, message):
     code, text = run(*arguments)
     assert code == 2
     assert message in text
@@ -68,7 +68,7 @@ def test_remove_removes(cache):
     assert environment.list_environments() == ()
 
 
-def test_what_a_command_did_is_json_for_a_program(cache):
+def test_removed_environments_are_available_as_json(cache):
     write_record(cache, "1.9.0")
     (gone,) = json.loads(run("remove", "exudyn", "--json")[1])
     assert (gone["version"], gone["packages"]) == ("1.9.0", ["exudyn==1.9.0", "numpy==2.4.6"])

@@ -56,7 +56,7 @@ def contents(folder):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_names_what_cannot_be_written_and_leaves_it(command, folder, tmp_path_factory):
+def test_a_command_names_the_file_that_cannot_be_written(command, folder, tmp_path_factory):
     limit, words, arguments = COMMANDS[command]
     before = contents(folder)
     if command == "sweep --out":  # what it compiles is kept, which takes more room than this disk has

@@ -108,7 +108,7 @@ def test_work_in_another_process_ends_with_its_command(tmp_path):
 
 
 @pytest.mark.parametrize("closed", ["2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
-def test_a_command_whose_streams_are_closed_ends_as_any_other(closed, tmp_path):
+def test_a_command_with_closed_streams_ends_normally(closed, tmp_path):
     shell = ["sh", "-c", f'exec "$0" -m conservative run nonsense {closed}', sys.executable]
     assert subprocess.run(shell, cwd=tmp_path, env=variables(PYTHONPATH=str(ROOT)), timeout=HANG).returncode == 2
 
@@ -173,7 +173,7 @@ def test_an_ignored_signal_stays_ignored():
         sys.unraisablehook = sys.__unraisablehook__
 
 
-def test_a_signal_waits_until_the_end_of_what_belongs_together(handled):
+def test_a_signal_waits_until_the_end_of_a_protected_block(handled):
     done = []
 
     def rename():
@@ -187,7 +187,7 @@ def test_a_signal_waits_until_the_end_of_what_belongs_together(handled):
     assert done == ["first", "second"]
 
 
-def test_compiled_code_that_writes_to_stdout_leaves_json_whole():
+def test_output_of_compiled_code_does_not_damage_json():
     code = (
         "import os\nfrom conservative.reports.sections import catalogue\nbefore = catalogue.build\n"
         "def noisy():\n    os.write(1, b'a log of an engine')\n    return before()\ncatalogue.build = noisy\n"

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from conservative import BadInput
 from conservative.errors import NotWritten
 from conservative.reports.cli.main import main
-from conservative.reports.cli.options import OutputCommand, OutputFile, OutputFolder, require_replaceable
+from conservative.reports.cli.options import Output, OutputCommand, require_replaceable
 from conservative.reports.terminal.report_folder import MANIFEST, recover, report_folder
 
 
@@ -168,7 +168,7 @@ def test_two_reports_into_one_folder_leave_that_of_the_last(tmp_path):
     assert tree(tmp_path) == ["report"]
 
 
-def test_what_a_person_adds_while_a_report_is_made_stays(tmp_path):
+def test_a_file_added_during_a_report_stays(tmp_path):
     with report_folder(tmp_path / "report") as fresh:
         write_report(fresh, "a.svg")
     with report_folder(tmp_path / "report") as fresh:
@@ -177,7 +177,7 @@ def test_what_a_person_adds_while_a_report_is_made_stays(tmp_path):
     assert tree(tmp_path / "report") == ["b.svg", MANIFEST, "notes.txt"]
 
 
-def test_a_full_disk_is_said_of_the_folder_and_not_of_its_temporary(tmp_path):
+def test_the_error_of_a_full_disk_names_the_folder(tmp_path):
     def fill():
         with report_folder(tmp_path / "report") as fresh:
             raise NotWritten("out", fresh / "a.svg", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
@@ -231,8 +231,8 @@ def test_a_dash_is_not_the_name_of_a_file(tmp_path, monkeypatch):
 
 def test_two_options_cannot_write_one_file(tmp_path):
     @click.command(cls=OutputCommand)
-    @click.option("--one", type=OutputFile("1"))
-    @click.option("--two", type=OutputFolder({"a": "2"}))
+    @click.option("--one", type=Output("1"))
+    @click.option("--two", type=Output({"a": "2"}))
     def both(one, two):
         """Write both."""
 

@@ -22,7 +22,7 @@ def answered(tmp_path_factory):
     return conservative(scene, *COMMON, "--engine", "mujoco,heyoka:1e-6", "--json", "--out", folder), folder
 
 
-def test_json_says_what_to_use_and_why(answered):
+def test_json_has_the_recommendation_and_its_basis(answered):
     done, _ = answered
     assert done.exit_code == 0, done.output
     content = json.loads(done.stdout)
@@ -55,14 +55,14 @@ def test_folder_has_the_answer_and_the_picture(answered):
         assert part in picture
 
 
-def test_what_cannot_reach_an_error_says_how_far_it_gets():
+def test_a_method_that_does_not_reach_the_error_has_its_limit():
     done = conservative("brick_flip", "--error", "1e-9", "--duration", "2", "--engine", "mujoco:Euler", "--cost-limit", "0.01")
     assert done.exit_code == 0, done.output
     assert "Methods that do not, at up to 0.01 s of wall time per simulated second" in done.stdout
     assert "anything finer costs more than 0.01 s" in " ".join(done.stdout.split())
 
 
-def test_an_unstable_motion_is_said_to_be_one():
+def test_an_unstable_motion_is_reported():
     text = " ".join(conservative("unstable_spin", "--engine", "heyoka:1e-6", "--duration", "20").stdout.split())
     assert "and by any angle after that" in text
     assert "the motion is unstable and amplifies errors" in text

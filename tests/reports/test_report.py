@@ -16,7 +16,7 @@ from conservative.methods.gauss import Gauss
 from conservative.reports import report
 from conservative.reports.charts import style
 from conservative.reports.cli.main import main
-from conservative.reports.cli.options import split_names
+from conservative.reports.cli.options import split_list, split_names
 from conservative.reports.document.model import Document
 from conservative.reports.run.plan import plan_report
 from conservative.reports.run.provenance import provenance
@@ -183,7 +183,7 @@ def test_missing_engine_stops_the_plan_unless_it_is_skipped(monkeypatch):
     assert len(plan_report(["brick_flip"], ["mujoco"], skip_missing=True).methods) == 5
 
 
-def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypatch):
+def test_a_missing_engine_is_skipped_among_all_methods(monkeypatch):
     def method(text, found=registry.method):
         if text == "pinocchio":
             raise MissingEngine("Pinocchio", "pin")
@@ -195,7 +195,7 @@ def test_what_is_registered_and_not_there_is_skipped_among_all_methods(monkeypat
     assert "pinocchio" in [method.name for method in plan_report(["brick_flip"], [], skip_missing=True).methods]
 
 
-def test_failure_of_ours_is_told(monkeypatch):
+def test_a_failure_of_our_methods_fails_the_command(monkeypatch):
     outcome = NotConverged(3, 0.02, 1.0).outcome
     found = [
         row("paper", "reduced", "energy drift max", float("nan"), 0.01, scene="brick_flip", outcome=each)
@@ -212,6 +212,7 @@ def test_failure_of_ours_is_told(monkeypatch):
 def test_names_with_settings_are_kept_together():
     assert split_names("methods", ("a,b:x=1,y=2,c", "d")) == ["a", "b:x=1,y=2", "c", "d"]
     assert split_names("methods", ()) == []
+    assert split_list("engines", ("all, exudyn,mujoco==3.6.0",)) == ["all", "exudyn", "mujoco==3.6.0"]
 
 
 @pytest.mark.parametrize("option", ["--scenes", "--methods"])
@@ -227,7 +228,7 @@ def test_an_option_that_names_nothing_does_not_mean_everything(option, value, tm
 MUJOCO = dict.fromkeys(("mujoco 4.0.0 RK4", "mujoco 4.0.0 Euler"), "mujoco")
 
 
-def test_colours_belong_to_families_whatever_else_is_drawn():
+def test_the_colour_of_a_family_does_not_depend_on_others():
     some = style.colours({"reduced": "reduced", **MUJOCO})
     more = style.colours({"heyoka 7.13.2 body": "heyoka", **MUJOCO, "reduced": "reduced", "their_own x": "their_own"})
     assert some["reduced"] == more["reduced"]
@@ -236,7 +237,7 @@ def test_colours_belong_to_families_whatever_else_is_drawn():
     assert list(style.number_in_family({**MUJOCO, "reduced": "reduced"}).values()) == [0, 1, 0]
 
 
-def test_provenance_names_what_can_change_a_number():
+def test_provenance_has_command_version_and_commit():
     found = provenance(["report", "--out", "a b"])
     assert found.command == "conservative report --out 'a b'"
     assert Reduced().label.partition("/")[0] == f"conservative=={found.compared['conservative-rotation']}"

@@ -48,12 +48,12 @@ def unfinished(tmp_path, monkeypatch):
         "dt": 0.1,
     }
     lines = Samples(**line, quantity="energy", t=np.array([0.1 + 0.2]), value=np.array([np.nan]))
-    kept.keep("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
+    kept.store("paper", [row("paper", "reduced", "energy drift max", np.nan, outcome=OUTCOME), lines])
     return tmp_path
 
 
 def test_floats_come_back_as_they_are(unfinished):
-    _, found = checkpoint.read(unfinished / "report.partial.json")
+    *_, found = checkpoint.read(unfinished / "report.partial.json")
     assert found["paper"].rows[0].dt == 0.1
     assert found["paper"].rows[0].value != found["paper"].rows[0].value
     assert found["paper"].rows[0].outcome == OUTCOME
@@ -73,7 +73,7 @@ def test_floats_come_back_as_they_are(unfinished):
         ([*SMALL[:3], "brick_flip:disturbance=1e-6", *SMALL[4:]], ["scenes: brick_flip"]),
     ],
 )
-def test_what_differs_cannot_be_put_together(changed, parts, unfinished):
+def test_a_report_with_other_terms_is_not_resumed(changed, parts, unfinished):
     done = CliRunner().invoke(main, [*changed, "--resume"])
     assert done.exit_code == 2
     assert done.stderr.count("\n") == 1
@@ -82,11 +82,11 @@ def test_what_differs_cannot_be_put_together(changed, parts, unfinished):
     assert [path.name for path in unfinished.iterdir()] == ["report.partial.json"]
 
 
-@pytest.mark.parametrize(("key", "part"), [("source", "source abc, now"), ("versions", "versions: numpy 1.0, now 2")])
-def test_neither_can_other_versions_or_source(key, part, unfinished):
+@pytest.mark.parametrize(("key", "part"), [("source", "source: hash abc, now"), ("versions", "versions: numpy 1.0, now 2")])
+def test_a_report_with_other_versions_or_source_is_not_resumed(key, part, unfinished):
     path = unfinished / "report.partial.json"
     content = json.loads(path.read_text())
-    content["terms"][key] = "abc" if key == "source" else {**content["terms"][key], "numpy": "1.0"}
+    content["terms"][key] |= {"hash": "abc"} if key == "source" else {"numpy": "1.0"}
     path.write_text(json.dumps(content))
     done = CliRunner().invoke(main, [*SMALL, "--resume"])
     assert done.exit_code == 2
@@ -113,7 +113,7 @@ def test_a_file_that_is_something_else_stays(content, resume, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    "content", ['{"format": 99, "pieces": {}}', '{"format": 2, "pieces": {"paper": {}}}', '{"format": 2, "comm']
+    "content", ['{"format": 99, "studies": {}}', '{"format": 3, "studies": {"paper": {}}}', '{"format": 3, "comm']
 )
 def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -127,7 +127,7 @@ def test_a_damaged_file_is_replaced_and_cannot_be_resumed(content, tmp_path, mon
     assert not kept.exists()
 
 
-def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finished(unfinished):
+def test_a_new_report_replaces_unfinished_work_after_its_first_study(unfinished):
     before = (unfinished / "report.partial.json").read_text()
 
     def stop(share, what):
@@ -139,7 +139,7 @@ def test_beginning_anew_is_announced_and_keeps_the_old_until_something_is_finish
     assert (unfinished / "report.partial.json").read_text() == before
 
 
-def test_an_error_keeps_what_is_finished_too(tmp_path):
+def test_finished_studies_survive_an_error(tmp_path):
     def fail(share, what):
         if "convergence" in what:
             raise BadInput("dt", "0", "above 0")
@@ -148,11 +148,11 @@ def test_an_error_keeps_what_is_finished_too(tmp_path):
     with pytest.raises(BadInput) as caught:
         report.write(made, tmp_path / "report", fail)
     assert "1 of 5 studies are finished (paper)" in caught.value.__notes__[0]
-    assert list(json.loads((tmp_path / "report.partial.json").read_text())["pieces"]) == ["paper"]
+    assert list(json.loads((tmp_path / "report.partial.json").read_text())["studies"]) == ["paper"]
 
 
 @pytest.mark.parametrize("out", ["/", ".", "..", "deep/report", "report/"])
-def test_unfinished_work_lies_beside_the_folder(out, tmp_path, monkeypatch):
+def test_unfinished_work_is_stored_next_to_the_folder(out, tmp_path, monkeypatch):
     here = tmp_path / "here"
     here.mkdir()
     monkeypatch.chdir(here)
@@ -185,8 +185,8 @@ def stopped(arguments, folder, number, ready):
     return process.returncode, out, err
 
 
-def pieces(path):
-    return list(json.loads(path.read_text())["pieces"]) if path.exists() else []
+def finished(path):
+    return list(json.loads(path.read_text())["studies"]) if path.exists() else []
 
 
 def an_earlier_report(folder):
@@ -202,11 +202,11 @@ def resumed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("resumed")
     an_earlier_report(folder / "report")
     kept = folder / "report.partial.json"
-    code, out, err = stopped(SMALL, folder, signal.SIGINT, lambda: "speed" in pieces(kept))
+    code, out, err = stopped(SMALL, folder, signal.SIGINT, lambda: "speed" in finished(kept))
     left = {path.name for path in folder.iterdir()}
     earlier = {path.name: path.read_text() for path in (folder / "report").iterdir()}
     content = json.loads(kept.read_text())
-    again = shlex.split(err.partition("go on with: ")[2])
+    again = shlex.split(err.partition("continue with: ")[2])
     with programs() as start:
         done = started(start, again[1:], folder)
         said = done.communicate(timeout=HANG)
@@ -214,14 +214,14 @@ def resumed(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
+def test_an_interrupt_stores_finished_studies_and_prints_the_command_that_continues(resumed):
     _, (code, out, err), left, earlier, content, again, _ = resumed
     assert code == 130
     assert out == ""
     assert "\nInterrupted; " in err
-    said = re.search(r"(\d) of 5 studies are finished \((.*)\) and kept", err)
+    said = re.search(r"(\d) of 5 studies are finished \((.*)\) and stored", err)
     names = said[2].split(", ")
-    assert names == list(content["pieces"])[: int(said[1])]  # a kill can come when a study is kept and not yet said to be
+    assert names == list(content["studies"])[: int(said[1])]  # a kill can come when a study is kept and not yet said to be
     assert "convergence" in names
     assert again == ["conservative", *SMALL, "--resume"]
     assert left == {"report", "report.partial.json"}
@@ -230,14 +230,19 @@ def test_an_interrupt_keeps_what_is_finished_and_says_how_to_go_on(resumed):
 
 
 @pytest.mark.slow
-def test_resume_does_the_rest_and_tidies_up(resumed):
-    folder, *_, (code, out, err) = resumed
+def test_a_resumed_report_is_complete_and_names_its_origin(resumed):
+    folder, _, _, _, content, _, (code, out, err) = resumed
     assert code == 0, err
     assert out.endswith("report/index.html\n")
     assert {path.name for path in folder.iterdir()} == {"report"}
     listed = json.loads((folder / "report" / "measurements.json").read_text())["files"]
     assert {path.name for path in (folder / "report").iterdir()} == {*listed, "mine.txt"}
     assert (folder / "report" / "mine.txt").read_text() == "mine"
+    made = json.loads((folder / "report" / "measurements.json").read_text())
+    (earlier,) = made["resumed"]
+    assert earlier.startswith(f"{', '.join(content['studies'])}: measured by an earlier process")
+    assert content["studies"]["paper"]["by"]["start"] in earlier
+    assert made["command"].endswith("--resume")
 
 
 @pytest.mark.slow
@@ -255,26 +260,15 @@ def test_a_resumed_report_has_the_measurements_of_one_that_was_not_interrupted(r
 
 
 @pytest.mark.slow
-def test_what_was_finished_is_not_measured_again(resumed):
+def test_finished_studies_are_not_measured_again(resumed):
     folder, content = resumed[0], resumed[4]
     rows = json.loads((folder / "report" / "measurements.json").read_text())["rows"]
-    kept = content["pieces"]["speed"]["rows"]
+    kept = content["studies"]["speed"]["rows"]
     names = ("scene", "method", "label", "family", "setting", "role", "series", "measure")
     measured = [[row[name] for name in names] for row in rows if row["study"] == "speed"]
     assert measured == [[row[name] for name in names] for row in kept]
     times = [row["value"] for row in rows if row["study"] == "speed"]
     assert times == pytest.approx([row["value"] for row in kept], rel=1e-9)  # JSON of pandas keeps 15 decimal places
-
-
-@pytest.mark.slow
-def test_a_resumed_report_says_so(resumed):
-    folder, content = resumed[0], resumed[4]
-    by = content["pieces"]["paper"]["by"]
-    made = json.loads((folder / "report" / "measurements.json").read_text())
-    assert len(made["resumed"]) == 1
-    assert made["resumed"][0].startswith(f"{', '.join(content['pieces'])}: measured by an earlier process")
-    assert by["start"] in made["resumed"][0]
-    assert made["command"].endswith("--resume")
 
 
 @pytest.mark.slow
@@ -284,5 +278,5 @@ def test_sigterm_before_anything_is_finished_leaves_nothing(tmp_path):
 
     code, out, err = stopped(SMALL, tmp_path, signal.SIGTERM, at_work)
     assert (code, out) == (143, "")
-    assert err.endswith("Interrupted; nothing was finished, nothing is kept\n")
+    assert err.endswith("Interrupted; no study was finished\n")
     assert list(tmp_path.iterdir()) == []

@@ -25,6 +25,7 @@ from conservative.reports.sections.report import build
 
 from .made_up import at_step, convergence, curves, measurements, over_steps
 from .rows import frame, parts, point, row
+from .rows import texts as texts_of
 
 
 def classes(base):
@@ -130,7 +131,7 @@ def test_orders_of_attitude_and_rates_are_fitted_to_their_own_errors(report):
         for dt in (0.1, 0.05, 0.025, 0.0125)
     ]
     document = build(plan, Measurements(measurement.frame(errors), measured.samples), source)
-    (line,) = tables(document, "brick_flip")["brick_flip: observed order"].rows
+    (line,) = texts_of(tables(document, "brick_flip")["brick_flip: observed order"])
     assert line[:3] == ["reduced", "2.00 ± 0.00", "3.00 ± 0.00"]
 
 
@@ -174,7 +175,8 @@ def test_scenes_are_those_of_the_plan_in_its_order(built, planned, table):
 
 def test_each_scene_has_its_rows_and_no_others(built):
     for scene, order in zip(SCENES, (2, 4), strict=True):
-        (slope,) = [cells for cells in tables(built, scene)[f"{scene}: observed order"].rows if cells[0].startswith("reduced")]
+        orders = texts_of(tables(built, scene)[f"{scene}: observed order"])
+        (slope,) = [cells for cells in orders if cells[0].startswith("reduced")]
         assert slope[1].startswith(f"{order}.0")
         assert [entry.name for entry in figure(built, f"work_precision_{scene}").legend] == ["reduced", "scipy"]
         (panel,) = figure(built, f"drift_{scene}").panels
@@ -190,7 +192,7 @@ def test_curves_that_are_missing_are_named(planned, table):
     assert not any(isinstance(each, Figure) and each.name == "sphere_lagrange_top" for each in document.figures)
 
 
-def test_names_of_scenes_cannot_become_markup_and_nothing_measured_is_said():
+def test_names_of_scenes_cannot_become_markup_and_empty_figures_are_stated():
     scene = Scene("<b>", scenes.brick_flip().body, np.eye(3), (0.1, 0.2, 3.0), 1.0, dt=0.1, source="<i>")
     page = html.render(build(Plan((scene,), (Reduced(),), (), quick=True), measurements(), provenance([])))
     assert "<i>" not in page

@@ -50,11 +50,11 @@ def test_files_have_the_rows_and_the_tables(made_up, tmp_path):
     assert done.exit_code == 0, done.output
     with (tmp_path / "a.csv").open(newline="") as file:
         assert len(list(csv.DictReader(file))) == len(made_up)
-    assert "| spring | 1e-2 | 2 of 2 | ✓ 1.00 | ✗ 0.50 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
+    assert "| spring | 1e-2 | 2 of 2 | ✓ 1.00 | ✗ 0.500 | ✓ 2.00 | 1 | gauss | heyoka |" in (tmp_path / "a.md").read_text()
     assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["study.csv", "study.json", "study.md"]
 
 
-def test_a_place_that_cannot_be_written_is_told_before_any_work(monkeypatch, tmp_path):
+def test_a_place_that_cannot_be_written_is_an_error_before_any_work(monkeypatch, tmp_path):
     monkeypatch.setattr(single_study, "measure_study", lambda *_: pytest.fail("it measures"))
     done = conservative(*RANDOM, "--csv", tmp_path)
     assert (done.exit_code, "csv" in done.stderr) == (2, True)
@@ -84,7 +84,7 @@ def test_any_other_study_shows_its_rows(tmp_path):
         (("random", "--methods", "nonsense"), "method"),
     ],
 )
-def test_what_is_not_for_the_study_is_refused(arguments, argument):
+def test_arguments_that_do_not_fit_the_study_are_refused(arguments, argument):
     done = conservative("study", *arguments)
     assert done.exit_code == 2
     assert done.stderr.startswith(f"Error: {argument}")
@@ -118,7 +118,7 @@ def test_numbers_of_bodies_are_read_as_people_write_them():
     assert [scene.name for scene in planned.scenes] == ["heavy_tops", "free_bodies"]
 
 
-def test_a_row_that_failed_says_why():
+def test_a_failed_row_has_its_reason():
     table = frame([row("paper", "reduced", "energy drift max", float("nan"), outcome="unsupported"), *TWICE[0]])
     failed, good, *_ = rows_table("paper", table).rows
     assert failed[3:] == ["energy drift max", "–", "1", "unsupported"]

@@ -72,7 +72,7 @@ def test_only_files_that_are_named_are_written_and_their_size_is_announced(answe
         assert part in picture
 
 
-def test_nothing_beside_the_folder_is_replaced(tmp_path):
+def test_no_file_next_to_the_folder_is_replaced(tmp_path):
     mine, small = tmp_path / "photo.svg", ("brick_flip", "--starts", "2", "--spread", "rate=1%", "--t-end", "1")
     mine.write_text("mine")
     assert conservative(*small, "--out", tmp_path / "photo.zarr").exit_code == 0
@@ -104,15 +104,15 @@ def test_another_sweep_is_not_resumed(answered, change):
     assert "an ensemble of another run" in done.stderr
 
 
-def test_an_interrupted_sweep_says_what_is_kept_and_resume_does_the_rest(answered, tmp_path, monkeypatch):
+def test_an_interrupted_sweep_is_resumed(answered, tmp_path, monkeypatch):
     _, folder = answered
 
-    def stop(sweep, progress):
+    def stop(rate):
         raise KeyboardInterrupt
 
     out = tmp_path / "sweep.zarr"
     with monkeypatch.context() as context:
-        context.setattr(work, "_progress_text", stop)
+        context.setattr(work, "rate_text", stop)
         done = conservative(*COMMON, "--out", out, "--threads", "1")
     assert done.exit_code == 130
     kept = rf"(1,024|476) of 1,500 bodies are finished in {re.escape(str(out))}; the same command with --resume does the rest"

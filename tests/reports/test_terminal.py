@@ -69,7 +69,7 @@ def test_a_single_piece_of_work_that_takes_long_is_shown():
     assert re.search(r"0:00:01 .* a scene: a method", on_a_terminal(SLOW))
 
 
-def test_what_takes_no_time_shows_nothing():
+def test_fast_work_shows_nothing():
     assert on_a_terminal(FAST).strip() == ""
 
 

@@ -1,6 +1,7 @@
-"""Costs at an error, from work against precision, and costs of a sample where each step of a scene is kept."""
+"""Costs at an error from work against precision, costs with every step stored, and the ratios of the verdict."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,16 +11,13 @@ from conservative.benchmarks.studies.paper import APPROXIMATE
 from conservative.reports.rows import points as work_precision
 from conservative.reports.rows.names import MethodClass
 from conservative.reports.rows.points import points
-from conservative.reports.sections import scene_contests, summary, verdict
+from conservative.reports.sections import random_bodies, scene_contests, summary, verdict
 
-from .rows import frame, point, row, table
+from .rows import frame, point, row, table, texts
+from .test_random_ratios import SLOWER, TWICE
 
 OURS = (point("ours", "ours", 1e-2, 1.0, dt=0.4), point("ours", "ours", 1e-4, 4.0, dt=0.2), point("ours", "ours", 1e-6, 16.0))
 ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine", 1e-8, 8.0))
-
-
-def statements(contests):
-    return [f"{found.subject}: {found.text}" for found in verdict.statements(contests)]
 
 
 def contests(found, errors=work_precision.DECADES):
@@ -53,7 +51,7 @@ def test_lines_stay_coarse_to_fine_where_they_share_steps():
     ]
 
 
-def test_nothing_is_claimed_below_what_the_truth_is_known_to():
+def test_errors_below_the_resolution_of_the_reference_are_raised_to_it():
     def agreement(detail):
         return [row("paper", "truth", Measure.AGREEMENT, 1e-5, role="truth", detail=detail)]
 
@@ -90,35 +88,25 @@ def test_lines_that_differ_in_tolerance_alone_are_one():
     assert found["series"].unique().tolist() == ["heyoka"]
 
 
-def test_front_is_what_nothing_beats():
+def test_front_has_the_points_that_no_other_beats():
     groups = (*OURS, *ENGINE, point("bad", "engine", 1e-3, 9.0))
     front = work_precision.front(points(table(*groups)))
     assert front["error"].tolist() == [1e-2, 1e-3, 1e-4, 1e-8]
 
 
-def test_verdict_names_the_engine_the_errors_and_the_factor():
-    decades = [1e-2, 1e-6, 1e-7]
-    lines = statements(contests(points(table(*OURS, *ENGINE)), decades))
-    assert lines == [
-        "made_up: engine is 3.5 times as fast as our general integrators, at 1e-6 rad, "  # 16 / (2 x 4^0.6)
-        "and reaches 1e-7 rad, which none of them was measured to reach.",
-        "made_up: our general integrators are 2.0 times as fast as the cheapest engine, at 1e-2 rad.",
-    ]
-
-
-def test_verdict_without_engines_claims_nothing():
-    lines = statements(contests(points(table(*OURS)), [1e-2]))
-    assert lines == ["made_up: no engine was measured."]
-    assert "no engine" in statements([])[0]
+def test_a_cell_has_the_ratio_or_the_side_that_is_alone():
+    cells = [str(verdict.contest_cell(each)) for each in contests(points(table(*OURS, *ENGINE)), [1e-2, 1e-6, 1e-7])]
+    assert cells == ["✓ 2.0", "✗ 0.29", "✗ engine only"]  # 2 x 4^0.6 / 16
+    assert [str(verdict.contest_cell(each)) for each in contests(points(table(*OURS)), [1e-2])] == ["✓ ours only"]
 
 
 POINTS = [*point("gauss", "ours", 1e-7, 4e-6), *point("heyoka", "engine", 1e-7, 2e-6)]
 DT = 0.1
 
 
-def each(line, role, kept, alone, **fields):
-    """A method that keeps each step of the made-up scene: its time per sample, s, where all are kept and where the end is."""
-    times = ("time per simulated second, each step kept", kept / DT), ("time per simulated second", alone / DT)
+def each(line, role, stored, final, **fields):
+    """A method on the made-up scene: its times per sample, s, with every step stored, and with the final state only."""
+    times = ("time per simulated second, each step kept", stored / DT), ("time per simulated second", final / DT)
     values = (("attitude error max", 1e-7), *times)
     return [row("each_step", line, measure, value, DT, role=role, **fields) for measure, value in values]
 
@@ -136,9 +124,9 @@ TABLE = frame(
 FOUND = scene_contests.each_step(TABLE, "made_up")
 
 
-def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
+def test_the_first_table_has_the_fastest_of_each_class_with_every_step_stored():
     told = summary.of_scene(points(TABLE), frame([]), frame([]), integrable=True, each=FOUND)
-    position = told.classes.header.index("µs a sample, each step kept")
+    position = told.classes.header.index("µs a sample, every step stored")
     assert [line[position] for line in told.classes.rows] == [
         "0.30 gauss; final state only: 0.10 reduced",
         "0.10 lame; final state only: 0.010",
@@ -147,27 +135,36 @@ def test_the_first_table_has_the_cheapest_of_each_class_and_who_it_is():
     ]
 
 
-def test_contests_have_both_at_last_in_the_units_of_their_columns():
+def test_contests_end_with_both_kinds_of_runs_in_the_units_of_their_columns():
     table = scene_contests.as_table(points(TABLE), 0.5, FOUND)
-    header, body = table.header, table.rows
-    assert header[1:4] == ("cheapest general integrator of ours", "µs per s", "µs a sample")
-    kept, alone = body[-2:]
-    assert kept[:8] == ["1e-6, each 0.1 s kept", "gauss", "3.00", "0.300", "heyoka", "6.00", "0.600", "2.00"]
-    assert kept[8:] == ["lame", "1.00", "0.100", "6.00"]
-    assert alone[:8] == ["1e-6, each 0.1 s, the end kept", "reduced", "1.00", "0.100", "heyoka", "0.500", "0.0500", "0.500"]
-    assert len(scene_contests.as_table(points(TABLE), 0.5).rows) == len(body) - 2
+    assert table.header[1:4] == ("our fastest general integrator", "µs per s", "µs a sample")
+    stored, final = texts(table)[-2:]
+    assert stored[:8] == ["1e-6, every 0.1 s stored", "gauss", "3.00", "0.300", "heyoka", "6.00", "0.600", "2.00"]
+    assert stored[8:] == ["lame", "1.00", "0.100", "6.00"]
+    only = ["1e-6, every 0.1 s, final state only", "reduced", "1.00", "0.100", "heyoka", "0.500", "0.0500", "0.500"]
+    assert final[:8] == only
+    assert len(scene_contests.as_table(points(TABLE), 0.5).rows) == len(table.rows) - 2
 
 
 @pytest.mark.parametrize("table", [frame(POINTS), frame([*POINTS, *each("gauss", "ours", 1e-7, 1e-7, outcome="diverged")])])
 def test_without_the_study_or_a_run_that_ends_there_is_nothing(table):
-    found = scene_contests.each_step(table, "made_up")
-    assert list(verdict.of_each_step("made_up", found)) == []
-    assert len(found.kept) == len(found.alone) == 0
+    assert scene_contests.each_step(table, "made_up") is None
 
 
-def test_the_faster_side_of_each_step_is_named_and_times_within_a_tenth_are_equal():
-    assert [each.marked for each in verdict.of_each_step("made_up", FOUND)] == [False, False, True, False]
-    for ratio in (0.92, 1.0, 1.09):
-        assert "same time" in verdict._faster(("ours", "heyoka"), ratio)
-    assert verdict._faster(("ours", "heyoka"), 1.2) == "ours is 1.2 times as fast as heyoka"
-    assert verdict._faster(("ours", "heyoka"), 0.5) == "heyoka is 2.0 times as fast as ours"
+def test_the_verdict_has_a_row_for_each_motion_and_class_and_names_the_faster_engine():
+    scene = SimpleNamespace(name="made_up", t_end=1.0)
+    random = random_bodies.ratios(frame([each for rows in (*TWICE, *SLOWER) for each in rows]))
+    measured = SimpleNamespace(
+        plan=SimpleNamespace(scenes=[scene]), ratios=random, points=points(TABLE), every_step={"made_up": FOUND}
+    )
+    found = verdict.ratio_table(measured)
+    at_1e_6 = {tuple(line[:2]): (line[found.header.index("1e-6")], line[-1]) for line in texts(found)}
+    general, solution = MethodClass.GENERAL.value, MethodClass.SOLUTION.value
+    assert at_1e_6 == {
+        ("random bodies, spring", general): ("✓ 1.0 (1 of 2)", "–"),
+        ("made_up", general): ("✗ 0.50", "heyoka"),
+        ("made_up, every 0.1 s stored", general): ("✓ 2.0", "–"),
+        ("made_up, every 0.1 s stored", solution): ("✓ 6.0", "–"),
+        ("made_up, every 0.1 s, final state only", general): ("✗ 0.50", "heyoka"),
+        ("made_up, every 0.1 s, final state only", solution): ("✓ 5.0", "–"),
+    }

@@ -64,12 +64,12 @@ def test_without_the_option_other_projects_are_unaffected(other):
     code, text = run(other)
     assert code == 0
     assert "2 passed" in text
-    assert "accuracy beside time" not in text
+    assert "accuracy and time" not in text
 
 
 def test_accuracy_is_printed_next_to_the_times(other):
     _, text = run(other, "--benchmark", "checks")
-    after = text.split("accuracy beside time")[1].splitlines()
+    after = text.split("accuracy and time")[1].splitlines()
     assert after[1].split() == ["benchmark", "min,", "s", "median,", "s", "error"]
     name, *numbers = after[2].split()
     assert name == "test_timed"

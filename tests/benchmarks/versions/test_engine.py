@@ -73,7 +73,7 @@ ALIKE = {
     "orders within half": replace(GOOD, attitude_order=Order(1.6, 0.01), rates_order=Order(2.4, 0.01)),
     "an order that is badly known": replace(GOOD, attitude_order=Order(1.2, 0.4)),
     "drifts of one class": replace(GOOD, drifts={"energy": near(9e-11), "momentum": near(9e-2)}),
-    "drifts beside the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
+    "drifts close to the edge of a class": replace(GOOD, drifts={"energy": near(5e-13), "momentum": near(9e-4)}),
     "errors within a factor": replace(GOOD, error=near(6e-3)),
     "an error that differs as much by one step more": replace(GOOD, error=Spread(3e-1, 4e-3, 4e-1)),
     "no order where the error is the same": replace(GOOD, rates_order=Order(reason="no descent")),

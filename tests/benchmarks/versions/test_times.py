@@ -70,7 +70,7 @@ def test_an_open_ratio_is_measured_in_more_processes():
     row = compare(Side(), Side(1.08, spells=lambda process: (0.97, 1.0, 1.03)[process % 3]))
     assert row.first.processes > PROCESSES
     clock = Clock(Side(), Side(1.08, spells=lambda process: (0.96, 1.0, 1.05)[process % 3]))
-    assert len(settle(clock, [TIMED], 3)[TIMED.key]) == 3 * MOST_TURNS
+    assert len(settle(clock, [TIMED], 3)[TIMED]) == 3 * MOST_TURNS
 
 
 def test_a_crashing_version_fails_only_its_row():
@@ -82,10 +82,10 @@ def test_a_crashing_version_fails_only_its_row():
             return super().timed(scene, method, dt, n_steps)
 
     timed_rows = compare_times(Side(), Fragile(), [TIMED, other])
-    assert timed_rows[other.key].failed
-    assert timed_rows[other.key].reason == "crashed (signal 11)"
-    assert timed_rows[other.key].first.processes == 2
-    assert not timed_rows[TIMED.key].failed
+    assert timed_rows[other].failed
+    assert timed_rows[other].reason == "crashed (signal 11)"
+    assert timed_rows[other].first.processes == 2
+    assert not timed_rows[TIMED].failed
 
 
 def test_no_rows_start_no_process():

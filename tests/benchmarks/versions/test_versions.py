@@ -206,8 +206,7 @@ def install(wheel, tmp_path_factory):
     def environment_of(wheel_of_project, requirements, source):
         key = wheel_of_project.parent.name
         if key not in made:
-            made[key] = WheelEnvironment.create(home / key, wheel)
-            made[key]._install(wheel_of_project)
+            made[key] = WheelEnvironment.create(home / key, wheel, wheel_of_project)
         return Environment("example-integrator", key, made[key].folder, "3", ())
 
     return environment_of

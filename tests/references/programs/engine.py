@@ -66,7 +66,7 @@ def answer(request):
 
 for line in sys.stdin:
     try:
-        found = answer(json.loads(line))
+        response = answer(json.loads(line))
     except Exception as error:
-        found = {"error": type(error).__name__, "message": str(error)}
-    print(json.dumps(found), flush=True)
+        response = {"error": type(error).__name__, "message": str(error)}
+    print(json.dumps(response), flush=True)

@@ -1,0 +1,129 @@
+"""A scene as JSON: numbers and texts, and a digest for everything else, such as the functions of a `FunctionPotential`.
+
+A digest shows whether two scenes are the same, but a scene cannot be restored from it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from functools import partial
+from importlib import import_module
+from types import CodeType, FunctionType, MethodType
+from typing import Any
+
+import numpy as np
+
+from ..check import build_unchecked, describe, read_only
+from ..errors import BadInput
+from ..scene import Scene
+
+_PACKAGE = __name__.partition(".")[0]
+_NOT_OF_MOTION = ("t_end", "dt", "group", "source")
+"""Fields of a scene that do not change the motion of its bodies on a given grid."""
+
+
+def find_scene(record: Mapping[str, Any], scene: object) -> Scene:
+    """Return the given scene if the record is its, or the scene of the record if None is given.
+
+    Raises
+    ------
+    BadInput
+        The scene is not that of the record; or it is None, and the record contains digests or cannot be restored.
+    """
+    if scene is None:
+        try:
+            restored = _restore(record)
+        except BadInput:
+            raise
+        except Exception:  # a damaged record can raise anything
+            restored = None
+        if not isinstance(restored, Scene):
+            raise BadInput("path", "a scene that cannot be read", "an ensemble as `integrate_many` wrote it")
+        return restored
+    if not isinstance(scene, Scene):
+        raise BadInput("scene", describe(scene), "None, or the Scene of the run")
+    if not record["fields"]["extra_invariants"]["tuple"]:
+        scene = scene.rename(scene.name, extra_invariants=())  # `integrate_many` drops those of one body for many
+    if not is_same_motion(record, record_scene(scene)):
+        raise BadInput("scene", repr(scene.name), f"the scene of the run, {record['fields']['name']!r}")
+    return scene
+
+
+def is_same_motion(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether two records are of scenes whose bodies have the same motion on the same grid."""
+    a, b = (json.loads(json.dumps({**each["fields"], **dict.fromkeys(_NOT_OF_MOTION)})) for each in (one, other))
+    return bool(a == b)
+
+
+def record_scene(value: Any) -> Any:
+    """Return a scene, or a value in it, as JSON."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return {"array": value.tolist()}
+    if isinstance(value, tuple):
+        return {"tuple": [record_scene(each) for each in value]}
+    kind = type(value)
+    if is_dataclass(value) and kind.__module__.partition(".")[0] == _PACKAGE and "<" not in kind.__qualname__:
+        named = {field.name: record_scene(getattr(value, field.name)) for field in fields(value)}
+        return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": named}
+    return {"digest": hashlib.sha256(repr(_list_parts(value, [])).encode()).hexdigest()[:16]}
+
+
+def _restore(record: Any) -> Any:
+    if not isinstance(record, dict):
+        return record
+    if "array" in record:
+        return read_only(np.array(record["array"], dtype=float))
+    if "tuple" in record:
+        return tuple(_restore(each) for each in record["tuple"])
+    if "digest" in record:
+        raise BadInput("scene", "None", "the scene of the run, by scene=, because its functions are not stored")
+    module, _, name = record["type"].partition(":")
+    kind = getattr(import_module(module), name) if module.partition(".")[0] == _PACKAGE else None
+    if not (isinstance(kind, type) and is_dataclass(kind)):
+        raise TypeError(f"no value of {record['type']}")
+    if record["fields"].keys() != {field.name for field in fields(kind)}:
+        raise TypeError(f"not the fields of {record['type']}")
+    return build_unchecked(kind, **{field: _restore(value) for field, value in record["fields"].items()})
+
+
+def _list_parts(value: Any, above: list[object]) -> Any:
+    """Return nested lists with the same `repr` in every process for values with the same behaviour.
+
+    A function is represented by its code and the values that it uses, because pickle's bytes of equal functions differ between
+    processes. `above` are the values that contain this one, to end cycles.
+    """
+    value = getattr(value, "py_func", value)  # a function that numba has compiled
+    kind, inner = f"{type(value).__module__}.{type(value).__qualname__}", [*above, value]
+    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+        return [kind, repr(value)]
+    if isinstance(value, np.ndarray | np.generic):
+        return [kind, value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
+    if any(each is value for each in above):
+        return [kind]
+    if isinstance(value, CodeType):
+        parts: list[Any] = [value.co_code, value.co_names, value.co_varnames, value.co_consts]
+    elif isinstance(value, FunctionType):
+        plain, known = (bool, int, float, complex, str, bytes, np.ndarray), value.__globals__
+        used = {name: known[name] for name in value.__code__.co_names if isinstance(known.get(name), plain)}
+        cells = [cell.cell_contents for cell in value.__closure__ or ()]
+        parts = [value.__code__, value.__defaults__, value.__kwdefaults__, used, cells]
+    elif isinstance(value, MethodType):
+        parts = [value.__func__, value.__self__]
+    elif isinstance(value, partial):
+        parts = [value.func, value.args, value.keywords]
+    elif isinstance(value, Mapping):
+        parts = [[key, value[key]] for key in sorted(value, key=repr)]
+    elif isinstance(value, set | frozenset):
+        parts = sorted(value, key=repr)
+    elif isinstance(value, list | tuple):
+        parts = list(value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        parts = [[field.name, getattr(value, field.name)] for field in fields(value)]
+    else:  # a class, a function of C, or an object
+        parts = [getattr(value, "__qualname__", ""), {} if isinstance(value, type) else dict(getattr(value, "__dict__", {}))]
+    return [kind, [_list_parts(part, inner) for part in parts]]
