@@ -18,10 +18,8 @@ class Potential(Protocol):
     """Base of all potentials: frozen values. Attitudes are (..., 3, 3), energies and gradients are in J.
 
     For a potential of your own, `FunctionPotential(energy, gradient)` with two Python functions is simple, and a thousand times
-    slower than a compiled field. For speed, write a frozen class with the methods below. Its `kernel_field` returns a named
-    tuple that implements the functions of `conservative.kernels.fields`: see `conservative/potentials/point_to_point.py` and
-    `conservative/kernels/point_fields.py`. `finite_derivative` must satisfy its identity to round-off, because energy is
-    conserved only as well as that.
+    slower than a compiled field. For speed, write a subclass of `conservative.potentials.field.FieldPotential`, which needs the
+    law once. `finite_derivative` must satisfy its identity to round-off, because energy is conserved only as well as that.
 
     An optional method `in_units(energy)` returns the field with energies in units of `energy` (J, a power of two). Our methods
     need it to integrate very large and very small scenes in units in which they are of order one.
