@@ -87,7 +87,7 @@ def test_the_template_loads_as_it_is_and_integrates(written):
         "R_WB.rotation_vector = " + str((ANGLE * AXIS / np.linalg.norm(AXIS)).tolist()),
     ],
 )
-def test_every_form_of_an_attitude_says_the_same(written, text):
+def test_every_form_of_an_attitude_is_equivalent(written, text):
     lines = GOOD.splitlines()[:-2]
     scene = scene_file.load(written("\n".join([*lines, text])))
     np.testing.assert_allclose(scene.R_WB0, R, atol=1e-15)  # measured 2e-16
