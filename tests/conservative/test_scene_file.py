@@ -57,6 +57,16 @@ def body_of(text):
     return head + "[body]\n" + text + "\n\n[start]" + rest.split("[start]")[1]
 
 
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        path = tmp_path / "my_body.toml"
+        path.write_bytes(text.encode() if isinstance(text, str) else text)
+        return path
+
+    return write
+
+
 def test_every_number_of_a_file_is_in_the_scene(written):
     path = written(GOOD)
     scene = registry.scene(str(path))
