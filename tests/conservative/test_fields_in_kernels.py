@@ -1,11 +1,11 @@
-"""Fields as kernels see them, against their potentials in NumPy and against difference quotients."""
+"""Fields in kernels against their potentials in NumPy and against difference quotients."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from conservative import LinearSpring
-from conservative.kernels import fields
+from conservative.kernels import fields, function_field
 
 from .one_body import FIELDS, TURN, in_field, torque
 
@@ -21,7 +21,7 @@ def matrix(q):
 
 
 def turned(a):
-    """The attitude after a step whose half has the Cayley vector a."""
+    """Return the attitude after a step whose half has the Cayley vector a."""
     return matrix(Q) @ matrix((1.0, *a))
 
 
@@ -30,8 +30,9 @@ def columns(R):
 
 
 @pytest.fixture(params=SCENES)
-def case(request):
-    """A scene, and its field in the body's principal axes, which are not those of the body."""
+def case(request, monkeypatch):
+    """Return a scene, and its field in principal axes, which differ from the axes of the body."""
+    monkeypatch.setattr(function_field, "_call", function_field._call_plain)  # called from Python, these kernels are Python
     scene = SCENES[request.param]
     return scene, scene.potential.kernel_field(TURN)
 
