@@ -1,6 +1,6 @@
-"""Fields of many bodies at once, as numbers of the named tuples that kernels take (`conservative.kernels.fields`).
+"""Parameters of the fields of many bodies, for the named tuples of `conservative.kernels.fields`.
 
-What a potential's `kernel_field` does for one body is done here for n of them. Source: definitions.
+`find_fields` computes for n bodies what `kernel_field` of a potential computes for one.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class Fields:
     Attributes
     ----------
     like
-        The kernel's field, whatever its numbers.
+        An instance of the kernel's field type; its numbers are not used.
     numbers
-        These numbers (n, k), a row for each body; lengths in units of the longest.
+        Numbers of the fields (n, k), a row for each body; lengths in units of the longest.
     energies
-        Which of the k are proportional to energy, J.
+        Columns of `numbers` that are proportional to energy, J.
     axis_W
-        Axes (n, 3), vectors of any length, world axes; 0 where nothing acts.
+        Axes of the fields (n, 3), world axes, of any length; 0 for free bodies.
     scale
-        Sizes (n,) of the potential, J.
+        Magnitudes (n,) of the potentials, J.
     """
 
     like: Any
@@ -48,7 +48,7 @@ class Fields:
 
 @singledispatch
 def find_fields(potential: Any, bodies: Batch, R_BP: Array) -> Fields | None:
-    """Return the fields of n bodies in axes R_BP (n, 3, 3), energies in J; None of a kind that is not known here."""
+    """Return the fields of n bodies in axes R_BP (n, 3, 3), energies in J; None for other kinds of potentials."""
     return None
 
 
@@ -93,7 +93,7 @@ def _find_gradients(potential: GravityGradient, bodies: Batch, R_BP: Array) -> F
 
 
 def read_parameter(bodies: Batch, name: str) -> Array:
-    """Return what the field `name` of each body's potential is, (n,), (n, 3) or (n, 3, 3), in its own unit: N, m, rad/s ..."""
+    """Return the parameter `name` of each body's potential, (n,), (n, 3) or (n, 3, 3), in SI units."""
     if name in bodies.parameters:
         return np.asarray(bodies.parameters[name], dtype=float)
     value = np.asarray(getattr(bodies.scene.potential, name), dtype=float)
@@ -101,5 +101,5 @@ def read_parameter(bodies: Batch, name: str) -> Array:
 
 
 def into_axes(v: Array, R_BP: Array) -> Array:
-    """Return vectors (n, 3) of any unit, body axes, in axes R_BP (n, 3, 3)."""
+    """Convert vectors (n, 3) from body axes to the axes R_BP (n, 3, 3)."""
     return np.asarray((v[:, None, :] @ R_BP)[:, 0, :])

@@ -93,6 +93,6 @@ def _from_pip() -> dict[str, str]:
     variables = {_FROM_PIP[key]: value for _, key, value in settings if key in _FROM_PIP}
     if "UV_FIND_LINKS" in variables:
         variables["UV_FIND_LINKS"] = ",".join(variables["UV_FIND_LINKS"].split())
-    if "UV_INDEX" in variables:  # with several indexes the best version counts, as with pip
+    if "UV_INDEX" in variables:  # the best version of all indexes is installed, as with pip
         variables["UV_INDEX_STRATEGY"] = "unsafe-best-match"
     return variables
