@@ -189,8 +189,8 @@ class AccuracyNotReached(UserWarning):
     def __init__(self, error: float, estimate: float) -> None:
         self.error, self.estimate = error, estimate
         super().__init__(
-            f"The error of {error:g} rad is not reached; {estimate:.2g} rad is estimated. Round-off has an effect of that "
-            "size on this motion. Ask for a larger error or a shorter t_end"
+            f"The error of {error:g} rad is not reached; {estimate:.2g} rad is estimated. Round-off alone causes an error of "
+            "that size on this motion. Ask for a larger error or a shorter t_end"
         )
 
 

@@ -1,7 +1,7 @@
 """Reference solutions for any scene: multi-precision Taylor integration by heyoka on MPFR numbers (Biscani & Izzo 2021).
 
-An entry in `FIELDS` adds a potential. The torques here are a copy independent of those that heyoka and SciPy integrate in
-double precision, so that a mistake in one of them shows.
+An entry in `FIELDS` adds a potential. The torques here are independent of the torques that heyoka and SciPy
+integrate in double precision, so a mistake in one of them is detected.
 """
 
 from __future__ import annotations
@@ -107,9 +107,9 @@ def find_field(potential: Any) -> TorqueExpression | None:
 
 @lru_cache
 def _turn(field: TorqueExpression) -> TorqueExpression:
-    """Return the expressions of a field that turns with an orbit: parameters rate (1), normal (3) and those of the field.
+    """Return the expressions of a field that turns with an orbit: parameters rate (1), normal (3), then the field's.
 
-    Cached, so that the compiled integrators of a field are found again.
+    The result is cached, because compiled integrators are cached by it.
     """
 
     def values(potential: Turning) -> list[Number]:
@@ -126,7 +126,7 @@ def _turn(field: TorqueExpression) -> TorqueExpression:
 
 @dataclass(frozen=True)
 class Precise(Method):
-    """Quaternion and body rates by heyoka in multi-precision; dt is only the distance of samples.
+    """Quaternion and body rates integrated by heyoka in multi-precision; dt is only the sampling interval.
 
     The initial state is taken as exact numbers, and samples are rounded to double. `states` returns them unrounded.
 
@@ -208,7 +208,7 @@ def states(
     w0
         Rates at t = 0 (3,), rad/s, body axes.
     t
-        Increasing times (n,), s, of which the first is 0 or later.
+        Increasing times (n,), s, not negative.
     moment_B
         Weight times centre of mass (3,), N m, body axes; gravity points along the world's -z. None for a free body.
     bits

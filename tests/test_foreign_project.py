@@ -69,7 +69,7 @@ def test_our_command_line_does_not_take_its_packages(with_us, project):
     assert "brick_flip" in text
 
 
-def test_our_suite_runs_beside_its_packages(with_us, project):
+def test_our_suite_runs_next_to_its_packages(with_us, project):
     options = ["--benchmark", "--benchmark-max-time=0.001", "-k", "brick_flip-scipy"]
     code, text = with_us.run(["python", "-m", "pytest", *options], project)
     assert code == 0, text

@@ -9,6 +9,7 @@ import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.benchmarks.studies import hard_cases, selection, sphere_curves
 from conservative.benchmarks.suite import points
+from conservative.errors import NotLoadable
 from conservative.methods import search
 from conservative.reports.charts import style
 
@@ -127,7 +128,7 @@ NEEDY = SOURCE.replace(
 """The same method, which needs an engine that is not installed."""
 
 
-def test_a_method_without_what_it_needs_breaks_nothing(installed):
+def test_a_method_without_its_engine_breaks_nothing(installed):
     top = cv.scenes.asymmetric_top()
     before = search.candidates(top)
     installed(NEEDY)
@@ -138,18 +139,22 @@ def test_a_method_without_what_it_needs_breaks_nothing(installed):
 
 
 BROKEN = {
-    "nothing there": ("", "borrowed = borrowed_nowhere:Borrowed"),
-    "fails on import": ("raise OSError('no licence')", "borrowed = borrowed_method:Borrowed"),
-    "no class": (SOURCE, "borrowed = borrowed_method:Role"),
-    "another name": (SOURCE, "lent = borrowed_method:Borrowed"),
+    "nothing there": ("", "borrowed = borrowed_nowhere:Borrowed", NotLoadable, "'borrowed', registered as 'borrowed_nowhere:B"),
+    "fails on import": ("raise OSError('no licence')", "borrowed = borrowed_method:Borrowed", NotLoadable, "cannot be loaded"),
+    "no class": (SOURCE, "borrowed = borrowed_method:Phantom", NotLoadable, "cannot be loaded"),
+    "not a method": (SOURCE, "borrowed = borrowed_method:Role", cv.BadInput, "class Role has family = None"),
+    "another name": (SOURCE, "lent = borrowed_method:Borrowed", cv.BadInput, "family = 'borrowed'; expected family = 'lent'"),
 }
 
 
 @pytest.mark.parametrize("what", BROKEN)
-def test_a_broken_entry_point_breaks_nothing(installed, what):
+def test_a_broken_entry_point_is_reported_and_breaks_nothing(installed, what):
+    source, entry, error, message = BROKEN[what]
     top = cv.scenes.asymmetric_top()
     families, chosen = registry.list_families(), search.candidates(top)
-    installed(*BROKEN[what])
+    installed(source, entry)
+    with pytest.raises(error, match=message):
+        registry.method(entry.partition(" ")[0])
     assert registry.list_families() == families
     assert search.candidates(top) == chosen
     assert list(style.order_lines({"mujoco 4.0.0 RK4": "mujoco", "reduced": "reduced"})) == ["reduced", "mujoco 4.0.0 RK4"]

@@ -66,7 +66,7 @@ def test_the_fastest_setting_at_an_error_is_found_between_its_points():
     assert load("measure").fastest(pd.DataFrame(rows), 1e-10) == (float("inf"), "")
 
 
-def test_ratios_on_random_bodies_are_geometric_means_and_a_side_alone_has_none():
+def test_ratios_on_random_bodies_are_geometric_means_over_bodies_with_both_times():
     rows = []
     for index, (ours, heyoka) in enumerate([(1e-6, 2e-6), (1e-6, 8e-6), (None, 1e-6)]):
         scene = f"random_body:field=spring,seed=1,index={index}"

@@ -19,15 +19,15 @@ TREND = 0.5
 SIGNIFICANT = 3.0
 """Standard errors between the slope of a secular drift and zero."""
 FASTER_THAN_LINEAR = 10.0
-"""A disturbance that rises this far above a straight line is called amplified."""
+"""A motion is unstable if it amplifies a disturbance by this factor more than in proportion to time."""
 
 
 @dataclass(frozen=True)
 class ExpectedDrift:
     """Change of an invariant relative to its reference scale.
 
-    `measured` is the largest in the run, `expected` the largest over the duration: proportional to time if the drift is
-    `secular`, otherwise as measured. `slope` is that of a straight line, 1/s.
+    `measured` is the largest drift of the run. `expected` is the largest drift over the duration: proportional to time if the
+    drift is `secular`, otherwise as measured. `slope` is the slope of a fitted line, 1/s.
     """
 
     name: str
@@ -62,10 +62,10 @@ class ErrorLaw:
     exponent
         p of t^p between half the run and all of it.
     linear, quadratic
-        Coefficients of a t + b t^2, rad/s and rad/s^2. b is the larger of what the exponent implies and the effect of a steady
-        drift of an invariant on the phase.
+        Coefficients a and b of a t + b t^2, rad/s and rad/s^2. b is the larger of two values: the fitted one, and the effect of
+        a steady drift of an invariant on the phase.
     excess
-        Factor by which the motion itself amplifies errors beyond that, between the length and the duration.
+        Additional factor by which the motion itself amplifies errors between the length and the duration.
     carried
         Text on the coarser setting from which this law was scaled; "" for a law of the run itself.
     """
@@ -108,7 +108,7 @@ class ErrorLaw:
             return f"measured over all {duration:g} s"
         run = f"measured over {self.length:.3g} s{self.carried}"
         if self.error >= ASYMPTOTIC:
-            return f"{run}, lost there"
+            return f"{run}, where the attitude is lost"
         if math.isinf(self.excess):
             return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
         steady, growing = self.linear * duration, self.quadratic * duration**2
@@ -120,8 +120,8 @@ class ErrorLaw:
 def fit_law(t: Array, error: Array, phase_acceleration: float, excess: float) -> ErrorLaw:
     """Return the law of an error.
 
-    With E1 and E2 the largest error over the first half of the run and over all of it, a t + b t^2 goes through both if the
-    error grows faster than t and slower than t^2; b is 0 below that, and a above.
+    E1 is the largest error over the first half of the run, and E2 over the whole run. If the error grows faster than t and more
+    slowly than t^2, a t + b t^2 goes through both. If it grows more slowly, b is 0. If it grows faster, a is 0.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Amplification:
     """Growth of a small relative change of the initial rates, the `disturbance`, as long as the two motions are comparable.
 
     `factor` (n,) is the largest difference of the attitudes up to the times t (n,), s, in rad, divided by the disturbance.
-    `label` belongs to the method that integrated both motions. After t[-1] they have nothing in common if `is_lost`.
+    `label` belongs to the method that integrated both motions. If `is_lost`, the two motions are unrelated after t[-1].
     """
 
     t: Array
@@ -156,7 +156,7 @@ class Amplification:
 
     @property
     def final_size(self) -> float:
-        """Largest difference, rad."""
+        """Largest difference of the attitudes, rad."""
         return float(self.factor[-1]) * self.disturbance
 
     @property
@@ -185,7 +185,7 @@ class Amplification:
 
 
 def amplification_of(t: Array, factor: Array, disturbance: float, label: str) -> Amplification:
-    """Return the amplification up to the time at which the two motions have nothing in common."""
+    """Return the amplification up to the time at which the two motions become unrelated."""
     lost = factor * disturbance > ASYMPTOTIC
     known = max(2, int(np.argmax(lost))) if lost.any() else len(t)
     return Amplification(t[:known], factor[:known], disturbance, label, known < len(t))

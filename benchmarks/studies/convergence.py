@@ -21,7 +21,7 @@ ORDERS = {
     Measure.ATTITUDE_MAX: (Measure.ORDER, Measure.ORDER_STDERR),
     Measure.RATES_MAX: (Measure.ORDER_RATES, Measure.ORDER_RATES_STDERR),
 }
-"""The measure to which an order is fitted, and the measures of the order and of its standard error."""
+"""Error measures to which orders are fitted, with the measures of the order and of its standard error."""
 ERRORS = (Measure.ATTITUDE_MAX, Measure.ATTITUDE_FINAL, Measure.RATES_MAX)
 """Measures at every step size."""
 
@@ -62,7 +62,7 @@ def converge(study: Study, scene: Scene, method: Method) -> Iterator[Measurement
 
 
 def order_rows(case: Case, names: tuple[Measure, Measure], order: Order, reason: str) -> list[Measurement]:
-    """Return the rows of an observed order and its standard error; without values if there is a reason."""
+    """Return the rows of an observed order and its standard error. `reason` explains a missing order; "" if there is one."""
     outcome = Outcome(OutcomeKind.NO_ORDER, reason) if reason else OK
     rows = case.rows(map(Value, names, (order.slope, order.stderr)), outcome, "" if reason else str(order))
     return list(map(drop_step, rows))

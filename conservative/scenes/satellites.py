@@ -1,8 +1,8 @@
 """Satellites in a circular orbit, turned by the gravity gradient of the planet: libration, tumbling, stability.
 
 The planet moves round the satellite once per orbit, so the field turns: the Jacobi integral is conserved and energy is not. A
-field fixed in the world is another motion: with it, the attitude error of `tumbling_satellite` is 16 degrees after one orbit
-and that of `librating_satellite` up to half a turn.
+field fixed in the world would cause a different motion: after one orbit, the attitude of `tumbling_satellite` would differ by
+16 degrees, and the attitude of `librating_satellite` by up to half a turn.
 
 For a satellite at rest in its orbit, with the axes of Hughes (1 along the track, 2 opposite to the orbit's normal, 3 towards
 the planet) and k1 = (J2 - J3)/J1, k3 = (J2 - J1)/J3, small angles s obey, in time units of 1/rate,
@@ -29,7 +29,7 @@ from ..potentials.turning import Orbit
 from ..scene import Scene
 
 PERIOD = 5400.0
-"""Period of the orbit, s, as at some 280 km above the Earth."""
+"""Period of the orbit, s: about 280 km above the Earth."""
 RATE = 2 * math.pi / PERIOD
 DISTURBED_ABOUT = (0.6, 0.48, 0.64)
 _NORMAL, _TO_PLANET = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
@@ -37,7 +37,7 @@ _SOURCE = "Hughes (1986), 9.2"
 
 
 def librating_satellite(amplitude: float = 0.5, t_end: float = 2 * PERIOD) -> Scene:
-    """Return a satellite that librates in the orbital plane like a pendulum, from rest at an angle, rad, to the planet.
+    """Return a satellite that librates in the orbital plane like a pendulum, released at `amplitude` rad to the planet.
 
     With axis 3 along the normal, J3 a'' = -3 rate^2 (J2 - J1) sin a cos a, so sin a = k cd(W t, k), k = sin(amplitude),
     W^2 = 3 rate^2 (J2 - J1)/J3. Beyond a right angle it librates about the opposite direction. `t_end` is in s.
@@ -56,14 +56,14 @@ def tumbling_satellite(t_end: float = PERIOD) -> Scene:
 
 
 def stable_satellite(k1: float = 0.6, k3: float = 0.3, disturbance: float = 1e-3, t_end: float = 4 * PERIOD) -> Scene:
-    """Return a satellite near rest in its orbit, stable by default: k1 > k3 > 0.
+    """Return a satellite near equilibrium in its orbit. By default it is stable: k1 > k3 > 0.
 
     Parameters
     ----------
     k1, k3
         Ratios (J2 - J3)/J1 and (J2 - J1)/J3, above -1 and below 1.
     disturbance
-        Initial angle from rest, rad, about a direction of no symmetry.
+        Initial angle, rad, between the satellite and its equilibrium, about an oblique axis.
     t_end
         Duration, s.
     """
@@ -77,7 +77,7 @@ def unstable_satellite(k1: float = 0.3, k3: float = 0.6, disturbance: float = 1e
 
 def moments_of(k1: float, k3: float) -> Array:
     """Return moments (3,) with the ratios (J2 - J3)/J1 = k1 and (J2 - J1)/J3 = k3, the largest of them 100 kg m^2."""
-    allowed = "a number above -1 and below 1, as that of every body"
+    allowed = "a number above -1 and below 1, as for every body"
     for name, value in (("k1", k1), ("k3", k3)):
         if not -1 < finite_number(name, value, allowed) < 1:
             raise BadInput(name, describe(value), allowed)

@@ -31,7 +31,7 @@ def engine_class(module: ModuleType) -> type[EngineMethod]:
 
 
 class EngineMethod(AdapterMethod):
-    """An engine in an environment of its own.
+    """An engine in its own environment.
 
     Attributes
     ----------

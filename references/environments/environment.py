@@ -99,7 +99,7 @@ class Environment:
 
     @property
     def is_build(self) -> bool:
-        """Whether the engine is a user's own build, not a release."""
+        """True if the engine is a user's own build, not a release."""
         return BUILD in self.version.partition("+")[2]
 
     @property
@@ -135,7 +135,7 @@ _workers: dict[tuple[Path, str, int], Worker] = {}
 def worker_of(environment: Environment, precision: str = "f64") -> Worker:
     """Return the worker of an environment, one for each precision, because JAX and Genesis have one precision per process.
 
-    A forked process gets workers of its own, since two processes cannot share a pipe.
+    A forked process gets other workers, because two processes cannot share a pipe.
     """
     key = environment.folder, precision, os.getpid()
     if key not in _workers:

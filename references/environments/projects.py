@@ -3,8 +3,8 @@
     FOLDER/wheels/KEY/      the wheel of a version; KEY is its commit or its hash
     FOLDER/NAME/KEY/        its environment (see `environment`); NAME is that of the package
 
-FOLDER is `projects` next to the folder of engines. Both are kept, so that the base of many comparisons is built once. The other
-packages of an environment have their current versions: if these have changed, it is created again.
+FOLDER is `projects` next to the folder of engines. Wheels and environments stay there, so that the base of many comparisons is
+built once. The other packages of an environment have their current versions: if these have changed, it is created again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .install import build_wheel, clear_leftovers, drop, import_trouble, make
 from .lock import Source, normal_name, resolve_wheel
 
 KEPT = 8
-"""Number of environments of a project that are kept, the last used ones."""
+"""Largest number of environments of a project. The least recently used ones are removed."""
 US = "conservative"
 _WHEEL = re.compile(r"([A-Za-z0-9_.]+)-[0-9][^-]*(-[^-]+){3,4}\.whl")
 

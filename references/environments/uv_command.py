@@ -36,19 +36,19 @@ class UvFailed(RuntimeError):
         super().__init__(self.summary)
 
     def says(self, *texts: str) -> bool:
-        """Return whether its output contains one of the texts."""
+        """Return True if the output contains one of the texts."""
         return any(text in self.words for text in texts)
 
     @property
     def no_wheel(self) -> bool:
-        """Whether the version exists, but without a wheel for this Python and system."""
+        """True if the version exists, but has no wheel for this Python and system."""
         return self.says("no wheels with a matching", "has no usable wheels", "have no usable wheels", "Requires-Python") or (
             re.search(r"depends on Python|does not satisfy Python", self.words) is not None
         )
 
     @property
     def summary(self) -> str:
-        """Its error message in one line."""
+        """The error message in one line."""
         lines = [line.strip() for line in self.words.splitlines() if line.strip()]
         errors = [line for line in lines if line.startswith(("error:", "cause:", "×", "╰─▶"))] or lines[-1:]
         return " ".join(errors[-1].split())[:300] if errors else "uv ended with an error"
@@ -93,6 +93,6 @@ def _from_pip() -> dict[str, str]:
     variables = {_FROM_PIP[key]: value for _, key, value in settings if key in _FROM_PIP}
     if "UV_FIND_LINKS" in variables:
         variables["UV_FIND_LINKS"] = ",".join(variables["UV_FIND_LINKS"].split())
-    if "UV_INDEX" in variables:  # with several indexes the best version counts, as with pip
+    if "UV_INDEX" in variables:  # the best version of all indexes is installed, as with pip
         variables["UV_INDEX_STRATEGY"] = "unsafe-best-match"
     return variables

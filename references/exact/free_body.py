@@ -9,8 +9,8 @@ e_z, which is regular for m3 > 0. Then
 
     2 chi' = |L|/J3 + (2T/|L| - |L|/J3) / (1 + m3),
 
-Because of its pole at 1 + m3 = 0, dn v = -|L|/L3max, exp(i chi) is the phase of exp(i mu t) theta_4(v - i y) with quarter
-periods (K, 2 K') and dc(y, 1 - m) = |L|/L3max.
+This has a pole at 1 + m3 = 0, that is dn v = -|L|/L3max. Therefore exp(i chi) is the phase of exp(i mu t) theta_4(v - i y) with
+quarter periods (K, 2 K') and dc(y, 1 - m) = |L|/L3max.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from .theta import Lattice, Points, Quotient, Theta, jacobi, theta
 
 @dataclass(frozen=True, eq=False)
 class OrderedAxes:
-    """Moments and momentum in axes 1, 2, 3 as above, and quantities that are sums of terms of one sign.
+    """Moments and momentum in axes 1, 2, 3 as above, and derived quantities that are computed without cancellation.
 
     The columns of `R_BP` are the axes, with L1 and L3 not negative.
     """

@@ -85,12 +85,12 @@ class Top:
 
     @property
     def rising(self) -> bool:
-        """Whether u' >= 0."""
+        """True if u' >= 0."""
         return bool((mp.conj(self.across) * self.w).imag >= 0)
 
     @property
     def upright(self) -> bool:
-        """Whether the axis stands or hangs at rest."""
+        """True if the axis stands or hangs at rest."""
         return bool(abs(self.across) < _UPRIGHT and abs(self.w) < _UPRIGHT * mp.sqrt(self.k))
 
     @property

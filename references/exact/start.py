@@ -58,7 +58,7 @@ class InitialState:
 
     @property
     def steady(self) -> bool:
-        """Whether a free body turns about a fixed axis or rests: its momentum is parallel to its rates."""
+        """True if a free body turns about a fixed axis or rests: its momentum is parallel to its rates."""
         moments, axes = self.principal
         w = self.rates(axes)
         L = [a * b for a, b in zip(moments, w, strict=True)]

@@ -41,7 +41,7 @@ class Lattice:
 
     @cached_property
     def hyperbolic(self) -> bool:
-        """Whether the complementary nome is the smaller one."""
+        """True if the complementary nome is the smaller one."""
         return bool(self.K_prime < self.K)
 
     @cached_property

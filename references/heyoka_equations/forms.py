@@ -242,5 +242,5 @@ def _sums(a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
 
 
 def is_zero(x: Expression) -> bool:
-    """Return whether an expression is the constant 0, whose terms are not in a form."""
+    """Return True if an expression is the constant 0, whose terms are not in a form."""
     return isinstance(x, float) and x == 0

@@ -69,7 +69,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 class Worker:
-    """A program in a process of its own. It starts with the first request, and again with the next request after it ended.
+    """A program in another process. It starts with the first request, and again with the next request after it ended.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Worker:
         return answer
 
     def forget(self, start: int, run: int) -> None:
-        """Let a run be forgotten that was prepared after a given start; the program is told with the next request."""
+        """Forget a run that was prepared after a given start. The next request tells the program to free it."""
         self._unwanted.append((start, run))
 
     @property
@@ -151,7 +151,7 @@ class Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether a request is being answered."""
+        """True while a request is being answered."""
         return self._lock.locked()
 
     def close(self) -> None:

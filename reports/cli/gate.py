@@ -127,7 +127,7 @@ def _judge(options: dict[str, Any]) -> Document:
 
 
 def _compare_and_write(options: dict[str, Any]) -> Document:
-    """Compare two versions and write the files that are asked for; missing packages and bad paths end it before any work."""
+    """Compare two versions and write the requested files. Missing packages and bad paths are reported before any work."""
     require_extra("conservative gate --against", "environments")
     require_extra("conservative gate --against", "gate", "heyoka")
     if options["html"]:

@@ -41,7 +41,7 @@ from .options import Output, OutputCommand, epilog, json_option, scene_argument,
 def run(scene: str, methods: tuple[str, ...], dt: float | None, t_end: float | None, as_json: bool, csv: Path | None) -> None:
     """Integrate SCENE once and print its outcome, drifts and final state; with several methods, a table.
 
-    Every step is stored, but at most a million evenly spaced samples. If the run fails, the CSV file contains the samples
+    Every step is stored. Longer runs store a million evenly spaced samples. If the run fails, the CSV file contains the samples
     before the failure, and the exit code is 1.
     """
     require_extra("conservative run", "report", "rich")

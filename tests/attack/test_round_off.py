@@ -50,7 +50,7 @@ def fit_growth(drift, steps):
     The changes over blocks of a walk are independent and of mean zero, so that the t value of each member, as a normal deviate,
     squared and summed over members, has a chi-square distribution. Members may drift in different directions.
     """
-    # Sixteen blocks are enough for t, and long enough that what is periodic in the motion is not taken for dependence.
+    # Sixteen blocks are enough for t, and long enough that periodic motion is not taken for dependence.
     coarse = np.diff(drift[:, :: (drift.shape[1] - 1) // 16], axis=1)
     scatter = np.maximum(coarse.std(axis=1, ddof=1), np.finfo(float).tiny)
     t = np.abs(coarse.mean(axis=1)) / scatter * math.sqrt(coarse.shape[1])
@@ -118,7 +118,7 @@ def test_bounded_drifts_are_no_faster_than_a_walk():
 
 
 def test_a_stopping_test_before_the_update_is_seen():
-    # The paper's own: Newton ends where the residual is small, and what is left of it has one sign.
+    # The paper's test: Newton ends when the residual is small, and the rest of the residual has one sign.
     grown = measure_growth(cv.Convected(tol=1e-6), cv.scenes.brick_flip(), 0.01, 640, 3)["energy"]
     assert grown.linear, str(grown)
     assert grown.exponent > 0.9  # measured 0.96

@@ -88,7 +88,7 @@ def draw_runs(methods, number, rng):
 
 
 def attack(methods, number):
-    """Return a line for each run whose result in threads differs from that of the run alone, or that raises an exception."""
+    """Return a line for each run whose result in threads differs from the run alone, or that raises an exception."""
     runs = draw_runs(methods, number, np.random.default_rng(SEED))
     alone = {run: run.digest(run.scene) for run in dict.fromkeys(runs)}
     start = Barrier(THREADS)

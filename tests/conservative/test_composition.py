@@ -59,7 +59,7 @@ def test_a_run_shows_the_claimed_order(name: str) -> None:
 
 
 @pytest.mark.parametrize("order", BEST)
-def test_energy_and_vertical_momentum_are_kept_at_every_order(order: int) -> None:
+def test_energy_and_vertical_momentum_are_conserved_at_every_order(order: int) -> None:
     trajectory = cv.Reduced(order).run(TOP, 0.05)
     vertical = trajectory.momentum_W[:, 2]
     assert np.ptp(trajectory.energy) / TOP.energy_scale < 3e-15  # measured 1.5e-15

@@ -1,4 +1,4 @@
-"""Fields as kernels see them, against their potentials in NumPy and against difference quotients."""
+"""Fields in machine code against their potentials in NumPy and against difference quotients."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def matrix(q):
 
 
 def turned(a):
-    """The attitude after a step whose half has the Cayley vector a."""
+    """Return the attitude after a step whose half has the Cayley vector a."""
     return matrix(Q) @ matrix((1.0, *a))
 
 
@@ -42,7 +42,7 @@ def columns(R):
 
 @pytest.fixture(params=SCENES)
 def case(request):
-    """A scene, and its field in the body's principal axes, which are not those of the body."""
+    """Return a scene, and its field in principal axes, which differ from the axes of the body."""
     scene = SCENES[request.param]
     return scene, scene.potential.kernel_field(TURN)
 

@@ -45,7 +45,7 @@ def names(folder):
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_a_full_disk_leaves_what_was_there(kind, tmp_path):
+def test_a_full_disk_leaves_the_file_as_it_was(kind, tmp_path):
     target = tmp_path / "run.csv"
     target.write_text("before")
     code, out, err = run_python(FULL.format(WRITERS[kind]), str(target))
@@ -58,7 +58,7 @@ def test_a_full_disk_leaves_what_was_there(kind, tmp_path):
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError, OSError])
-def test_an_exception_leaves_what_was_there(error, tmp_path):
+def test_an_exception_leaves_the_file_as_it_was(error, tmp_path):
     target = tmp_path / "run.csv"
     files.write_text(target, "before", "csv")
 

@@ -135,7 +135,7 @@ def test_the_store_is_bounded() -> None:
 @pytest.mark.parametrize(
     "method", [cv.Reduced(), cv.Reduced(4, frame="auto"), cv.Gauss(2), cv.Lame(), cv.Projected(), cv.Taylor()]
 )
-def test_nothing_keeps_a_scene_alive(method: cv.Method) -> None:
+def test_a_scene_is_freed_after_its_last_use(method: cv.Method) -> None:
     top = cv.scenes.lagrange_top()
     cv.integrate(top, method=method, t_end=0.05)
     gone = weakref.ref(top)

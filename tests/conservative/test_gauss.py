@@ -47,7 +47,7 @@ def state_by_scipy(scene: cv.Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("stages", range(1, MOST_STAGES + 1))
-def test_coefficients_are_those_of_a_method_that_keeps_quadratic_invariants(stages: int) -> None:
+def test_coefficients_conserve_quadratic_invariants_and_have_their_order(stages: int) -> None:
     table = tableau(stages)
     weighted = table.b[:, None] * table.A
     assert np.abs(weighted + weighted.T - np.outer(table.b, table.b)).max() < 5e-17  # measured 2.8e-17
@@ -68,7 +68,7 @@ def test_agrees_with_an_independent_solver(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("stages", [1, 2, 3, 5, 8, 10])
-def test_keeps_every_invariant_whatever_the_step(kind: str, stages: int) -> None:
+def test_conserves_every_invariant(kind: str, stages: int) -> None:
     trajectory = cv.integrate(generic(kind), 0.1, cv.Gauss(stages), t_end=100.0)
     assert drift(trajectory) < 3e-14  # measured up to 6e-15
     assert orthonormality(trajectory.R_WB).max() < 1e-14  # measured 4e-15, of the axis that eigh gives the symmetric body

@@ -133,7 +133,7 @@ def test_degenerate_bodies(kind: str, order: int | str) -> None:
     assert drifts(trajectory) < 5e-15  # measured 1.1e-15
 
 
-def test_a_body_at_rest_stays_and_a_small_step_is_no_worse() -> None:
+def test_a_body_at_rest_stays_and_small_steps_lose_no_digits() -> None:
     rest = cv.MoserVeselov().run(cv.Scene("rest", cv.RigidBody((1, 2, 3)), rotation_about((1, 1, 0), 1), (0, 0, 0), 1.0), 0.1)
     assert np.abs(rest.R_WB - rest.R_WB[0]).max() == 0
     assert np.abs(rest.w_WB_B).max() == 0
@@ -143,7 +143,7 @@ def test_a_body_at_rest_stays_and_a_small_step_is_no_worse() -> None:
     assert angle_between(coarse.R_WB[-1], trajectory.R_WB[-1]) < 1e-13  # measured 4e-15
 
 
-def test_what_it_refuses() -> None:
+def test_steps_that_are_too_long_are_refused() -> None:
     scene = cv.scenes.brick_flip()
     with pytest.raises(cv.BadInput, match=r"dt: got 0.15, .*expected a step with \|w\| dt < 1.5: below 0.149998 s"):
         cv.integrate(scene, 0.15, cv.MoserVeselov(6))

@@ -168,7 +168,7 @@ def test_the_axis_of_symmetry_is_drawn_if_there_is_one():
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 0), (1, 2, math.nan)])
-def test_an_axis_that_is_no_direction_is_refused(axis):
+def test_an_axis_without_direction_is_refused(axis):
     with pytest.raises(cv.BadInput, match=r"axis_B: got .*expected a direction"):
         ensemble(3, Grid(0.1, 1)).plot(axis_B=axis)
 
@@ -242,7 +242,7 @@ def test_quantiles_are_right_to_a_quarter_of_a_percent(R_WB):
     np.testing.assert_array_equal(angle_quantiles(R_WB, mean[[2]], [2]), found[[2]])
 
 
-def test_quantiles_of_equal_attitudes_and_of_none():
+def test_quantiles_of_equal_attitudes_and_of_failed_bodies():
     R = np.tile(rotation_about((1, 2, 3), 1.0), (4, 2, 1, 1))
     R[:, 1] = math.nan
     found = angle_quantiles(R, R[0] * 1.0)

@@ -50,7 +50,7 @@ def test_agrees_with_a_method_that_shares_no_code(field: str) -> None:
 
 @pytest.mark.parametrize("field", FIELDS)
 @pytest.mark.parametrize("dt", [0.02, 0.3])
-def test_keeps_every_invariant_of_the_field(field: str, dt: float) -> None:
+def test_conserves_every_invariant(field: str, dt: float) -> None:
     end = 3.0 if field in SLOW else 300.0
     trajectory = cv.integrate(scene(field), dt, cv.Projected(), t_end=end)
     assert drift(trajectory) < 4e-15  # measured up to 1.4e-15

@@ -1,12 +1,10 @@
 """Names of methods and scenes: read back, nearest names, entry points, labels."""
 
-from importlib.metadata import EntryPoint
-
 import pytest
 
 import conservative as cv
 from conservative import deferred_imports, registry
-from conservative.errors import BadInput, NotLoadable
+from conservative.errors import BadInput
 
 
 @pytest.mark.parametrize("name", registry.list_methods())
@@ -30,27 +28,6 @@ def test_the_nearest_names_of_an_unknown_scene_are_listed(text, hint):
     with pytest.raises(cv.BadInput) as caught:
         registry.scene(text)
     assert hint in str(caught.value)
-
-
-def with_entry(monkeypatch, name, value):
-    """Register another method, as an installed package would."""
-    group, list_entries = deferred_imports.METHODS, deferred_imports.list_entries
-    more = {group: list_entries(group) | {name: EntryPoint(name, value, group)}}
-    for module in (deferred_imports, registry):
-        monkeypatch.setattr(module, "list_entries", lambda group: more.get(group) or list_entries(group))
-
-
-@pytest.mark.parametrize("value", ["conservative.body:Phantom", "conservative.nowhere:Phantom"])
-def test_an_entry_point_that_cannot_be_loaded_is_named(monkeypatch, value):
-    with_entry(monkeypatch, "phantom", value)
-    with pytest.raises(NotLoadable, match=f"'phantom', registered as '{value}', which cannot be loaded"):
-        registry.method("phantom")
-
-
-def test_a_method_is_registered_under_its_own_name(monkeypatch):
-    with_entry(monkeypatch, "shorter", "conservative.methods.reduced:Reduced")
-    with pytest.raises(BadInput, match="class Reduced has family = 'reduced'; expected family = 'shorter'"):
-        registry.method("shorter")
 
 
 @pytest.mark.parametrize("text", ["heyoka:tol=small", "gauss:stages=two", "gauss:many"])

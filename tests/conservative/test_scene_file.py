@@ -57,6 +57,16 @@ def body_of(text):
     return head + "[body]\n" + text + "\n\n[start]" + rest.split("[start]")[1]
 
 
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        path = tmp_path / "my_body.toml"
+        path.write_bytes(text.encode() if isinstance(text, str) else text)
+        return path
+
+    return write
+
+
 def test_every_number_of_a_file_is_in_the_scene(written):
     path = written(GOOD)
     scene = registry.scene(str(path))
@@ -87,7 +97,7 @@ def test_the_template_loads_as_it_is_and_integrates(written):
         "R_WB.rotation_vector = " + str((ANGLE * AXIS / np.linalg.norm(AXIS)).tolist()),
     ],
 )
-def test_every_form_of_an_attitude_says_the_same(written, text):
+def test_every_form_of_an_attitude_is_equivalent(written, text):
     lines = GOOD.splitlines()[:-2]
     scene = scene_file.load(written("\n".join([*lines, text])))
     np.testing.assert_allclose(scene.R_WB0, R, atol=1e-15)  # measured 2e-16

@@ -106,7 +106,7 @@ def test_a_published_scene_has_the_reference_parameters_and_invariants(case):
         assert np.abs(invariant.evaluate(R, w) - start).max() < 2e-15 * invariant.scale  # measured 3.3e-16
 
 
-def test_separatrix_goes_to_the_unstable_axis_as_its_closed_form_says():
+def test_separatrix_follows_its_closed_form_to_the_unstable_axis():
     scene = cv.scenes.separatrix(t_end=1)
     w = cv.integrate(scene, 1e-4).w_WB_B[-1]
     Ja, Jc, Jb = 13, 5, 10
@@ -120,7 +120,7 @@ def test_separatrix_goes_to_the_unstable_axis_as_its_closed_form_says():
     ("name", "figure"),
     [("cusped_top", "cusps"), ("looping_top", "loops"), ("unduloid_top", "waves"), ("nutating_top", "waves")],
 )
-def test_nutating_tops_draw_what_they_are_named_after(name, figure):
+def test_nutating_tops_draw_cusps_loops_and_waves(name, figure):
     scene = registry.scene(name)
     trajectory = cv.integrate(scene, 0.0005)
     x, y, _ = np.moveaxis(trajectory.R_WB[:, :, 2], 1, 0)

@@ -327,7 +327,7 @@ def test_threads_get_the_same_choice():
     assert len(set(found)) == 1
 
 
-def test_progress_is_told_after_a_second_and_not_too_often():
+def test_progress_is_reported_after_a_second_and_rarely():
     told, now = [], iter((0.0, 0.2, 0.9, 1.0, 1.05, 1.2, 1.25, 5.0))
     observe = trials.throttle(told.append, lambda: next(now))
     for n in (2, 4, 8, 16, 32, 64, 128):

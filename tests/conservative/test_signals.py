@@ -78,7 +78,7 @@ def quartic(k):
 
 
 class Stop(BaseException):
-    """What a handler of the tests raises."""
+    """An exception raised by a handler."""
 
 
 @contextmanager
@@ -97,7 +97,7 @@ def long_run(n_steps: int = 10**9) -> cv.Trajectory:
     return cv.Reduced().prepare(cv.scenes.brick_flip(), Grid(1e-6, n_steps, n_steps))()
 
 
-def test_what_a_handler_raises_comes_out_as_it_is() -> None:
+def test_exceptions_of_a_handler_are_not_changed() -> None:
     def stop(*_: object) -> None:
         raise Stop("reason")
 
@@ -148,7 +148,7 @@ def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
         assert states(short()) == reference
 
 
-def test_a_time_limit_in_another_thread_is_kept() -> None:
+def test_another_thread_can_enforce_a_time_limit() -> None:
     """The run is let go on: a thread that is a daemon ends with its process."""
     started = threading.Event()
 

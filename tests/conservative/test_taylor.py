@@ -69,7 +69,7 @@ def test_a_step_has_the_error_of_its_order(field: str, order: int) -> None:
 
 @pytest.mark.parametrize("field", FIELDS)
 @pytest.mark.parametrize(("order", "dt"), [(6, 0.05), (14, 0.05), (18, 0.1)])
-def test_keeps_every_invariant_of_the_field(field: str, order: int, dt: float) -> None:
+def test_conserves_every_invariant(field: str, order: int, dt: float) -> None:
     trajectory = cv.integrate(scene(field), dt, cv.Taylor(order), t_end=500.0, sample_every=7)
     assert drift(trajectory) < 5e-15  # measured up to 2e-15
     assert orthonormality(trajectory.R_WB).max() < 1e-14  # measured 2e-15
@@ -83,7 +83,7 @@ def test_rounding_does_not_add_up() -> None:
 
 
 @pytest.mark.parametrize("potential", [cv.UniformGravity(4.0, 0.3 * TURN[:, 2]), None])
-def test_keeps_the_momentum_about_an_axis_of_symmetry(potential: cv.Potential | None) -> None:
+def test_conserves_the_momentum_about_an_axis_of_symmetry(potential: cv.Potential | None) -> None:
     held = cv.Scene("top", SYMMETRIC, rotation_about((0.3, -0.5, 0.8), 0.7), (1.2, -2.0, 0.7), 2.0, potential)
     for order, dt in ((5, 0.05), (14, 0.1)):
         trajectory = cv.integrate(held, dt, cv.Taylor(order), t_end=500.0)

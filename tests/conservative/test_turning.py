@@ -85,7 +85,7 @@ def test_projected_follows_the_textbook(field):
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_the_jacobi_integral_is_kept_and_energy_is_not(field):
+def test_the_jacobi_integral_is_conserved_and_energy_is_not(field):
     end = 0.6 if field == "two functions" else 300.0
     found = cv.integrate(scene(field, end), 0.02, cv.Projected())
     (invariant,) = found.scene.invariants
@@ -99,7 +99,7 @@ def test_the_jacobi_integral_is_kept_and_energy_is_not(field):
     assert np.ptp(by_hand) < 1e-13 * invariant.scale
 
 
-def test_taylor_keeps_the_jacobi_integral_and_follows_projected():
+def test_taylor_conserves_the_jacobi_integral_and_follows_projected():
     found = cv.integrate(scene(t_end=300.0), 0.05, cv.Taylor())
     assert np.abs(found.drift(found.scene.invariants[0])).max() < 4e-15  # measured 1.1e-15
     assert np.ptp(found.energy) > 0.01 * found.scene.energy_scale
@@ -174,7 +174,7 @@ def test_support_for_time_is_that_of_the_inner_method():
     assert cv.Substepped("projected").unsupported(scene()) is None
 
 
-def test_there_is_no_energy_of_the_attitude_alone():
+def test_energy_is_not_a_function_of_the_attitude_alone():
     field = scene().potential
     assert not isinstance(field, cv.Potential)
     for name in ("energy", "gradient", "finite_derivative"):
@@ -296,7 +296,7 @@ def test_unusable_arguments_are_refused(make, argument, hint):
     assert hint in str(caught.value)
 
 
-def test_there_is_no_value_without_a_time():
+def test_a_value_without_a_time_is_refused():
     for function in (FIELD.energy, FIELD.gradient):
         with pytest.raises(cv.PotentialFailed, match="attitude and time"):
             function(R_WB0)
@@ -367,7 +367,7 @@ def test_small_disturbances_grow_as_the_linearised_equations_predict(case):
         assert np.log(later / late) / window == pytest.approx(growth, rel=0.1)  # measured up to 5 %: oscillations
 
 
-def test_the_registered_satellites_are_what_their_names_say():
+def test_the_registered_satellites_are_stable_and_unstable():
     stable, unstable = cv.scenes.stable_satellite(), cv.scenes.unstable_satellite()
     for scene, largest in ((stable, (0.0, 0.01)), (unstable, (0.5, np.pi))):
         found = cv.integrate(scene, scene.dt, cv.Projected())

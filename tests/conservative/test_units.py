@@ -82,7 +82,7 @@ def test_a_motion_is_the_same_in_units_of_any_size(name: str, kind: str) -> None
             assert sizes(found.drift(invariant)).max() <= bound * 1e3 or invariant.name not in integrate.conserves
 
 
-def test_registered_scenes_keep_their_units() -> None:
+def test_registered_scenes_are_not_converted() -> None:
     for name in list_scenes():
         assert find_units(registered(name), registered(name).dt) == SI, name
 

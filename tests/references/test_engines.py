@@ -5,6 +5,7 @@ name the measured version.
 """
 
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import mujoco
 import mujoco.rollout
@@ -13,7 +14,7 @@ import pytest
 
 import conservative as cv
 from conservative import registry
-from conservative.attitude import angle_between, rotation_about
+from conservative.attitude import angle_between, from_quaternion, rotation_about
 from conservative.grid import Grid
 from conservative.references import engine
 from conservative.references.engine import principal_axes
@@ -21,6 +22,8 @@ from conservative.references.engines import heyoka
 from conservative.references.engines.catalogue import MuJoCo, Pinocchio
 from conservative.references.engines.heyoka import Heyoka
 from conservative.references.engines.scipy import SciPy
+from conservative.references.engines.shared import compile_models, sample
+from conservative.references.environments.plain_numbers import describe
 from conservative.references.exact.method import Exact
 from conservative.references.exact.start import _BLOCK
 from conservative.references.precise import Precise
@@ -197,6 +200,23 @@ def test_mujoco_makes_many_steps_in_one_call(free, monkeypatch, every, stepped, 
     )
     assert MuJoCo().prepare(free, Grid(0.01, 60, every))().ok
     assert (steps, rollouts) == (stepped, stored)
+
+
+def test_samples_of_an_engine_are_copies_of_its_state():
+    state, given = np.zeros(1), SimpleNamespace(steps=np.array([0, 2, 5]))
+    samples = sample(given, lambda: np.add(state, 1, out=state), lambda: {"w": state})
+    assert samples["w"].tolist() == [[0], [2], [5]]
+
+
+def test_mjcf_models_have_the_mass_distribution_of_the_scene(heavy):
+    given = SimpleNamespace(integrator="RK4", **describe(principal_axes(heavy), Grid(0.01, 1)))
+    (model,), gravity, arrays = compile_models([given])
+    np.testing.assert_allclose(gravity, [[0, 0, -given.gravity]], rtol=1e-15)
+    np.testing.assert_allclose(arrays["body_mass"], [[0, given.mass]], rtol=1e-15)
+    np.testing.assert_allclose(arrays["body_ipos"][0, 1], given.com, rtol=1e-15)
+    R = from_quaternion(model.body_iquat[1])
+    np.testing.assert_allclose(R @ np.diag(model.body_inertia[1]) @ R.T, given.inertia_com, atol=1e-14)  # measured 1.8e-15
+    assert (model.opt.timestep, model.nq, model.nv) == (0.01, 4, 3)
 
 
 BRICK = cv.scenes.brick_flip(t_end=1.0)

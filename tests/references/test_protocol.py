@@ -119,12 +119,12 @@ def test_a_silent_program_is_ended(start, monkeypatch):
 
 
 ADAPTER = """
-import time
+from .waiting import sleep
 calls = []
 def prepare(given):
     def run():
         calls.append("run")
-        time.sleep(given.seconds)
+        sleep(given.seconds)
         return {"calls": list(calls)}
     run.dispose = lambda: calls.append("dispose")
     return run
@@ -135,6 +135,7 @@ def count():
 
 def test_runs_have_unmeasured_calls_and_are_disposed_of(tmp_path):
     (tmp_path / "adapter.py").write_text(ADAPTER)
+    (tmp_path / "waiting.py").write_text("from time import sleep\n")  # adapters may import files of their folder
     adapter, worker = str(tmp_path / "adapter.py"), python_worker()
     try:
         run = worker.ask("prepare", adapter=adapter, settings={"seconds": 0.005})["run"]
