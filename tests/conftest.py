@@ -17,6 +17,7 @@ MARKERS = {
     "browser": "needs chromium and its driver; runs with --browser or --all",
     "engine(name)": "needs an engine in an environment of its own; runs with --engines name or --all",
     "attack": "searches for failures at random; runs with --attack",
+    "late": "runs last, with kernels that other tests have compiled",
 }
 ENGINES = "exudyn,rapier3d,bsk,mujoco==3.6.0"
 """Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
@@ -43,6 +44,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
+    items.sort(key=lambda item: item.get_closest_marker("late") is not None)
     everything = config.getoption("--all")
     engines = set(filter(None, (config.getoption("--engines") or (ENGINES if everything else "")).split(",")))
     wanted = {

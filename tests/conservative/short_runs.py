@@ -32,12 +32,12 @@ OTHER = ("conservative.kernels", "conservative.kernels.parts", "conservative.ker
 
 
 def in_field(name: str, potential: cv.Potential | cv.Turning) -> cv.Scene:
-    """A body without symmetry in a field."""
+    """Return a body without symmetry in a field."""
     return cv.Scene(name, BODY, rotation_about((1, 0.2, -1), 0.7), (0.3, -2.0, 1.0), 2.0, potential)
 
 
 def scenes() -> list[cv.Scene]:
-    """A scene of each kind of field; free ones in axes of their own and not, at rest, and on polhodes about either axis."""
+    """Return a scene for each kind of field, and free bodies at rest, in turned axes, and on polhodes about either axis."""
     quartic = cv.FunctionPotential(lambda R: (R[2] @ HOOK) ** 4, lambda R: np.outer([0, 0, 1], 4 * (R[2] @ HOOK) ** 3 * HOOK))
     growing = cv.FunctionPotential(
         lambda R, t: (1 + t) * R[2] @ HOOK, lambda R, t: (1 + t) * np.outer([0, 0, 1], HOOK), time_dependent=True
@@ -95,7 +95,7 @@ def runs() -> Iterator[tuple[str, Callable[[], cv.Trajectory | Block | None]]]:
 
 
 def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
-    """Three bodies at once, which start at rates of their own; None where the method runs them one by one."""
+    """Return the block of three bodies with different rates, or None if the method runs them one at a time."""
     bodies = Batch(scene, np.tile(scene.R_WB0, (3, 1, 1)), np.outer((1.0, 0.9, -1.1), scene.w_WB_B0), None, {})
     with np.errstate(all="ignore"):  # compiled, a body that fails goes on in its lane without a word
         run = method.prepare_many(bodies, grid)
@@ -106,7 +106,7 @@ def run_many(scene: cv.Scene, method: Method, grid: Grid) -> Block | None:
 
 
 def numbers(found: cv.Trajectory | Block | None) -> np.ndarray:
-    """Attitudes and rates, relative to the largest, of those who finished, and how many steps, or who, as one array."""
+    """Return attitudes and relative rates of finished bodies, and the number of steps or who finished, as one array."""
     if found is None:
         return np.empty(0)
     if isinstance(found, Block):
@@ -118,7 +118,7 @@ def numbers(found: cv.Trajectory | Block | None) -> np.ndarray:
 
 
 def functions() -> dict[str, str]:
-    """Names of all functions of the kernels by file and name of their code."""
+    """Return the names of all functions of the kernels by file and name of their code."""
     found = {}
     for module in pkgutil.iter_modules(kernels.__path__, "conservative.kernels."):
         if module.name in OTHER:

@@ -26,7 +26,7 @@ PACKAGE = Path(cv.__file__).parent
 
 
 def python(arguments: list[str], **environment: str) -> str:
-    """What Python prints with these variables changed; an empty one is removed."""
+    """Return the output of Python with these environment variables changed; empty ones are removed."""
     known = {**os.environ, **environment}
     command = [sys.executable, "-P", "-W", "error", *arguments]
     return subprocess.run(
@@ -34,6 +34,7 @@ def python(arguments: list[str], **environment: str) -> str:
     ).stdout.strip()
 
 
+@pytest.mark.late
 def test_plain_python_and_machine_code_agree_on_every_kernel(tmp_path: Path) -> None:
     plain, compiled = tmp_path / "plain.npz", tmp_path / "compiled.npz"
     not_called = python([str(SHORT_RUNS), str(plain)], NUMBA_DISABLE_JIT="1")
@@ -60,7 +61,7 @@ print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
 
 @pytest.mark.parametrize("setting", ["__pycache__", "NUMBA_CACHE_DIR"])
 def test_an_edit_of_an_inner_function_runs_new_code(tmp_path: Path, setting: str) -> None:
-    """The file of the outer kernel stays as it is, and so does the time of the file that is edited."""
+    """The file of the outer kernel and the modification time of the edited file do not change."""
     rooms = shutil.ignore_patterns("references", "benchmarks", "reports", "__pycache__")
     shutil.copytree(PACKAGE, tmp_path / "conservative", ignore=rooms)
     cache = str(tmp_path / "cache") if setting == "NUMBA_CACHE_DIR" else ""
@@ -96,12 +97,12 @@ NAMES = sorted({family.card.kernel for family in list_families().values() if fam
 
 
 def named(fields: type) -> Any:
-    """A named tuple whose values are the names of its fields."""
+    """Return a named tuple whose values are the names of its fields."""
     return fields(*(f"{fields.__name__}.{name}" for name in fields._fields))  # type: ignore[attr-defined]
 
 
 def plain_enter(module: ModuleType) -> Any:
-    """The function `enter` of a kernel as Python."""
+    """Return the function `enter` of a kernel as Python."""
     return getattr(module.enter, "py_func", module.enter)
 
 

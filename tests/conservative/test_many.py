@@ -240,7 +240,7 @@ T = GRID.t
 
 
 def samples():
-    """Attitudes and rates of no motion at all, so that drifts are large; attitudes are not quite orthonormal."""
+    """Return random attitudes and rates, so that drifts are large; attitudes are not exactly orthonormal."""
     R, w = starts(FIVE * TIMES, seed=1)
     R += 1e-3 * np.random.default_rng(2).normal(size=R.shape)
     return R.reshape(FIVE, TIMES, 3, 3), w.reshape(FIVE, TIMES, 3)
@@ -327,7 +327,7 @@ EVERY_OTHER = {"dt": 0.05, "t_end": 0.5, "sample_every": 2}
 
 @dataclass(frozen=True)
 class Damaged(Method):
-    """The method `INNER` on lanes, which `damage` changes before they are looked at."""
+    """The method `INNER` on lanes; `damage` changes their samples before they are checked."""
 
     damage: Any
 

@@ -1,4 +1,4 @@
-"""Signals and other threads during a compiled run, and blocks of steps that leave no trace in its results."""
+"""Signals and other threads during a compiled run; results do not depend on its blocks of steps."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from conservative.methods.principal_axes import principal_start
 from conservative.methods.run_kernel import prepare_run
 
 HANG = 120
-"""A time, s, that only what hangs exceeds."""
+"""Time limit of a program that does not hang, s."""
 INTERRUPT = """
 import os, signal, sys, threading
 import conservative as cv
@@ -65,7 +65,7 @@ THREADS = 4
 
 
 def quartic(k):
-    """A potential whose Python functions hand the interpreter over to other threads in the middle of every answer."""
+    """Return a potential whose Python functions let other threads run in the middle of every evaluation."""
     hook = np.array([0.0, 0.1 * k, 0.4])
 
     def energy(R):
@@ -83,7 +83,7 @@ class Stop(BaseException):
 
 @contextmanager
 def alarms(interval: float, handler: object) -> Iterator[None]:
-    """Alarms every so many seconds, and their handler."""
+    """Raise an alarm every `interval` seconds."""
     before = signal.signal(signal.SIGALRM, handler)  # type: ignore[arg-type]
     signal.setitimer(signal.ITIMER_REAL, interval, interval)
     try:
@@ -115,13 +115,13 @@ def test_a_handler_that_raises_nothing_changes_nothing(monkeypatch: pytest.Monke
 
 
 def repeat(run: Run) -> None:
-    """Make so many runs that an alarm falls into one."""
+    """Make enough runs for an alarm during one of them."""
     for _ in range(1000):
         run()
 
 
 def test_samples_without_end_are_interrupted_too() -> None:
-    """A run of few steps a sample: the most time goes into bringing the samples into body axes."""
+    """With one step per sample, most of the time is spent on the conversion of samples to body axes."""
 
     def stop(*_: object) -> None:
         raise Stop
@@ -134,7 +134,7 @@ def test_samples_without_end_are_interrupted_too() -> None:
 
 
 def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
-    """Signals come before, during and after the Python functions; what follows is not spoiled by a half-finished evaluation."""
+    """Signals come before, during and after the Python functions; an unfinished evaluation does not affect later runs."""
 
     def stop(*_: object) -> None:
         raise Stop
@@ -149,12 +149,12 @@ def test_an_interrupt_within_functions_of_a_potential_is_not_theirs() -> None:
 
 
 def test_another_thread_can_enforce_a_time_limit() -> None:
-    """The run is let go on: a thread that is a daemon ends with its process."""
+    """The run continues in a daemon thread, which ends with its process."""
     started = threading.Event()
 
     def work() -> None:
         started.set()
-        long_run(5 * 10**7)
+        long_run(10**7)
 
     long_run(10)
     thread = threading.Thread(target=work, daemon=True)
@@ -181,7 +181,7 @@ BLOCKS = (
 
 @pytest.mark.parametrize(("scene", "method", "factor"), BLOCKS)
 def test_results_do_not_depend_on_blocks(scene: str, method: str, factor: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short steps, long ones that the solver reaches in parts, and steps that fail."""
+    """Short steps, long steps that the solver reaches in parts, and steps that fail."""
     chosen, motion = registry.method(method), registry.scene(scene)
     dt = min(factor * motion.dt, 0.9 * chosen.longest_step(motion))
     run, kernel = chosen.prepare(motion, Grid(dt, 400, 3)), kernels(chosen.card.kernel)
@@ -214,7 +214,7 @@ def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: st
 
 
 def in_threads(runs):
-    """Call the runs at once, all of them prepared here, and return their states."""
+    """Make prepared runs in concurrent threads and return their states."""
     with ThreadPoolExecutor(len(runs)) as pool:
         return [states(trajectory) for trajectory in pool.map(lambda run: run(), runs)]
 
